@@ -1,0 +1,174 @@
+"""Nodes and edges on a flat grid: a node at every joint and rod end, and equal edges between them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from gridshell.layout.flatgrid import FlatGrid
+
+Ints = NDArray[np.intp]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GridMesh:
+    """A flat grid divided into edges; rods share one node at a joint.
+
+    Parameters
+    ----------
+    grid : the rods and joints that were meshed.
+    flat : (n, 3) node positions in the flat, unstressed state, z = 0 [m].
+    rod_nodes : (k,) nodes of all rods in a row, in the order of `grid.rods`.
+    rod_start : (m,) where each rod begins in `rod_nodes`.
+    stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
+    joint_nodes : (c,) node of each of the grid's crossings.
+    """
+
+    grid: FlatGrid
+    flat: Floats
+    rod_nodes: Ints
+    rod_start: Ints
+    stations: Floats
+    joint_nodes: Ints
+
+    @property
+    def node_count(self) -> int:
+        return len(self.flat)
+
+    def rod_slice(self, rod: int) -> slice:
+        stop = self.rod_start[rod + 1] if rod + 1 < len(self.rod_start) else len(self.rod_nodes)
+        return slice(int(self.rod_start[rod]), int(stop))
+
+    def nodes_of(self, rod: int) -> Ints:
+        """Nodes along one rod, from its start to its end."""
+        return self.rod_nodes[self.rod_slice(rod)]
+
+    @cached_property
+    def _rod_of(self) -> Ints:
+        lengths = np.diff(np.append(self.rod_start, len(self.rod_nodes)))
+        return np.repeat(np.arange(len(self.rod_start)), lengths)
+
+    @cached_property
+    def edges(self) -> Ints:
+        """(e, 2) nodes of each edge, rod by rod."""
+        return self._windows(2)
+
+    @cached_property
+    def edge_rods(self) -> Ints:
+        """(e,) rod of each edge."""
+        return self._rod_of[:-1][self._rod_of[1:] == self._rod_of[:-1]]
+
+    @cached_property
+    def edge_lengths(self) -> Floats:
+        """(e,) rest lengths [m]."""
+        return np.diff(self.stations)[self._rod_of[1:] == self._rod_of[:-1]]
+
+    @cached_property
+    def bends(self) -> Ints:
+        """(b, 3) nodes of each pair of consecutive edges of a rod."""
+        return self._windows(3)
+
+    @cached_property
+    def bend_rods(self) -> Ints:
+        """(b,) rod of each bend."""
+        return self._rod_of[:-2][self._rod_of[2:] == self._rod_of[:-2]]
+
+    @cached_property
+    def voronoi_lengths(self) -> Floats:
+        """(b,) half the rest length of the two edges of each bend [m] (HQK Eq 1b, of the rest state: ERRATA)."""
+        whole = (self.stations[2:] - self.stations[:-2])[self._rod_of[2:] == self._rod_of[:-2]]
+        return 0.5 * whole
+
+    @cached_property
+    def ends(self) -> Ints:
+        """(m, 2) first and last node of each rod."""
+        return np.column_stack([self.rod_nodes[self.rod_start], self.rod_nodes[self.rod_stop - 1]])
+
+    @property
+    def rod_stop(self) -> Ints:
+        return np.append(self.rod_start[1:], len(self.rod_nodes))
+
+    def _windows(self, width: int) -> Ints:
+        last = len(self.rod_nodes) - width + 1
+        inside = self._rod_of[width - 1 :] == self._rod_of[:last]
+        columns = [self.rod_nodes[k : k + last][inside] for k in range(width)]
+        return np.column_stack(columns)
+
+    def tributary_lengths(self) -> Floats:
+        """(n,) rod length that each node stands for: half of every edge that meets there [m]."""
+        total = np.zeros(self.node_count)
+        np.add.at(total, self.edges, 0.5 * self.edge_lengths[:, None])
+        return total
+
+    def prolong(self, positions: Floats, fine: "GridMesh") -> Floats:
+        """Positions (n, 3) of the nodes of `fine`, by a cubic spline along each rod of this mesh [m]."""
+        result = np.empty((fine.node_count, 3))
+        for rod in range(len(self.rod_start)):
+            here, there = self.rod_slice(rod), fine.rod_slice(rod)
+            points = positions[self.rod_nodes[here]]
+            spline = CubicSpline(self.stations[here], points) if len(points) > 2 else None
+            s = fine.stations[there]
+            if spline is None:
+                share = ((s - s[0]) / (s[-1] - s[0]))[:, None]
+                values = (1 - share) * points[0] + share * points[-1]
+            else:
+                values = spline(s)
+            result[fine.rod_nodes[there]] = values
+        return result
+
+
+def mesh_grid(grid: FlatGrid, edge: float) -> GridMesh:
+    """Divide a flat grid: every span between joints and every tail into the fewest equal edges of at most `edge` [m]."""
+    rod_count = len(grid.rods)
+    joints_on = [list[tuple[float, int]]() for _ in range(rod_count)]
+    for joint, (rods, at) in enumerate(zip(grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True)):
+        for rod, s in zip(rods, at, strict=True):
+            joints_on[rod].append((s, joint))
+    merged = _merge_joints(grid)
+    next_node = int(merged.max(initial=-1)) + 1
+    rod_nodes, stations, rod_start = list[int](), list[float](), list[int]()
+    for rod, joints in zip(grid.rods, joints_on, strict=True):
+        rod_start.append(len(rod_nodes))
+        tiny = 1e-9 * rod.length
+        marks = [(s, int(merged[joint])) for s, joint in sorted(joints)]
+        marks = [mark for k, mark in enumerate(marks) if k == 0 or mark[1] != marks[k - 1][1]]
+        if not marks or marks[0][0] - rod.start > tiny:
+            marks.insert(0, (rod.start, next_node))
+            next_node += 1
+        if rod.end - marks[-1][0] > tiny:
+            marks.append((rod.end, next_node))
+            next_node += 1
+        for (s0, n0), (s1, _) in zip(marks, marks[1:], strict=False):
+            pieces = edge_count(s1 - s0, edge)
+            rod_nodes += [n0, *range(next_node, next_node + pieces - 1)]
+            stations += np.linspace(s0, s1, pieces, endpoint=False).tolist()
+            next_node += pieces - 1
+        rod_nodes.append(marks[-1][1])
+        stations.append(marks[-1][0])
+    nodes, s = np.array(rod_nodes, dtype=np.intp), np.array(stations)
+    starts = np.array(rod_start, dtype=np.intp)
+    flat = np.zeros((next_node, 3))
+    for rod, begin, stop in zip(grid.rods, starts, np.append(starts[1:], len(nodes)), strict=True):
+        flat[nodes[begin:stop], :2] = rod.point(s[begin:stop])
+    return GridMesh(grid, flat, nodes, starts, s, merged)
+
+
+def edge_count(length: float, edge: float) -> int:
+    """Fewest equal edges of at most `edge` that make up `length` (an edge may be 1e-6 too long)."""
+    return max(1, int(np.ceil(length / edge - 1e-6)))
+
+
+def _merge_joints(grid: FlatGrid) -> Ints:
+    """Node of each crossing: crossings at one point (three rods or more) share their node."""
+    count = len(grid.crossings)
+    if count == 0:
+        return np.empty(0, dtype=np.intp)
+    points = np.array(
+        [grid.rods[a].point(s) for (a, _), (s, _) in zip(grid.crossings.rods, grid.crossings.at, strict=True)]
+    )
+    scale = max(rod.length for rod in grid.rods)
+    _, node = np.unique(np.round(points / (1e-7 * scale)).astype(np.int64), axis=0, return_inverse=True)
+    return node.ravel().astype(np.intp)
