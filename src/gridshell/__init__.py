@@ -1,0 +1,1 @@
+"""gridshell: from a target surface to a flat grid of elastic rods that pops up into it."""
