@@ -1,0 +1,10 @@
+"""What the user wants: surfaces with signed gap, normal, curvature and an end."""
+
+from gridshell.targets.domain import Disc, Domain, EllipseDomain, Rectangle
+from gridshell.targets.quadric import Cap, Ellipsoid, Hemisphere, Paraboloid
+from gridshell.targets.target import Gap, Implicit, Target
+
+__all__ = [
+    "Cap", "Disc", "Domain", "Ellipsoid", "EllipseDomain", "Gap", "Hemisphere", "Implicit", "Paraboloid",
+    "Rectangle", "Target",
+]

@@ -1,0 +1,114 @@
+"""Regions of the plan: where a height field is defined, and the wall that stands under a target's rim."""
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+class Domain(Protocol):
+    """A region of the plan, centred on the origin."""
+
+    @property
+    def half_extent(self) -> tuple[float, float]:
+        """Half the width along x and along y [m]."""
+        ...
+
+    def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
+        """Signed distance (n,) [m] of the points (n, 2), negative inside; its gradient (n, 2) and Hessian (n, 2, 2)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Disc:
+    """All points within `radius` [m] of the origin."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        require_positive("domain radius", self.radius)
+
+    @property
+    def half_extent(self) -> tuple[float, float]:
+        return self.radius, self.radius
+
+    def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
+        r = np.maximum(np.hypot(xy[:, 0], xy[:, 1]), 1e-300)
+        n = xy / r[:, None]
+        hessian = (np.eye(2) - n[:, :, None] * n[:, None, :]) / r[:, None, None]
+        return r - self.radius, n, hessian
+
+
+@dataclass(frozen=True)
+class EllipseDomain:
+    """All points with (x/a)^2 + (y/b)^2 <= 1; half-axes `a`, `b` [m]."""
+
+    a: float
+    b: float
+
+    @property
+    def half_extent(self) -> tuple[float, float]:
+        return self.a, self.b
+
+    def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
+        axes = np.array([self.a, self.b])
+        # closest point: x_k = a_k^2 p_k / (a_k^2 + t) with sum (a_k p_k / (a_k^2 + t))^2 = 1; in s = t + min(a)^2
+        # the root is bracketed and the function convex, so Newton from the left end converges monotonically
+        p = np.abs(xy)
+        low = np.min(axes) ** 2
+        shift = axes**2 - low
+        t = np.maximum(np.max(axes * p - shift, axis=1), 1e-12 * low)
+        for _ in range(60):
+            denominator = t[:, None] + shift
+            f = np.sum((axes * p / denominator) ** 2, axis=1) - 1.0
+            slope = -2.0 * np.sum((axes * p) ** 2 / denominator**3, axis=1)
+            step = np.where(slope < 0, -f / np.minimum(slope, -1e-300), 0.0)
+            t = np.maximum(t + step, 1e-12 * low)
+            if np.all(np.abs(step) <= 1e-14 * t):
+                break
+        foot = np.sign(xy) * axes**2 * p / (t[:, None] + shift)
+        normal = foot / axes**2
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        d = np.einsum("ij,ij->i", xy - foot, normal)
+        curvature = 1.0 / (self.a**2 * self.b**2 * np.sum((foot / axes**2) ** 2, axis=1) ** 1.5)
+        along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        bend = curvature / np.maximum(1.0 + d * curvature, 1e-3)
+        return d, normal, bend[:, None, None] * along[:, :, None] * along[:, None, :]
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """All points with |x| <= width/2 and |y| <= depth/2; `size` = (width, depth) [m]."""
+
+    size: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        for side in self.size:
+            require_positive("domain size", side)
+
+    @property
+    def half_extent(self) -> tuple[float, float]:
+        return self.size[0] / 2, self.size[1] / 2
+
+    def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
+        q = np.abs(xy) - np.array(self.half_extent)
+        outside = np.maximum(q, 0.0)
+        corner = np.hypot(outside[:, 0], outside[:, 1])
+        d = corner + np.minimum(np.max(q, axis=1), 0.0)
+        nearest = np.eye(2)[np.argmax(q, axis=1)]
+        n = np.where(corner[:, None] > 0, outside / np.maximum(corner, 1e-300)[:, None], nearest)
+        bent = (outside > 0).all(axis=1)
+        along = np.stack([-n[:, 1], n[:, 0]], axis=1) * np.sign(xy)
+        hessian = np.where(bent, 1.0 / np.maximum(corner, 1e-300), 0.0)[:, None, None]
+        return d, n * np.where(xy < 0, -1.0, 1.0), hessian * along[:, :, None] * along[:, None, :]
+
+
+def require_positive(name: str, value: float) -> None:
+    if not (isfinite(value) and value > 0):
+        raise InputError(f"{name} must be positive, not {value} m")
