@@ -1,5 +1,6 @@
 """Nodes and edges on a flat grid: a node at every joint and rod end, and equal edges between them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from gridshell.layout.flatgrid import FlatGrid
+from gridshell.layout.flatgrid import FlatGrid, FlatRod
 
 Ints = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -120,8 +121,11 @@ class GridMesh:
         return result
 
 
-def mesh_grid(grid: FlatGrid, edge: float) -> GridMesh:
-    """Divide a flat grid: every span between joints and every tail into the fewest equal edges of at most `edge` [m]."""
+def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
+    """Divide a flat grid: every span between joints and every tail into the fewest equal edges of at most `edge` [m].
+
+    `marks`, for each rod the material coordinates [m] of further points that must be nodes.
+    """
     rod_count = len(grid.rods)
     joints_on = [list[tuple[float, int]]() for _ in range(rod_count)]
     for joint, (rods, at) in enumerate(zip(grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True)):
@@ -130,30 +134,68 @@ def mesh_grid(grid: FlatGrid, edge: float) -> GridMesh:
     merged = _merge_joints(grid)
     next_node = int(merged.max(initial=-1)) + 1
     rod_nodes, stations, rod_start = list[int](), list[float](), list[int]()
-    for rod, joints in zip(grid.rods, joints_on, strict=True):
+    for index, (rod, joints) in enumerate(zip(grid.rods, joints_on, strict=True)):
         rod_start.append(len(rod_nodes))
         tiny = 1e-9 * rod.length
-        marks = [(s, int(merged[joint])) for s, joint in sorted(joints)]
-        marks = [mark for k, mark in enumerate(marks) if k == 0 or mark[1] != marks[k - 1][1]]
-        if not marks or marks[0][0] - rod.start > tiny:
-            marks.insert(0, (rod.start, next_node))
-            next_node += 1
-        if rod.end - marks[-1][0] > tiny:
-            marks.append((rod.end, next_node))
-            next_node += 1
-        for (s0, n0), (s1, _) in zip(marks, marks[1:], strict=False):
+        fixed = [(s, int(merged[joint])) for s, joint in sorted(joints)]
+        fixed = [mark for k, mark in enumerate(fixed) if k == 0 or mark[1] != fixed[k - 1][1]]
+        for s in (rod.start, *(marks[index] if marks is not None else ()), rod.end):
+            if all(abs(s - other) > tiny for other, _ in fixed):
+                fixed.append((s, next_node))
+                next_node += 1
+        fixed.sort()
+        for (s0, n0), (s1, _) in zip(fixed, fixed[1:], strict=False):
             pieces = edge_count(s1 - s0, edge)
             rod_nodes += [n0, *range(next_node, next_node + pieces - 1)]
             stations += np.linspace(s0, s1, pieces, endpoint=False).tolist()
             next_node += pieces - 1
-        rod_nodes.append(marks[-1][1])
-        stations.append(marks[-1][0])
+        rod_nodes.append(fixed[-1][1])
+        stations.append(fixed[-1][0])
     nodes, s = np.array(rod_nodes, dtype=np.intp), np.array(stations)
     starts = np.array(rod_start, dtype=np.intp)
     flat = np.zeros((next_node, 3))
     for rod, begin, stop in zip(grid.rods, starts, np.append(starts[1:], len(nodes)), strict=True):
         flat[nodes[begin:stop], :2] = rod.point(s[begin:stop])
     return GridMesh(grid, flat, nodes, starts, s, merged)
+
+
+def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
+    """The part of a mesh that belongs to `rods`: rods of its grid, cut at nodes; and its nodes (n,) in `mesh`.
+
+    Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own.
+    """
+    parent = {rod.name: index for index, rod in enumerate(mesh.grid.rods)}
+    joint_of = {tuple(pair): int(node) for pair, node in zip(mesh.grid.crossings.rods.tolist(), mesh.joint_nodes, strict=True)}
+    index = [parent[rod.name] for rod in rods]
+    grid = FlatGrid.of(rods, margin=margin)
+    known = np.array([(min(index[a], index[b]), max(index[a], index[b])) in joint_of for a, b in grid.crossings.rods])
+    grid = FlatGrid(grid.rods, grid.crossings.select(known.astype(bool)))
+    joints = [joint_of[min(index[a], index[b]), max(index[a], index[b])] for a, b in grid.crossings.rods]
+    shared = {node: k for k, node in enumerate(dict.fromkeys(joints))}
+    on_rod = [set[int]() for _ in rods]
+    for (a, b), node in zip(grid.crossings.rods, joints, strict=True):
+        on_rod[a].add(node)
+        on_rod[b].add(node)
+    source = list(shared)
+    nodes, stations, starts = list[int](), list[float](), list[int]()
+    for rod, place, joined in zip(rods, index, on_rod, strict=True):
+        starts.append(len(nodes))
+        s = mesh.stations[mesh.rod_slice(place)]
+        tiny = 1e-9 * rod.length
+        for k in np.flatnonzero((s >= rod.start - tiny) & (s <= rod.end + tiny)):
+            node = int(mesh.nodes_of(place)[k])
+            if node in joined:
+                nodes.append(shared[node])
+            else:
+                nodes.append(len(source))
+                source.append(node)
+            stations.append(float(s[k]))
+    chosen = np.array(source, dtype=np.intp)
+    part = GridMesh(
+        grid, mesh.flat[chosen], np.array(nodes, dtype=np.intp), np.array(starts, dtype=np.intp),
+        np.array(stations), np.array([shared[node] for node in joints], dtype=np.intp),
+    )  # fmt: skip
+    return part, chosen
 
 
 def edge_count(length: float, edge: float) -> int:

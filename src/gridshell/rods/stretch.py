@@ -1,6 +1,10 @@
-"""Stretch of an edge [HQK Eq 1a]: E = EA/2 eps^2 |e0|, eps = |e|/|e0| - 1."""
+"""Stretch of an edge [HQK Eq 1a]: E = (N0 eps + EA/2 eps^2) |e0|, eps = |e|/|e0| - 1.
 
-from dataclasses import dataclass
+N0 = 0 is the paper's elastic edge. With a multiplier N0 it is the augmented Lagrangian of an inextensible
+edge: at the solution the strain vanishes and N0 is the axial force.
+"""
+
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numba as nb
@@ -18,25 +22,51 @@ class Stretch:
     blocks : (e, 2) nodes of each edge.
     rest_lengths : (e,) [m].
     stiffness : (e,) EA [N].
-    forces : (e,) axial forces [N] of the geometric stiffness in the Hessian; None takes EA eps, which makes
-        the Hessian exact. A solver that carries the forces as unknowns gives its own.
+    multipliers : (e,) N0 [N].
+    forces : (e,) axial forces [N] of the geometric stiffness in the Hessian; None takes N0 + EA eps, which
+        makes the Hessian exact. A solver that carries the forces as unknowns gives its own.
     """
 
     blocks: Ints
     rest_lengths: Floats
     stiffness: Floats
+    multipliers: Floats
     forces: Floats | None = None
+
+    @staticmethod
+    def elastic(blocks: Ints, rest_lengths: Floats, stiffness: Floats) -> "Stretch":
+        """The paper's elastic edges."""
+        return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
+
+    def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
+        return replace(self, forces=forces, multipliers=self.multipliers if multipliers is None else multipliers)
 
     def strains(self, state: Floats) -> Floats:
         """(e,) axial strains [-]."""
         edge = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
         return np.sqrt(np.einsum("ij,ij->i", edge, edge)) / self.rest_lengths - 1.0
 
+    def elongation(self, state: Floats, motion: Floats) -> Floats:
+        """(e,) change of the strains [-] to first order for displacements (N, 3) [m]."""
+        edge = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
+        apart = motion[self.blocks[:, 1]] - motion[self.blocks[:, 0]]
+        length = np.sqrt(np.einsum("ij,ij->i", edge, edge))
+        return np.asarray(np.einsum("ij,ij->i", edge, apart) / (length * self.rest_lengths))
+
+    def add_axial(self, state: Floats, forces: Floats, gradient: Floats) -> None:
+        """Add the gradient [N] of edges that carry the axial forces (e,) [N]."""
+        edge = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
+        pull = (forces / np.sqrt(np.einsum("ij,ij->i", edge, edge)))[:, None] * edge
+        np.add.at(gradient, self.blocks[:, 1], pull)
+        np.subtract.at(gradient, self.blocks[:, 0], pull)
+
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         own = self.forces is None
         forces = self.rest_lengths if self.forces is None else self.forces
         return float(
-            _stretch(state, self.blocks, self.rest_lengths, self.stiffness, forces, own, gradient, hessians)
+            _stretch(
+                state, self.blocks, self.rest_lengths, self.stiffness, self.multipliers, forces, own, gradient, hessians
+            )
         )
 
     def refreshed(self, state: Floats) -> Self:
@@ -44,7 +74,7 @@ class Stretch:
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _stretch(x, edges, rest, stiffness, forces, own, gradient, hessians):  # type: ignore[no-untyped-def]
+def _stretch(x, edges, rest, stiffness, multipliers, forces, own, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_a, x_b) [m]; energies [J], from HQK Eq 1a."""
     wanted = hessians.shape[0] > 0
     energy = 0.0
@@ -53,8 +83,8 @@ def _stretch(x, edges, rest, stiffness, forces, own, gradient, hessians):  # typ
         d0, d1, d2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
         strain = length / rest[e] - 1.0
-        energy += 0.5 * stiffness[e] * strain * strain * rest[e]
-        force = stiffness[e] * strain
+        energy += (multipliers[e] + 0.5 * stiffness[e] * strain) * strain * rest[e]
+        force = multipliers[e] + stiffness[e] * strain
         t0, t1, t2 = d0 / length, d1 / length, d2 / length
         gradient[a, 0] -= force * t0
         gradient[a, 1] -= force * t1

@@ -1,0 +1,1 @@
+"""Gaps to a target turned into node constraints or contact energy."""

@@ -1,0 +1,67 @@
+"""Constraints as free directions: what each block of the state can still do."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """Free directions of each block.
+
+    Supports, prescribed motion and sliding on a surface are all the same: directions taken away. The reduced
+    system in the free directions is symmetric (ERRATA to HQK Eq 11, whose row-filtered form is not).
+
+    Parameters
+    ----------
+    directions : (n, 3, 3); `directions[i, k]` is the k-th free direction of block i, orthonormal.
+    count : (n,) number of free directions, 0 to 3.
+    """
+
+    directions: Floats
+    count: Ints
+
+    @staticmethod
+    def free(blocks: int) -> "Freedom":
+        """Every node free along x, y, z."""
+        return Freedom(np.tile(np.eye(3), (blocks, 1, 1)), np.full(blocks, 3, dtype=np.intp))
+
+    def with_directions(self, blocks: Ints, *directions: tuple[float, float, float]) -> "Freedom":
+        """These blocks free along the given orthonormal directions only (none: fixed)."""
+        table, count = self.directions.copy(), self.count.copy()
+        for k, direction in enumerate(directions):
+            table[blocks, k] = direction
+        count[blocks] = len(directions)
+        return Freedom(table, count)
+
+    @cached_property
+    def first(self) -> Ints:
+        """(n,) index of each block's first reduced DOF."""
+        return np.cumsum(self.count) - self.count
+
+    @cached_property
+    def size(self) -> int:
+        """Number of reduced DOFs."""
+        return int(self.count.sum())
+
+    @cached_property
+    def _slots(self) -> tuple[Ints, Ints]:
+        block = np.repeat(np.arange(len(self.count)), self.count)
+        return block, np.arange(self.size) - self.first[block]
+
+    def expand(self, q: Floats) -> Floats:
+        """Displacements (n, 3) of reduced DOFs (size,)."""
+        block, k = self._slots
+        result = np.zeros((len(self.count), 3))
+        np.add.at(result, block, q[:, None] * self.directions[block, k])
+        return result
+
+    def reduce(self, gradient: Floats) -> Floats:
+        """Components (size,) of a gradient (n, 3) in the free directions."""
+        block, k = self._slots
+        return np.asarray(np.einsum("ij,ij->i", gradient[block], self.directions[block, k]))

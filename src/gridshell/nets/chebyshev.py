@@ -1,0 +1,289 @@
+"""The inextensible net of a layout on a target, and the footprint that it cuts out of the flat grid.
+
+Two crossing geodesics through the anchor determine the net (`compass`). It is marched at two steps, cut at
+the target's end and extrapolated (Richardson), so that each rod end is known far better than the mesh of any
+mechanical model; the difference of the two marches estimates the error. Lines of the lattice that are not
+built still shape the net: they are kept as virtual rods.
+"""
+
+from dataclasses import dataclass
+from math import cos, degrees, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.errors import InputError, NetLimitError
+from gridshell.geometry.vectors import cross, dot
+from gridshell.layout import FlatRod, GridLayout
+from gridshell.layout.flatgrid import Family
+from gridshell.layout.gridlayout import rod_name
+from gridshell.layout.mesh import edge_count
+from gridshell.nets.compass import Net, march
+from gridshell.nets.cuts import Cut, cut_lines, inside_nodes, lagrange
+from gridshell.targets import Target
+
+Floats = NDArray[np.float64]
+
+MARGIN = 2.3  # spacings marched past the end of the target: a cut is interpolated between nodes on both sides
+SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
+MOST_NODES = 4_000_000
+
+
+@dataclass(frozen=True)
+class ChebyshevNet:
+    """The net of a layout on a target.
+
+    Parameters
+    ----------
+    rods : rods and virtual rods, each from end to end of the target: the footprint G0.
+    lines : (u, v) offsets of all lines of the lattice near the target: `lines[0]` are the u at which lines of
+        family v lie, `lines[1]` the v of family u [m].
+    net : the finer march, from which positions are taken.
+    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all rod ends [m]: the error before extrapolation.
+    min_angle : smallest angle between the families on the target [rad], at the point `min_angle_at` (3,) [m].
+    dropped : rods of the layout that are not in `rods`, with the reason.
+    warnings : sentences.
+    """
+
+    target: Target
+    layout: GridLayout
+    rods: tuple[FlatRod, ...]
+    lines: tuple[Floats, Floats]
+    net: Net
+    error_estimate: float
+    min_angle: float
+    min_angle_at: tuple[float, float, float]
+    dropped: tuple[tuple[str, str], ...]
+    warnings: tuple[str, ...]
+
+    def positions(self, rod: FlatRod, s: Floats) -> Floats:
+        """Points (n, 3) of the net at material coordinates `s` (n,) of a rod, by local cubics [m]."""
+        if rod.family == "u":
+            knots, points = self.net.u, self.net.points[:, int(np.argmin(np.abs(self.net.v - rod.offset)))]
+        else:
+            knots, points = self.net.v, self.net.points[int(np.argmin(np.abs(self.net.u - rod.offset)))]
+        known = np.flatnonzero(np.isfinite(points[:, 0]))
+        knots, points = knots[known], points[known]
+        first = np.clip(np.searchsorted(knots, s) - 2, 0, len(knots) - 4)
+        window = first[:, None] + np.arange(4)
+        return lagrange(knots[window], points[window], s)
+
+
+def chebyshev_net(target: Target, layout: GridLayout, *, anchor: tuple[float, float] | None = None) -> ChebyshevNet:
+    """March the net of `layout` over `target` and cut it at the target's end.
+
+    Parameters
+    ----------
+    anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+
+    Raises
+    ------
+    NetLimitError : the crossing angle falls to 10 degrees or the march fails inside the target; names the place.
+    InputError : the anchor lies outside, the spacing is too large, or a rod is too short to reach the end.
+    """
+    start, heading = _start(target, layout, anchor)
+    if max(layout.spacing) >= 2 * target.size:
+        raise InputError(
+            f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
+            "use a smaller spacing"
+        )
+    lines = _find_lines(target, layout, start, heading)
+    coarse, fine = (_march_lines(target, layout, lines, start, heading, refine) for refine in (1, 2))
+    inside = inside_nodes(target, fine)
+    _refuse_holes(fine, inside)
+    angle, where = _smallest_angle(target, fine, inside)
+    if degrees(angle) < SMALLEST_ANGLE:
+        raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
+    ends, error = _extrapolate(target, lines, (coarse, fine), inside)
+    rods, dropped, warnings = _name_rods(layout, lines, ends)
+    _require_length(layout, rods)
+    return ChebyshevNet(target, layout, rods, (lines.u, lines.v), fine, error, angle, where, tuple(dropped), tuple(warnings))
+
+
+def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
+    """The anchor lifted vertically onto the target, and the tangent that points along the heading in plan."""
+    x, y = anchor if anchor is not None else target.summit
+    point = target.lift(np.array([[x, y]]))
+    if target.margin(point)[0] <= 0:
+        raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim")
+    n = target.on_surface(point).normal[0]
+    plan = np.array([cos(layout.rotate), sin(layout.rotate)])
+    return point[0], np.array([*plan * n[2], -plan @ n[:2]])
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Offsets of all lines of one march: `u` are those of family v (they cross the u axis), `v` those of u."""
+
+    u: Floats
+    v: Floats
+
+
+def _find_lines(target: Target, layout: GridLayout, start: Floats, heading: Floats) -> _Lines:
+    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; found by a coarse march."""
+    reach = np.full(4, 1.5 * target.size)  # towards -u, +u, -v, +v
+    step = np.array(layout.spacing[::-1]) / 2  # along u, the lines of family v: their spacing
+    for _ in range(12):
+        u, v = (
+            np.arange(-np.ceil(reach[2 * k] / step[k]), np.ceil(reach[2 * k + 1] / step[k]) + 1) * step[k]
+            for k in (0, 1)
+        )
+        if len(u) * len(v) > MOST_NODES / 10:
+            raise InputError(
+                f"the net needs more than {len(u) // 2} x {len(v) // 2} lines: use a larger spacing or a smaller target"
+            )
+        net = march(target, u, v, start, heading)
+        inside = inside_nodes(target, net)
+        if not inside.any():
+            raise InputError("no node of the net lies inside the target: move the anchor away from the rim")
+        touched_u, touched_v = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+        needed = np.array([-u[touched_u[0]], u[touched_u[-1]], -v[touched_v[0]], v[touched_v[-1]]])
+        needed += 2 * MARGIN * np.repeat(step, 2)
+        if np.all(needed <= reach + 1e-12):
+            break
+        reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
+    return _Lines(_lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3]))
+
+
+def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
+    """Offsets of the lattice lines of a family between -below and above, with the axis."""
+    phase, spacing = layout.phase(family), layout.spacing[0 if family == "u" else 1]
+    first, last = np.floor((-below - phase) / spacing), np.ceil((above - phase) / spacing)
+    offsets = phase + spacing * np.arange(first, last + 1)
+    offsets[np.abs(offsets) < 1e-9 * spacing] = 0.0
+    return offsets if (offsets == 0.0).any() else np.sort(np.append(offsets, 0.0))
+
+
+def _march_lines(
+    target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int
+) -> Net:
+    u, v = (_subdivide(offsets, layout.edge, refine) for offsets in (lines.u, lines.v))
+    if len(u) * len(v) > MOST_NODES:
+        raise InputError(f"the net would have {len(u)} x {len(v)} nodes: use longer edges or a larger spacing")
+    return march(target, u, v, start, heading)
+
+
+def _subdivide(offsets: Floats, edge: float, refine: int) -> Floats:
+    """Three steps or more from line to line, twice as many where `refine` is 2, meeting the nodes of the mesh."""
+    pieces = []
+    for low, high in zip(offsets[:-1], offsets[1:], strict=True):
+        edges = edge_count(high - low, edge)
+        steps = edges // 2 if edges % 2 == 0 and edges >= 6 else max(3, edges)
+        pieces.append(np.linspace(low, high, refine * steps, endpoint=False))
+    return np.append(np.concatenate(pieces), offsets[-1])
+
+
+def _refuse_holes(net: Net, inside: NDArray[np.bool_]) -> None:
+    """A node that the march could not find next to one inside the target: the net ends there."""
+    lost = ~np.isfinite(net.points[:, :, 0])
+    beside = np.zeros_like(inside)
+    beside[:-1] |= lost[1:]
+    beside[1:] |= lost[:-1]
+    beside[:, :-1] |= lost[:, 1:]
+    beside[:, 1:] |= lost[:, :-1]
+    holes = np.argwhere(beside & inside)
+    if len(holes):
+        i, j = holes[np.argmin(np.abs(net.u[holes[:, 0]]) + np.abs(net.v[holes[:, 1]]))]
+        raise _net_limit(tuple(net.points[i, j].tolist()), "the rods of the two families become parallel")
+
+
+def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
+    x, y, z = where
+    return NetLimitError(
+        f"no inextensible net covers this target: near ({x:.4g}, {y:.4g}, {z:.4g}) m {what}; "
+        "use a smaller part of the target (a higher base), or another anchor or heading"
+    )
+
+
+def _smallest_angle(
+    target: Target, net: Net, inside: NDArray[np.bool_]
+) -> tuple[float, tuple[float, float, float]]:
+    """Smallest angle between the families over the inside nodes [rad], from central differences."""
+    i, j = np.nonzero(inside)
+    along = net.points[i + 1, j] - net.points[i - 1, j]
+    across = net.points[i, j + 1] - net.points[i, j - 1]
+    angle = np.arctan2(np.linalg.norm(cross(along, across), axis=1), np.abs(dot(along, across)))
+    k = int(np.argmin(angle))
+    x, y, z = net.points[i[k], j[k]].tolist()
+    return float(angle[k]), (x, y, z)
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """Cuts of the lines of both families, extrapolated."""
+
+    u: list[Cut | None]
+    v: list[Cut | None]
+
+
+def _extrapolate(
+    target: Target, lines: _Lines, nets: tuple[Net, Net], inside_fine: NDArray[np.bool_]
+) -> tuple[_Ends, float]:
+    cuts = []
+    for net in nets:
+        inside = inside_fine if net is nets[1] else inside_nodes(target, net)
+        row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
+        cuts.append(
+            (
+                cut_lines(target, net.u, net.points[:, column].transpose(1, 0, 2), inside[:, column].T),
+                cut_lines(target, net.v, net.points[row], inside[row]),
+            )
+        )
+    error = 0.0
+    families = list[list[Cut | None]]()
+    for coarse, fine in zip(cuts[0], cuts[1], strict=True):
+        family = list[Cut | None]()
+        for rough, exact in zip(coarse, fine, strict=True):
+            if rough is None or exact is None:
+                family.append(exact)
+                continue
+            change = np.array([exact.start - rough.start, exact.end - rough.end]) / 3
+            error = max(error, float(np.abs(change).max()))
+            family.append(Cut(exact.start + change[0], exact.end + change[1], exact.pieces))
+        families.append(family)
+    return _Ends(*families), error
+
+
+def _name_rods(
+    layout: GridLayout, lines: _Lines, ends: _Ends
+) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
+    """Rods from the lines: those of the layout get their labels, all other lines are virtual."""
+    rods, dropped, warnings = list[FlatRod](), list[tuple[str, str]](), list[str]()
+    families: tuple[tuple[Family, Floats, list[Cut | None]], ...] = (("u", lines.v, ends.u), ("v", lines.u, ends.v))
+    for family, offsets, cuts in families:
+        make = FlatRod.u if family == "u" else FlatRod.v
+        touching = {float(c): cut for c, cut in zip(offsets, cuts, strict=True) if cut is not None}
+        built = layout.offsets(family)
+        if built is None:
+            phase, spacing = layout.phase(family), layout.spacing[0 if family == "u" else 1]
+            built = np.array([c for c in touching if abs((c - phase) / spacing - round((c - phase) / spacing)) < 1e-6])
+        for k, c in enumerate(built):
+            name = rod_name(family, k, len(built))
+            here = min(touching, key=lambda offset: abs(offset - c), default=np.inf)
+            if abs(here - c) > 1e-9 * max(layout.spacing):
+                dropped.append((name, "it never touches the target"))
+                continue
+            cut = touching.pop(here)
+            rods.append(make(name, here, cut.start, cut.end))
+            if cut.pieces > 1:
+                warnings.append(f"rod {name} meets the target in {cut.pieces} pieces; only the longest is kept")
+        rods += [
+            make(f"virtual {family.upper()} {c:+.4f}", c, cut.start, cut.end, virtual=True)
+            for c, cut in touching.items()
+        ]
+    return tuple(rods), dropped, warnings
+
+
+def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:
+    """Refuse a layout whose rods end above the end of the target."""
+
+    def needed(rod: FlatRod) -> float:
+        middle = layout.middle(rod.family)
+        return 2 * max(rod.end - middle, middle - rod.start)
+
+    longest = max((rod for rod in rods if not rod.virtual), key=needed, default=None)
+    if longest is not None and layout.length != "auto" and needed(longest) > layout.length:
+        raise InputError(
+            f"rod {longest.name} is too short to reach the end of the target: it needs {needed(longest):.4g} m, "
+            f'the layout gives {layout.length:.4g} m: use a longer length, or "auto"'
+        )

@@ -1,0 +1,179 @@
+"""Static equilibrium by Newton's method with the axial forces as unknowns.
+
+Stiff edges make the plain Newton method crawl: the geometric stiffness of an axial force EA eps evaluated at
+a strain that is not yet equilibrated is wild. Here each edge carries its force N as an unknown, updated with
+the linearised strain; the same iteration serves elastic edges (N = EA eps at the end) and inextensible ones
+(eps = 0 at the end, EA being a penalty that any size serves). On a curved constraint it is the SQP method on
+a manifold: steps in the tangent directions, the constraint's curvature in the Hessian, a retraction after.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.model import Assembly, Freedom
+from gridshell.rods.elements import Elements
+from gridshell.rods.stretch import Stretch
+from gridshell.solve.constraint import Constraint
+from gridshell.solve.linear import LinearSolver, Qdldl, SingularError
+from gridshell.solve.report import SolveReport, Status
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, float], None]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A shell in equilibrium: elastic elements, edges, loads and a constraint.
+
+    Parameters
+    ----------
+    elements : every energy but the stretch.
+    stretch : the edges.
+    inextensible : the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
+    constraint : supports or a surface.
+    length : characteristic length of the shape [m]: steps are measured by it.
+    load : (n, 3) dead forces [N], or None.
+    """
+
+    elements: tuple[Elements, ...]
+    stretch: Stretch
+    constraint: Constraint
+    length: float
+    inextensible: bool = False
+    load: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state (n, 3), its axial forces (e,) [N], its gradient (n, 3) [N] without constraint forces, and figures."""
+
+    state: Floats
+    forces: Floats
+    gradient: Floats
+    report: SolveReport
+
+
+STEP_TOLERANCE = 1e-6  # of the length; Newton's next error is its square
+STRAIN_TOLERANCE = 2e-6
+LONGEST_STEP = 0.15  # of the length
+
+
+def find_equilibrium(
+    problem: Problem,
+    state: Floats,
+    forces: Floats,
+    *,
+    most_iterations: int = 60,
+    progress: Progress | None = None,
+    solver: Callable[[NDArray[np.int64], NDArray[np.int64]], LinearSolver] = Qdldl,
+) -> Equilibrium:
+    """Equilibrium near `state` (n, 3) [m] with axial forces near `forces` (e,) [N].
+
+    Never raises for a solve that does not converge: the report's status says so, and the last state comes with it.
+    """
+    begin = time.perf_counter()
+    step = _Step(problem, state, solver)
+    status, iteration = Status.STALLED, 0
+    for iteration in range(1, most_iterations + 1):
+        try:
+            moved, state_next, forces_next, mismatch = step.take(state, forces)
+        except SingularError:
+            status = Status.DIVERGED
+            break
+        if not (np.isfinite(moved) and np.isfinite(forces_next).all()):
+            status = Status.DIVERGED
+            break
+        state, forces = state_next, forces_next
+        if progress is not None:
+            progress(iteration, moved / problem.length)
+        if moved < STEP_TOLERANCE * problem.length and mismatch < STRAIN_TOLERANCE:
+            status = Status.CONVERGED
+            break
+        step.refresh(state)
+    gradient = step.gradient(state, forces)
+    residual = problem.constraint.freedom(state).reduce(gradient)
+    report = SolveReport(
+        status=status,
+        dofs=step.dofs,
+        iterations=iteration,
+        factorizations=step.factorizations,
+        seconds=time.perf_counter() - begin,
+        force_residual=float(np.abs(residual).max(initial=0.0)),
+        max_strain=float(np.abs(problem.stretch.strains(state)).max()),
+        negative_modes=step.negative_modes,
+    )
+    return Equilibrium(state, forces, gradient, report)
+
+
+class _Step:
+    """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
+
+    def __init__(
+        self, problem: Problem, state: Floats, solver: Callable[[NDArray[np.int64], NDArray[np.int64]], LinearSolver]
+    ) -> None:
+        self._problem = problem
+        self._elements = problem.elements
+        free = problem.constraint.freedom(state)
+        everywhere = np.arange(len(state))[:, None]
+        self._blocks = [*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere]
+        self._assembly = Assembly.of(self._blocks, free)
+        self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
+        self._solver = solver(self._assembly.indptr, self._assembly.indices)
+        self.dofs = free.size
+        self.factorizations = 0
+        self.negative_modes = 0
+
+    def refresh(self, state: Floats) -> None:
+        self._elements = tuple(element.refreshed(state) for element in self._elements)
+
+    def gradient(self, state: Floats, forces: Floats) -> Floats:
+        """Gradient (n, 3) of energy and load with the given axial forces [N]."""
+        gradient = np.zeros_like(state) if self._problem.load is None else -self._problem.load
+        for element in self._elements:
+            element.evaluate(state, gradient)
+        self._problem.stretch.add_axial(state, forces, gradient)
+        return gradient
+
+    def take(self, state: Floats, forces: Floats) -> tuple[float, Floats, Floats, float]:
+        """Length of the step, the next state and forces, and how far these are from matching the strains."""
+        problem = self._problem
+        base = forces if problem.inextensible else np.zeros_like(forces)
+        stretch = problem.stretch.with_forces(forces, multipliers=base)
+        free = problem.constraint.freedom(state)
+        gradient = np.zeros_like(state) if problem.load is None else -problem.load
+        for element, hessians in zip(self._elements, self._hessians, strict=False):
+            element.evaluate(state, gradient, hessians)
+        by_force = gradient.copy()
+        stretch.add_axial(state, forces, by_force)
+        stretch.evaluate(state, gradient, self._hessians[-2])
+        curvature = problem.constraint.curvature(state, by_force)
+        self._hessians[-1][:] = curvature if len(curvature) else 0.0
+        self._factor(free)
+        motion = free.expand(self._solver.solve(-free.reduce(gradient)))
+        reach = float(np.sqrt(np.einsum("ij,ij->i", motion, motion).max()))
+        share = min(1.0, LONGEST_STEP * problem.length / reach) if reach > 0 else 1.0
+        strains = problem.stretch.strains(state) + problem.stretch.elongation(state, motion)
+        forces_next = forces + share * (base + problem.stretch.stiffness * strains - forces)
+        state_next = problem.constraint.retract(state + share * motion)
+        left = problem.stretch.strains(state_next)
+        if not problem.inextensible:
+            left = left - forces_next / problem.stretch.stiffness
+        return reach, state_next, forces_next, float(np.abs(left).max())
+
+    def _factor(self, free: Freedom) -> None:
+        """Factorise; where the Hessian is indefinite, again with a growing shift of its diagonal."""
+        data = self._assembly.assemble(self._hessians, self._blocks, free)
+        self.factorizations += 1
+        self.negative_modes = negative = self._solver.factor(data)
+        shift = 0.0
+        soft = np.trace(self._hessians[0], axis1=1, axis2=2).mean() / 9 if len(self._hessians) > 2 else 1.0
+        while negative and shift < 1e6 * soft:
+            shift = 4.0 * shift if shift else 1e-3 * soft
+            shifted = data.copy()
+            shifted[self._assembly.diagonal] += shift
+            self.factorizations += 1
+            negative = self._solver.factor(shifted)

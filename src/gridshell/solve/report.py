@@ -1,0 +1,56 @@
+"""How a solve ended: one record for every solver."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Status(Enum):
+    """Typed results; `sentence` says what to do."""
+
+    CONVERGED = "converged"
+    STALLED = "stalled"
+    DIVERGED = "diverged"
+    SLID_OFF = "slid off"
+
+    @property
+    def sentence(self) -> str:
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Status.CONVERGED: "converged",
+    Status.STALLED: "stopped at the largest number of iterations above its tolerance; refine the mesh or "
+    "reduce the spacing",
+    Status.DIVERGED: "the iteration diverged; reduce the spacing, or choose another anchor or heading",
+    Status.SLID_OFF: "the grid slid off the target (nothing holds it there without friction); use method = bound",
+}
+
+
+@dataclass(frozen=True)
+class SolveReport:
+    """Figures of one solve.
+
+    Parameters
+    ----------
+    dofs : reduced unknowns.
+    force_residual : largest component of the gradient in the free directions [N].
+    max_strain : largest axial strain, or constraint strain where rods are inextensible [-].
+    negative_modes : of the exact Hessian in the free directions at the final state; 0 says stable.
+    """
+
+    status: Status
+    dofs: int
+    iterations: int
+    factorizations: int
+    seconds: float
+    force_residual: float
+    max_strain: float
+    negative_modes: int
+
+    @property
+    def converged(self) -> bool:
+        return self.status is Status.CONVERGED
+
+    @property
+    def stable(self) -> bool:
+        return self.converged and self.negative_modes == 0
