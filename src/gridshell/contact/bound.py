@@ -39,6 +39,9 @@ class BoundToTarget:
         surface = self.target.on_surface(state)
         return -dot(surface.normal, gradient)[:, None, None] * surface.hessian
 
+    def remaining(self, state: Floats) -> Floats | None:
+        return None
+
     def retract(self, state: Floats) -> Floats:
         return self.target.retract(state)
 

@@ -104,11 +104,14 @@ class GridMesh:
         np.add.at(total, self.edges, 0.5 * self.edge_lengths[:, None])
         return total
 
-    def prolong(self, positions: Floats, fine: "GridMesh") -> Floats:
-        """Positions (n, 3) of the nodes of `fine`, by a cubic spline along each rod of this mesh [m]."""
+    def prolong(self, positions: Floats, fine: "GridMesh", *, rods: Sequence[int] | None = None) -> Floats:
+        """Positions (n, 3) of the nodes of `fine`, by a cubic spline along each rod of this mesh [m].
+
+        `rods` names, for each rod of `fine`, the rod of this mesh that it is a part of; default: the same.
+        """
         result = np.empty((fine.node_count, 3))
-        for rod in range(len(self.rod_start)):
-            here, there = self.rod_slice(rod), fine.rod_slice(rod)
+        for k, rod in enumerate(rods if rods is not None else range(len(self.rod_start))):
+            here, there = self.rod_slice(rod), fine.rod_slice(k)
             points = positions[self.rod_nodes[here]]
             spline = CubicSpline(self.stations[here], points) if len(points) > 2 else None
             s = fine.stations[there]

@@ -2,5 +2,6 @@
 
 from gridshell.model.assembly import Assembly
 from gridshell.model.freedom import Freedom
+from gridshell.model.shell import Shell
 
-__all__ = ["Assembly", "Freedom"]
+__all__ = ["Assembly", "Freedom", "Shell"]

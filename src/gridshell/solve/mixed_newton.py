@@ -49,17 +49,24 @@ class Problem:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A state (n, 3), its axial forces (e,) [N], its gradient (n, 3) [N] without constraint forces, and figures."""
+    """A state (n, 3), its axial forces (e,) [N], its gradient (n, 3) [N] without constraint forces, and figures.
+
+    Where the state is not stable, `mode` (n, 3) is the direction of the most negative curvature, its largest
+    displacement being 1.
+    """
 
     state: Floats
     forces: Floats
     gradient: Floats
     report: SolveReport
+    mode: Floats | None = None
 
 
 STEP_TOLERANCE = 1e-6  # of the length; Newton's next error is its square
 STRAIN_TOLERANCE = 2e-6
 LONGEST_STEP = 0.15  # of the length
+NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle
+NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
 
 
 def find_equilibrium(
@@ -67,6 +74,7 @@ def find_equilibrium(
     state: Floats,
     forces: Floats,
     *,
+    descend: bool = False,
     most_iterations: int = 60,
     progress: Progress | None = None,
     solver: Callable[[NDArray[np.int64], NDArray[np.int64]], LinearSolver] = Qdldl,
@@ -74,13 +82,17 @@ def find_equilibrium(
     """Equilibrium near `state` (n, 3) [m] with axial forces near `forces` (e,) [N].
 
     Never raises for a solve that does not converge: the report's status says so, and the last state comes with it.
+
+    Parameters
+    ----------
+    descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
     """
     begin = time.perf_counter()
     step = _Step(problem, state, solver)
     status, iteration = Status.STALLED, 0
     for iteration in range(1, most_iterations + 1):
         try:
-            moved, state_next, forces_next, mismatch = step.take(state, forces)
+            moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
         except SingularError:
             status = Status.DIVERGED
             break
@@ -106,7 +118,32 @@ def find_equilibrium(
         max_strain=float(np.abs(problem.stretch.strains(state)).max()),
         negative_modes=step.negative_modes,
     )
-    return Equilibrium(state, forces, gradient, report)
+    mode = step.lowest_mode(state) if status is Status.CONVERGED and step.negative_modes else None
+    return Equilibrium(state, forces, gradient, report, mode)
+
+
+def find_stable(
+    problem: Problem, state: Floats, forces: Floats, *, most_iterations: int = 60, progress: Progress | None = None
+) -> Equilibrium:
+    """As `find_equilibrium`; where that ends on a saddle, slide off along its mode, to either side in turn.
+
+    Returns the saddle, with its negative modes counted, where neither side leads to a stable equilibrium.
+    The report counts the work of all solves.
+    """
+    first = find_equilibrium(problem, state, forces, most_iterations=most_iterations, progress=progress)
+    tries = [first]
+    if first.mode is not None:
+        for side in (1.0, -1.0):
+            start = first.state + side * NUDGE * problem.length * first.mode
+            tries.append(
+                find_equilibrium(
+                    problem, start, first.forces, descend=True, most_iterations=2 * most_iterations, progress=progress
+                )
+            )
+            if tries[-1].report.stable:
+                break
+    best = tries[-1] if tries[-1].report.stable else first
+    return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))
 
 
 class _Step:
@@ -126,6 +163,7 @@ class _Step:
         self.dofs = free.size
         self.factorizations = 0
         self.negative_modes = 0
+        self._shift = 0.0
 
     def refresh(self, state: Floats) -> None:
         self._elements = tuple(element.refreshed(state) for element in self._elements)
@@ -138,12 +176,12 @@ class _Step:
         self._problem.stretch.add_axial(state, forces, gradient)
         return gradient
 
-    def take(self, state: Floats, forces: Floats) -> tuple[float, Floats, Floats, float]:
+    def take(self, state: Floats, forces: Floats, descend: bool) -> tuple[float, Floats, Floats, float]:
         """Length of the step, the next state and forces, and how far these are from matching the strains."""
         problem = self._problem
         base = forces if problem.inextensible else np.zeros_like(forces)
         stretch = problem.stretch.with_forces(forces, multipliers=base)
-        free = problem.constraint.freedom(state)
+        self._free = free = problem.constraint.freedom(state)
         gradient = np.zeros_like(state) if problem.load is None else -problem.load
         for element, hessians in zip(self._elements, self._hessians, strict=False):
             element.evaluate(state, gradient, hessians)
@@ -152,8 +190,12 @@ class _Step:
         stretch.evaluate(state, gradient, self._hessians[-2])
         curvature = problem.constraint.curvature(state, by_force)
         self._hessians[-1][:] = curvature if len(curvature) else 0.0
-        self._factor(free)
-        motion = free.expand(self._solver.solve(-free.reduce(gradient)))
+        prescribed = problem.constraint.remaining(state)
+        if prescribed is not None:
+            gradient += self._times(prescribed)
+        motion = free.expand(self._direction(-free.reduce(gradient), descend))
+        if prescribed is not None:
+            motion += prescribed
         reach = float(np.sqrt(np.einsum("ij,ij->i", motion, motion).max()))
         share = min(1.0, LONGEST_STEP * problem.length / reach) if reach > 0 else 1.0
         strains = problem.stretch.strains(state) + problem.stretch.elongation(state, motion)
@@ -164,16 +206,45 @@ class _Step:
             left = left - forces_next / problem.stretch.stiffness
         return reach, state_next, forces_next, float(np.abs(left).max())
 
-    def _factor(self, free: Freedom) -> None:
-        """Factorise; where the Hessian is indefinite, again with a growing shift of its diagonal."""
-        data = self._assembly.assemble(self._hessians, self._blocks, free)
+    def _times(self, motion: Floats) -> Floats:
+        """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""
+        result = np.zeros_like(motion)
+        for hessians, blocks in zip(self._hessians, self._blocks, strict=True):
+            product = np.einsum("mij,mj->mi", hessians, motion[blocks].reshape(len(blocks), -1))
+            np.add.at(result, blocks, product.reshape(*blocks.shape, 3))
+        return result
+
+    def lowest_mode(self, state: Floats) -> Floats:
+        """(n, 3) eigenvector of the most negative eigenvalue, by inverse iteration on the shifted Hessian."""
+        self._shift_until_definite()
+        v = np.sin(1.0 + np.arange(self._free.size) ** 2)  # no symmetry of the shell is one of this start
+        for _ in range(12):
+            v = self._solver.solve(v / np.abs(v).max())
+        mode = self._free.expand(v)
+        return mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max())
+
+    def _direction(self, right: Floats, descend: bool) -> Floats:
+        """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian."""
+        self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
         self.factorizations += 1
-        self.negative_modes = negative = self._solver.factor(data)
-        shift = 0.0
-        soft = np.trace(self._hessians[0], axis1=1, axis2=2).mean() / 9 if len(self._hessians) > 2 else 1.0
-        while negative and shift < 1e6 * soft:
-            shift = 4.0 * shift if shift else 1e-3 * soft
-            shifted = data.copy()
+        self.negative_modes = self._solver.factor(self._data)
+        if self.negative_modes and not descend:
+            step = self._solver.solve(right)
+            if np.abs(step).max() < NEAR * self._problem.length:
+                return step
+        if self.negative_modes:
+            self._shift_until_definite()
+        return self._solver.solve(right)
+
+    def _shift_until_definite(self) -> None:
+        """Factorise with a growing shift of the diagonal, beginning a little below the last that sufficed."""
+        bending = self._hessians[0]
+        softest = 1e-3 * float(np.trace(bending, axis1=1, axis2=2).mean()) / bending.shape[1]
+        shift, negative = max(softest, self._shift / 16.0), 1
+        while negative and shift < 1e12 * softest:
+            shift *= 4.0
+            shifted = self._data.copy()
             shifted[self._assembly.diagonal] += shift
             self.factorizations += 1
             negative = self._solver.factor(shifted)
+        self._shift = shift

@@ -1,6 +1,6 @@
 """How a solve ended: one record for every solver."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 
@@ -54,3 +54,12 @@ class SolveReport:
     @property
     def stable(self) -> bool:
         return self.converged and self.negative_modes == 0
+
+    def after(self, *earlier: "SolveReport") -> "SolveReport":
+        """This report with the work of earlier solves added."""
+        return replace(
+            self,
+            iterations=self.iterations + sum(one.iterations for one in earlier),
+            factorizations=self.factorizations + sum(one.factorizations for one in earlier),
+            seconds=self.seconds + sum(one.seconds for one in earlier),
+        )

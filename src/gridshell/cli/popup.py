@@ -1,0 +1,65 @@
+"""`gridshell popup`: rods from a table or an earlier result, popped up from flat with pinned ends."""
+
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gridshell.cli.outcome import deliver, output_folder
+from gridshell.cli.progress import Progress, announce_compilation
+from gridshell.errors import InputError
+
+if TYPE_CHECKING:
+    from gridshell.cli.rodends import RodEnds
+    from gridshell.rods.section import Rod
+
+PAPER_ROD_LENGTH = (
+    pi * 0.2
+)  # of the hemisphere's middle rod [HQK section 3.1], which the default rod belongs to
+
+
+@click.command()
+@click.argument("source", metavar="RODS.csv|DIR")
+@click.option("--unit", metavar="UNIT", help="Of the table's coordinates: m, mm, in, ...; a table needs it.")
+@click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME-popup.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs.")
+@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+def command(source: str, unit: str | None, out: str | None, as_json: bool, quiet: bool) -> int:
+    """Pop up rods from flat, their ends pinned: where does the shell go?
+
+    RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
+    final_z0, final_x1, final_y1, final_z1 and, if you like, id. DIR is an earlier result.
+    """
+    path = Path(source)
+    ends, rod = _rods_and_material(path, unit)
+    folder = output_folder(out, f"{path.absolute().stem}-popup")
+    if folder.absolute() == path.absolute():
+        raise InputError(f"--out {folder} is the result that is read: give another folder")
+    announce_compilation(quiet=quiet)
+    from gridshell.formfinding import pop_up_table
+    from gridshell.layout import straight_rods
+
+    grid = straight_rods(ends.flat, names=ends.names)
+    with Progress(quiet=quiet) as progress:
+        popped = pop_up_table(grid, ends.flat, ends.final, rod, progress=progress)
+    return deliver(popped, popped.save, folder, as_json=as_json, quiet=quiet)
+
+
+def _rods_and_material(path: Path, unit: str | None) -> "tuple[RodEnds, Rod]":
+    """A table takes the default rod at the table's scale; a result keeps the rod that it was found with."""
+    from gridshell.case import load_case
+    from gridshell.cli.rodends import read_result, read_table
+
+    if path.is_dir():
+        if unit is not None:
+            raise InputError(f'--unit = "{unit}": {path} is a result, which is in SI; leave --unit out')
+        ends = read_result(path)
+        if (path / "case.toml").is_file():
+            return ends, load_case(path / "case.toml").rod.build()
+    elif unit is None:
+        raise InputError("--unit is missing: give the unit of the table's coordinates, such as --unit m")
+    else:
+        ends = read_table(path, unit)
+    radius = 0.001 * ends.longest / PAPER_ROD_LENGTH
+    return ends, load_case("hemisphere", {"rod.section.radius": radius}).rod.build()

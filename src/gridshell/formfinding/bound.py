@@ -1,0 +1,145 @@
+"""The bound drape: march the net, then bind the elastic grid to the target (numerics.md, section 4).
+
+Every node slides on the target without friction, rods do not stretch, and bending alone decides what the net
+leaves open: the shape of each span between its joints. No load and no stretch stiffness enter, so that the
+result does not depend on scale or material. The axes and the anchor are held, as the net holds them.
+"""
+
+from math import degrees
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.contact.bound import BoundToTarget
+from gridshell.formfinding.draped import Draped
+from gridshell.formfinding.progress import Progress, silent
+from gridshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
+from gridshell.model import Shell
+from gridshell.nets import ChebyshevNet, chebyshev_net
+from gridshell.nets.apron import with_apron
+from gridshell.rods.section import Rod
+from gridshell.rods.stretch import Stretch
+from gridshell.solve.mixed_newton import Problem, find_equilibrium
+from gridshell.targets import Target
+
+Floats = NDArray[np.float64]
+
+CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
+WARN_ANGLE = 25.0  # degrees
+
+
+def bound_drape(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    anchor: tuple[float, float] | None = None,
+    progress: Progress = silent,
+) -> Draped:
+    """Drape `layout` over `target` by its net; see `drape`."""
+    progress("net", "marching", 0.0)
+    net = chebyshev_net(target, layout, anchor=anchor)
+    footprint = {(line.family, line.offset): line for line in net.rods}
+    grid = with_apron(net, CLEARANCE * layout.edge)
+    cuts = [footprint.get((line.family, line.offset)) for line in grid.rods]
+    mesh = mesh_grid(grid, layout.edge, marks=[(cut.start, cut.end) if cut else () for cut in cuts])
+    start = np.empty((mesh.node_count, 3))
+    for k, line in enumerate(grid.rods):
+        start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
+    shell = Shell.of(mesh, rod)
+    problem = Problem(
+        elements=shell.elements,
+        stretch=_penalty(shell.stretch, rod, target, len(grid.rods)),
+        constraint=_bind(target, mesh, start),
+        length=target.size,
+        inextensible=True,
+    )
+    found = find_equilibrium(
+        problem,
+        target.retract(start),
+        np.zeros(len(mesh.edges)),
+        progress=lambda k, step: progress("drape", f"bound, iteration {k}", step),
+    )
+    on_target = _nodes_on_target(mesh, cuts)
+    pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
+    warnings = list(net.warnings)
+    if degrees(net.min_angle) < WARN_ANGLE:
+        x, y, z = net.min_angle_at
+        warnings.append(
+            f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
+            "joints there must close far; another anchor or heading may open them"
+        )
+    return Draped(
+        method="bound",
+        target=target,
+        layout=layout,
+        rod=rod,
+        mesh=mesh,
+        positions=found.state,
+        rods=tuple(line for line in net.rods if not line.virtual),
+        levels=(found.report,),
+        max_gap=float(np.abs(target.gap(found.state[on_target]).distance).max()),
+        pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
+        min_angle=net.min_angle,
+        min_angle_at=net.min_angle_at,
+        own_ends=_own_ends(target, mesh, cuts, found.state),
+        net=net,
+        dropped=net.dropped,
+        warnings=tuple(warnings),
+    )
+
+
+def _penalty(stretch: Stretch, rod: Rod, target: Target, rods: int) -> Stretch:
+    """Edges whose stiffness only has to outweigh bending: 1e5 (1e6 above 50 rods) at EI = (0.15 Lc)^3."""
+    weight = (1e5 if rods <= 100 else 1e6) / 0.15**3
+    stiffness = weight * rod.bend_stiffness / target.size**2
+    return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
+
+
+def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
+    """All nodes on the target; those of the two axes keep to their lines, the anchor to its place."""
+    count = np.full(mesh.node_count, 2, dtype=np.intp)
+    guides = np.tile([1.0, 0.0, 0.0], (mesh.node_count, 1))
+    guides[np.abs(target.on_surface(start).normal[:, 0]) > 0.7] = [0.0, 1.0, 0.0]
+    for k, line in enumerate(mesh.grid.rods):
+        if line.offset == 0.0:
+            nodes = mesh.nodes_of(k)
+            count[nodes] -= 1
+            guides[nodes] = np.gradient(start[nodes], axis=0)
+    return BoundToTarget(target, count, guides)
+
+
+def _nodes_on_target(mesh: GridMesh, cuts: list[FlatRod | None]) -> NDArray[np.intp]:
+    """Nodes between the ends of some rod: all but the apron's."""
+    chosen = []
+    for k, cut in enumerate(cuts):
+        if cut is not None:
+            s = mesh.stations[mesh.rod_slice(k)]
+            tiny = 1e-9 * cut.length
+            chosen.append(mesh.nodes_of(k)[(s >= cut.start - tiny) & (s <= cut.end + tiny)])
+    return np.unique(np.concatenate(chosen))
+
+
+def _own_ends(target: Target, mesh: GridMesh, cuts: list[FlatRod | None], positions: Floats) -> Floats:
+    """Distance [m] along each rod between its end and where this state crosses the target's end."""
+    result = []
+    for k, cut in enumerate(cuts):
+        if cut is None or cut.virtual:
+            continue
+        s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
+        for end in (cut.start, cut.end):
+            first = int(np.clip(np.argmin(np.abs(s - end)) - 1, 0, max(len(s) - 3, 0)))
+            window = slice(first, first + 3)
+            margin = target.margin(positions[nodes[window]])
+            fit = np.polyfit(s[window] - end, margin, len(margin) - 1)
+            result.append(abs(float(fit[-1] / fit[-2])))
+    return np.array(result)
+
+
+def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
+    """Key figures of a net for the result file."""
+    return {
+        "error_estimate": net.error_estimate,
+        "min_angle_deg": degrees(net.min_angle),
+        "min_angle_at": list(net.min_angle_at),
+    }
