@@ -1,1 +1,80 @@
-"""gridshell: from a target surface to a flat grid of elastic rods that pops up into it."""
+"""gridshell: from a target surface to a flat grid of elastic rods that pops up into it.
+
+    import gridshell as gs
+
+    target = gs.Hemisphere(radius=0.2)
+    layout = gs.GridLayout.orthogonal(rods=(17, 17), spacing=0.03, length=1.2, edge=0.005)
+    rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+    form = gs.find_form(target, layout, rod)
+    print(form.summary())
+    form.save("out/dome")
+
+Names are imported when they are first used, so that the command line starts at once.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gridshell.errors import ConvergenceError, GridshellError, InputError, NetLimitError, OutputError
+    from gridshell.form import Form, PoppedUp, find_form, pop_up_table
+    from gridshell.formfinding import (
+        Agreement,
+        Boundary,
+        Draped,
+        Footprint,
+        Popped,
+        Trimmed,
+        agreement,
+        drape,
+        map_back,
+        pop_up,
+        trim,
+    )
+    from gridshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+    from gridshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
+    from gridshell.rods.section import Circle, Material, Rod, Tube
+    from gridshell.targets import (
+        Cap,
+        Disc,
+        Ellipsoid,
+        HeightField,
+        Hemisphere,
+        Paraboloid,
+        Rectangle,
+        Target,
+    )
+
+_HOMES = {
+    "gridshell.errors": ("ConvergenceError", "GridshellError", "InputError", "NetLimitError", "OutputError"),
+    "gridshell.form": ("Form", "PoppedUp", "find_form", "pop_up_table"),
+    "gridshell.formfinding": (
+        "Agreement", "Boundary", "Draped", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
+        "pop_up", "trim",
+    ),
+    "gridshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
+    "gridshell.nets": ("ChebyshevNet", "chebyshev_net", "sphere_net_end", "sphere_net_rod"),
+    "gridshell.rods.section": ("Circle", "Material", "Rod", "Tube"),
+    "gridshell.targets": (
+        "Cap", "Disc", "Ellipsoid", "HeightField", "Hemisphere", "Paraboloid", "Rectangle", "Target",
+    ),
+}  # fmt: skip
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Agreement", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Disc", "Draped", "Ellipsoid",
+    "FlatGrid", "FlatRod", "Footprint", "Form", "GridLayout", "GridMesh", "GridshellError", "HeightField",
+    "Hemisphere", "InputError", "Material", "NetLimitError", "OutputError", "Paraboloid", "Popped", "PoppedUp",
+    "Rectangle", "Rod", "Target", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape", "find_form",
+    "map_back", "mesh_grid", "pop_up", "pop_up_table", "sphere_net_end", "sphere_net_rod", "straight_rods", "trim",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'gridshell' has no attribute {name!r}")
+    return getattr(import_module(_HOME_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -78,7 +78,7 @@ def run(case: Case, name: str, *, out: str | None, as_json: bool, quiet: bool) -
     folder = output_folder(out, name)
     target, layout, rod, options = case.build()
     announce_compilation(quiet=quiet)
-    from gridshell.formfinding import find_form
+    from gridshell.form import find_form
 
     with Progress(quiet=quiet) as progress:
         form = find_form(target, layout, rod, progress=progress, **options)

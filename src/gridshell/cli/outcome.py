@@ -1,14 +1,11 @@
-"""Where a job's result goes: the check before it runs, and what is written and said after it."""
+"""Where a job's result goes, and what is said when it is there."""
 
 import json
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 import click
-
-from gridshell.errors import OutputError
 
 CONVERGED, NOT_CONVERGED = 0, 3
 
@@ -28,34 +25,15 @@ class Result(Protocol):
 
 
 def output_folder(out: str | None, name: str) -> Path:
-    """The folder for a result, by default out/NAME, which can be written now, before the job starts.
+    """The folder for a result, by default out/NAME; asked for before the job starts.
 
     Raises
     ------
-    OutputError : it is a file, holds other things than a result, or cannot be written.
+    OutputError : it cannot be written, or holds other things than a result.
     """
-    folder = Path(out) if out else Path("out") / Path(name).stem
-    whole = folder.absolute()
-    above = next(path for path in whole.parents if path.exists())
-    if not above.is_dir():
-        raise OutputError(f"the output folder {folder} cannot be made, {above} is a file: give another")
-    try:
-        with TemporaryDirectory(dir=above, prefix=".gridshell-"):  # a result is written beside it and renamed
-            free = not whole.exists() or _may_be_replaced(whole)
-    except OSError as reason:
-        raise OutputError(
-            f"the output folder {folder} cannot be written ({reason.strerror}: {above}): give another"
-        ) from None
-    if not free:
-        raise OutputError(
-            f"the output folder {folder} holds other things, which a result would replace: give a new one"
-        )
-    return folder
+    from gridshell.output.folder import check_folder
 
-
-def _may_be_replaced(folder: Path) -> bool:
-    """An earlier result may, and so may an empty folder."""
-    return folder.is_dir() and ((folder / "result.json").is_file() or not any(folder.iterdir()))
+    return check_folder(out or Path("out") / Path(name).stem)
 
 
 def deliver(

@@ -33,16 +33,16 @@ def command(source: str, unit: str | None, out: str | None, as_json: bool, quiet
     """
     path = Path(source)
     ends, rod = _rods_and_material(path, unit)
-    folder = output_folder(out, f"{path.absolute().stem}-popup")
-    if folder.absolute() == path.absolute():
+    folder = output_folder(out, f"{path.resolve().stem}-popup")
+    if folder == path.resolve():
         raise InputError(f"--out {folder} is the result that is read: give another folder")
     announce_compilation(quiet=quiet)
-    from gridshell.formfinding import pop_up_table
+    from gridshell.form import pop_up_table
     from gridshell.layout import straight_rods
 
     grid = straight_rods(ends.flat, names=ends.names)
     with Progress(quiet=quiet) as progress:
-        popped = pop_up_table(grid, ends.flat, ends.final, rod, progress=progress)
+        popped = pop_up_table(grid, ends.final, rod, progress=progress)
     return deliver(popped, popped.save, folder, as_json=as_json, quiet=quiet)
 
 

@@ -42,7 +42,8 @@ class Progress:
         if self._live is not None:
             from rich.text import Text
 
-            self._live.update(Text(f"{stage}: {detail}, residual {residual:.1e}"))
+            reached = f", residual {residual:.1e}" if residual else ""
+            self._live.update(Text(f"{stage}: {detail}{reached}"))
         elif not self._quiet and stage != self._stage:
             click.echo(f"gridshell: {stage}", err=True)
         self._stage = stage

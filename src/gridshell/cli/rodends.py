@@ -1,13 +1,10 @@
 """Rods given by where their ends lie flat and where they go: from a table, or from an earlier result."""
 
 import csv
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,27 +100,20 @@ def read_result(folder: Path) -> RodEnds:
 
     Raises
     ------
-    InputError : the folder holds no result that can be read.
+    OutputError : the folder holds no result that can be read.
+    InputError : the result has no rods, or no shell in space.
     """
+    from gridshell.output.archive import SHELLS, read
+    from gridshell.output.rods import rods_of
+
+    archive = read(folder)
     try:
-        result = json.loads((folder / "result.json").read_bytes())
-        with np.load(folder / "states.npz") as states:
-            return _ends_of(folder, result, states)
-    except FileNotFoundError as missing:
-        name = Path(missing.filename).name
-        raise InputError(f"{folder} has no {name}: give a folder that gridshell wrote, or a table") from None
-    except InputError:
-        raise
-    except (OSError, KeyError, IndexError, TypeError, ValueError, BadZipFile) as reason:
-        raise InputError(f"the result in {folder} is damaged ({reason}): run it again") from None
-
-
-def _ends_of(folder: Path, result: dict[str, Any], states: Mapping[str, NDArray[Any]]) -> RodEnds:
-    if result["format"] != "gridshell-result" or result["version"] != 1:
-        raise InputError(f"{folder / 'result.json'} is not a gridshell result of version 1")
-    shell = next((name for name in ("draped", "popped_pinned", "popped_clamped") if name in states), None)
-    if shell is None:
-        raise ValueError("it has no popped state")
-    nodes, start = states["rod_nodes"], states["rod_start"]
-    ends = np.column_stack([nodes[start], nodes[np.append(start[1:], len(nodes)) - 1]])
-    return RodEnds([rod["id"] for rod in result["rods"]], states["flat"][ends][:, :, :2], states[shell][ends])
+        rods = rods_of(archive)
+        shell = archive.states[next(name for name in SHELLS if name in archive.states)]
+        flat = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
+        final = np.array([shell[rod.nodes[[0, -1]]] for rod in rods]).reshape(-1, 2, 3)
+    except (StopIteration, KeyError, IndexError, TypeError, ValueError):
+        raise InputError(f"the result in {folder} lacks its rods or its states: run it again") from None
+    if not rods:
+        raise InputError(f"the result in {folder} has no rods")
+    return RodEnds([rod.id for rod in rods], flat, final)

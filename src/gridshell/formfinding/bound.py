@@ -83,6 +83,8 @@ def bound_drape(
         min_angle=net.min_angle,
         min_angle_at=net.min_angle_at,
         own_ends=_own_ends(target, mesh, cuts, found.state),
+        anchor=anchor,
+        gravity=0.0,
         net=net,
         dropped=net.dropped,
         warnings=tuple(warnings),

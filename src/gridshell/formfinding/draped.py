@@ -30,6 +30,7 @@ class Draped:
     min_angle : smallest angle between two rods at a joint on the target [rad], at the point `min_angle_at` [m].
     own_ends : (k,) distance along each rod between its end in the flat grid and the end that this drape alone
         would give it [m]; None where they are the same.
+    anchor : x, y of the anchor as it was given [m], or None; gravity : [m/s2].
     net : the net that the drape started from; None where it started from the flat grid.
     """
 
@@ -46,6 +47,8 @@ class Draped:
     min_angle: float
     min_angle_at: tuple[float, float, float]
     own_ends: Floats | None
+    anchor: tuple[float, float] | None
+    gravity: float
     net: ChebyshevNet | None
     dropped: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()

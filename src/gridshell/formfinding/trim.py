@@ -87,6 +87,12 @@ def trim(draped: Draped) -> Trimmed:
     return Trimmed(draped, mesh, positions, boundary, tuple(dropped))
 
 
+def untrimmed(draped: Draped) -> Trimmed:
+    """A draped grid as it is, for keeping the partial result of a drape that did not converge."""
+    mesh, x = draped.mesh, draped.positions
+    return Trimmed(draped, mesh, x, Boundary(x[mesh.ends.ravel()], end_tangents(mesh, x), x), draped.dropped)
+
+
 def map_back(trimmed: Trimmed) -> Footprint:
     """The same cuts on the flat grid: the footprint G0."""
     return Footprint(trimmed.mesh)

@@ -4,10 +4,11 @@ import ast
 import operator
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from math import e, isfinite, pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,7 @@ OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 ALLOWED = "x, y, numbers, pi, e, + - * / ^, parentheses and " + ", ".join(FUNCTIONS)
 
+FOREIGN = {"−": "-", "·": "*", "×": "*", "÷": "/", "²": "^2", "³": "^3", "=": "only what follows it"}
 LONGEST = 4000  # characters; Python's parser is safe with texts of this length
 DEEPEST = 100  # parentheses in each other
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/^() ]|//|__")
@@ -88,10 +90,19 @@ def parse_formula(text: str) -> Formula:
     if not source:
         raise InputError(f"the formula is empty: write z in {ALLOWED}")
     if foreign := _FOREIGN.search(source):
-        raise _refusal(text, foreign[0])
+        raise _refusal(text, foreign[0], FOREIGN.get(foreign[0]))
     if _nesting(source) > DEEPEST:
         raise InputError(f"formula {shown(text)}: more than {DEEPEST} parentheses in each other: write a simpler one")
-    return _Compiler(text, source.replace("^", "**")).formula()
+    return _Compiler(text, source).formula()
+
+
+class _Result(NamedTuple):
+    """An operand: what a step gives. The others are floats and the names "x" and "y"."""
+
+    step: int
+
+
+_Operand = float | str | _Result
 
 
 class _Compiler:
@@ -99,49 +110,45 @@ class _Compiler:
 
     def __init__(self, text: str, source: str) -> None:
         self.text, self.source = text, source
-        self.numbers: list[float] = []
-        self.steps: list[tuple[Callable[..., Any], Any, Any]] = []
-        self.known: dict[tuple[Any, ...], Any] = {}
+        self.steps: dict[tuple[Callable[..., Any], _Operand, _Operand | None], _Result] = {}
 
     def formula(self) -> Formula:
         result = self._walk(self._parse())
         if isinstance(result, float):  # one height for every x: added to 0 x, so that shapes are kept
-            result = self._step(operator.add, self._step(operator.mul, "x", 0.0), result)
-        elif not self.steps or result != len(self.steps) - 1:
-            result = self._step(operator.add, result, 0.0)  # x or y alone
-        constants = tuple(dict.fromkeys(a for step in self.steps for a in step[1:] if isinstance(a, float)))
-        place: dict[Any, Slot] = {"x": 0, "y": 1, None: -1}
-        place |= {number: 2 + k for k, number in enumerate(constants)}
-
-        def slot(operand: Any) -> Slot:
-            return 2 + len(constants) + operand if isinstance(operand, int) else place[operand]
-
-        steps = tuple((f, slot(a), None if b is None else slot(b)) for f, a, b in self.steps)
-        return Formula(self.text, constants, steps)
+            self._step(operator.add, self._step(operator.mul, "x", 0.0), result)
+        elif isinstance(result, str):
+            self._step(operator.pos, result)
+        constants = dict.fromkeys(a for step in self.steps for a in step[1:] if isinstance(a, float))
+        place: dict[_Operand | None, Slot | None] = {None: None}
+        for operand in ("x", "y", *constants, *self.steps.values()):
+            place[operand] = len(place) - 1
+        steps = tuple((function, place[a] or 0, place[b]) for function, a, b in self.steps)
+        return Formula(self.text, tuple(constants), steps)
 
     def _parse(self) -> ast.expr:
         try:
-            return ast.parse(self.source, mode="eval").body
+            return ast.parse(self.source.replace("^", "**"), mode="eval").body
         except SyntaxError as reason:
-            rest = self.source[max((reason.offset or 1) - 1, 0) :]
+            read = self.source.replace("^", "**")[: max((reason.offset or 1) - 1, 0)]
+            rest = self.source[len(self._as_written(read)) :]
             where = f"from {shown(rest)} on" if rest else "to its end"
             raise InputError(
-                f"formula {shown(self.text)} cannot be read {where}: write it with {ALLOWED}; a product needs its *"
+                f"formula {shown(self.text)} cannot be read {where}: use {ALLOWED}; a product needs its *"
             ) from None
         except (ValueError, MemoryError, RecursionError):
             raise InputError(f"formula {shown(self.text)} is nested too deeply: write a simpler one") from None
 
-    def _walk(self, root: ast.expr) -> Any:
+    def _walk(self, root: ast.expr) -> _Operand:
         """Operands first, by a stack of our own: a long sum is a deep tree."""
-        done: dict[ast.expr, Any] = {}
+        done: dict[ast.expr, _Operand] = {}
         stack = [root]
         while stack:
-            node = stack[-1]
-            waiting = [child for child in self._operands(node) if child not in done]
+            waiting = [child for child in self._operands(stack[-1]) if child not in done]
             if waiting:
                 stack.extend(reversed(waiting))
             else:
-                done[stack.pop()] = self._operand(node, done)
+                node = stack.pop()
+                done[node] = self._operand(node, done)
         return done[root]
 
     def _operands(self, node: ast.expr) -> list[ast.expr]:
@@ -151,73 +158,70 @@ class _Compiler:
             case ast.UnaryOp(ast.USub() | ast.UAdd(), inner):
                 return [inner]
             case ast.Call(ast.Name(name), args, []) if name in FUNCTIONS:
-                if len(args) != 1 or isinstance(args[0], ast.Starred):
-                    raise InputError(
-                        f"formula {shown(self.text)}: {name} takes one value, not {len(args)}: write {name}(...)"
-                    )
+                if len(args) != 1:
+                    raise self._wrong(node, f"has {len(args)} values: write {name}(...) with one")
                 return args
+            case ast.Name(name) if name in FUNCTIONS:
+                raise self._wrong(node, f"has no value: write {name}(...)")
             case ast.Name(name) if name in ("x", "y") or name in CONSTANTS:
                 return []
             case ast.Constant(value) if type(value) in (int, float):
                 return []
-        raise _refusal(self.text, self._piece(node), _hint(node))
+        raise _refusal(self.text, self._piece(node), _meant(node))
 
-    def _operand(self, node: ast.expr, done: dict[ast.expr, Any]) -> Any:
-        """A float, "x", "y" or the number of a step."""
+    def _operand(self, node: ast.expr, done: dict[ast.expr, _Operand]) -> _Operand:
+        function: Callable[..., Any]
+        operands: tuple[_Operand, ...]
         match node:
             case ast.Name(name):
                 return CONSTANTS.get(name, name)
-            case ast.Constant(value):
-                return self._finite(float, (value,), node)
             case ast.UnaryOp(ast.UAdd(), inner):
                 return done[inner]
+            case ast.Constant(value):
+                function, operands = float, ()
+                with suppress(OverflowError):  # an integer past the largest float
+                    operands = (float(value),)
             case ast.UnaryOp(_, inner):
                 function, operands = operator.neg, (done[inner],)
             case ast.BinOp(left, op, right):
                 function, operands = OPERATORS[type(op)], (done[left], done[right])
                 if function is operator.truediv and operands[1] == 0.0:
-                    raise InputError(f"formula {shown(self.text)}: {shown(self._piece(node))} divides by zero")
+                    raise self._wrong(node, "divides by zero: write a divisor other than 0")
             case ast.Call(ast.Name(name), [inner]):
                 function, operands = FUNCTIONS[name], (done[inner],)
-        if all(isinstance(operand, float) for operand in operands):
-            return self._finite(function, tuple(np.float64(operand) for operand in operands), node)
-        return self._step(function, *operands)
-
-    def _step(self, function: Callable[..., Any], a: Any, b: Any = None) -> Any:
-        key = function, a, b
-        if key not in self.known:
-            self.known[key] = len(self.steps)
-            self.steps.append(key)
-        return self.known[key]
-
-    def _finite(self, function: Callable[..., Any], operands: tuple[Any, ...], node: ast.expr) -> float:
-        """The value of a constant piece."""
-        try:
-            with np.errstate(all="ignore"):
-                value = float(function(*operands))
-        except OverflowError:  # an integer past the largest float
-            value = np.inf
-        if not isfinite(value):
-            piece = shown(self._piece(node))
-            raise InputError(f"formula {shown(self.text)}: {piece} is no finite number: write a value that is")
+        if not all(isinstance(operand, float) for operand in operands):
+            return self._step(function, *operands)
+        with np.errstate(all="ignore"):
+            value = float(function(*(np.float64(operand) for operand in operands)))
+        if not (isfinite(value) and operands):
+            raise self._wrong(node, "is no finite number: write a value that is")
         return value
 
+    def _step(self, function: Callable[..., Any], a: _Operand, b: _Operand | None = None) -> _Result:
+        return self.steps.setdefault((function, a, b), _Result(len(self.steps)))
+
+    def _wrong(self, node: ast.expr, what: str) -> InputError:
+        return InputError(f"formula {shown(self.text)}: {shown(self._piece(node))} {what}")
+
     def _piece(self, node: ast.expr) -> str:
-        return ast.get_source_segment(self.source, node) or self.source
+        return self._as_written(ast.get_source_segment(self.source.replace("^", "**"), node) or self.source)
+
+    def _as_written(self, piece: str) -> str:
+        return piece.replace("**", "^") if "^" in self.source else piece
 
 
-def _refusal(text: str, piece: str, hint: str = "") -> InputError:
+def _refusal(text: str, piece: str, meant: str | None = None) -> InputError:
+    hint = f" (did you mean {meant}?)" if meant else ""
     return InputError(f"formula {shown(text)}: {shown(piece)} is not allowed{hint}: use {ALLOWED}")
 
 
-def _hint(node: ast.expr) -> str:
-    """What may have been meant by an unknown name."""
+def _meant(node: ast.expr) -> str | None:
+    """The known name that looks most like an unknown one."""
     match node:
-        case ast.Call(ast.Attribute(_, name)) | ast.Call(ast.Name(name)) | ast.Attribute(_, name) | ast.Name(name):
-            spelt = {"ln": "log", "abs": ""}.get(name, name.lower().replace("arc", "a"))
-            near = get_close_matches(spelt, ["x", "y", *CONSTANTS, *FUNCTIONS], n=1)
-            return f" (did you mean {near[0]}?)" if near else ""
-    return ""
+        case ast.Call(ast.Attribute(_, name) | ast.Name(name)) | ast.Attribute(_, name) | ast.Name(name):
+            spelt = {"ln": "log"}.get(name, name.lower().replace("arc", "a"))
+            return next(iter(get_close_matches(spelt, ["x", "y", *CONSTANTS, *FUNCTIONS], n=1)), None)
+    return None
 
 
 def _nesting(source: str) -> int:

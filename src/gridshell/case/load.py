@@ -1,0 +1,106 @@
+"""From a name or a file, and what the command line adds, to a complete case or one clear sentence."""
+
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from difflib import get_close_matches
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from gridshell.case.keys import BY_KIND, case_keys, case_tables
+from gridshell.case.schema import Case
+from gridshell.case.sentences import not_a_table, sentence, unknown_key
+from gridshell.errors import InputError
+from gridshell.units import shown
+
+Raw = dict[str, Any]
+
+BUILT_IN: dict[str, Raw] = {
+    "hemisphere": {"layout": {"rods": (17, 17), "length": 1.2}},
+    "paraboloid": {"layout": {"rods": (15, 15), "length": 1.2}},
+    "ellipsoid": {"layout": {"rods": (11, 15), "length": 1.2}},
+    "cap": {"layout": {"rods": (17, 17), "length": 1.2}},
+    "heightfield": {},
+}
+"""The cases that need no file, each named like its target's kind; the schema's defaults give the rest."""
+
+SURFACE_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".3dm", ".step", ".stp")
+
+
+def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Case:
+    """The case of this name or in this file, with some keys set anew.
+
+    Parameters
+    ----------
+    name_or_path : one of `BUILT_IN`, or the path of a TOML file.
+    overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
+        keeps those keys of its table that it has too.
+
+    Raises
+    ------
+    InputError : no such case or file, not TOML, an unknown key, a value that cannot be used; in one sentence.
+    """
+    overrides = dict(overrides or {})
+    raw = _read(name_or_path)
+    for path in case_tables():
+        if not isinstance(_table(raw, path), dict):
+            raise InputError(not_a_table(path, _table(raw, path)))
+    for path, kind in BY_KIND.items():
+        _table(raw, path).setdefault("kind", kind)
+    _drop_for_another_kind(raw, overrides)
+    for path, value in overrides.items():
+        if path not in case_keys():
+            raise InputError(unknown_key(path, value, raw))
+        table, _, key = path.rpartition(".")
+        _table(raw, table)[key] = value
+    try:
+        return Case.model_validate(raw)
+    except ValidationError as error:
+        raise InputError(sentence(error, raw)) from None
+
+
+def _table(raw: Raw, path: str) -> Any:
+    """The table at a dotted path, made where it is missing."""
+    inner: Any = raw
+    for name in path.split("."):
+        inner = inner.setdefault(name, {})
+    return inner
+
+
+def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
+    """Where an override sets another kind (or domain), drop what was given for the old one alone."""
+    for path in BY_KIND:
+        kind, table = overrides.get(f"{path}.kind"), _table(raw, path)
+        if kind is not None and kind != table["kind"]:
+            for key in case_keys().values():
+                if key.table == path and key.kinds and kind not in key.kinds:
+                    table.pop(key.name, None)
+    domain, target = overrides.get("target.domain"), raw["target"]
+    if domain is not None and domain != target.get("domain", "disc"):
+        for name in ("radius", "size"):
+            target.pop(name, None)
+
+
+def _read(name_or_path: str | PathLike[str]) -> Raw:
+    name, path = str(name_or_path), Path(name_or_path)
+    if name in BUILT_IN:
+        return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
+    if path.suffix.lower() in SURFACE_FILES:
+        raise InputError(f"{name}: not yet: targets from files; give a case or a formula")
+    if path.is_dir():
+        raise InputError(f"{name} is a folder: give a case file, such as {path / 'case.toml'}")
+    if not path.exists():
+        near = get_close_matches(name, BUILT_IN, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"give a case file, or one of {', '.join(BUILT_IN)}"
+        raise InputError(f"there is no case and no file named {shown(name)}: {hint}")
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as reason:
+        raise InputError(f"{name} cannot be read: {reason.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{name} is not text in UTF-8: save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as reason:
+        raise InputError(f"{name} is not valid TOML: {reason}") from None

@@ -1,0 +1,138 @@
+"""The front door: from a target to a form in one call, and what can be done with it."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gridshell.case.of import case_text
+from gridshell.errors import InputError
+from gridshell.formfinding import FoundForm, PoppedTable, find_stages, pop_up_stages
+from gridshell.formfinding.drape import Method
+from gridshell.formfinding.popup import Ends
+from gridshell.formfinding.progress import Progress, silent
+from gridshell.layout import FlatGrid, GridLayout
+from gridshell.output import Archive, write
+from gridshell.output.result import form_result, form_states, table_result, table_states
+from gridshell.output.summary import summary_text
+from gridshell.rods.section import Rod
+from gridshell.targets import Target
+
+
+LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
+
+
+class Form(FoundForm):
+    """A form that was found: its stages, and its files."""
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        return form_result(self)
+
+    def summary(self) -> str:
+        """One screen of text."""
+        return summary_text(self.result())
+
+    def archive(self, case_toml: str | None = None) -> Archive:
+        """Everything that is kept; `case_toml` is the input it came from, by default one made from the objects."""
+        if case_toml is None:
+            draped = self.draped
+            case_toml = case_text(
+                self.target, self.layout, self.rod,
+                method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
+            )  # fmt: skip
+        return Archive(self.result(), form_states(self), case_toml)
+
+    def save(self, folder: str | PathLike[str], *, case_toml: str | None = None) -> Path:
+        """Write archive, drawings, schedules, models and report; the folder's absolute path.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written, or holds something else.
+        """
+        return write(self.archive(case_toml), folder)
+
+
+class PoppedUp(PoppedTable):
+    """A table of rods that was popped up, and its files."""
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json."""
+        return table_result(self, "popup")
+
+    def summary(self) -> str:
+        """One screen of text."""
+        return summary_text(self.result())
+
+    def save(self, folder: str | PathLike[str]) -> Path:
+        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
+        return write(Archive(self.result(), table_states(self)), folder)
+
+
+def find_form(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    method: Method = "bound",
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    ends: Sequence[Ends] = ("pinned", "clamped"),
+    progress: Progress = silent,
+) -> Form:
+    """From a target to the flat grid that pops up into it, with the proof.
+
+    Parameters
+    ----------
+    target : the shape wanted.
+    layout : the flat grid asked for.
+    rod : section and material of every rod.
+    method, anchor, gravity : of the drape, see `drape`.
+    ends : end conditions of the pop-up.
+    progress : called as progress(stage, detail, residual) at every iteration.
+
+    Returns
+    -------
+    The form. Its `status` is "converged", or says which stage stopped; nothing is raised for that.
+
+    Raises
+    ------
+    InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
+    """
+    found = find_stages(
+        target, layout, rod, method=method, anchor=anchor, gravity=gravity, ends=ends, progress=progress
+    )
+    return Form(**{field.name: getattr(found, field.name) for field in fields(found)})
+
+
+def pop_up_table(
+    grid: FlatGrid, finals: ArrayLike, rod: Rod, *, edge: float | None = None, progress: Progress = silent
+) -> PoppedUp:
+    """Pop up rods from elsewhere: pinned, from flat.
+
+    Parameters
+    ----------
+    grid : the rods, flat (see `straight_rods`).
+    finals : (m, 2, 3) where the ends of each rod go [m].
+    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+
+    Raises
+    ------
+    InputError : `finals` does not fit `grid`; no rod has three joints.
+    """
+    points = np.asarray(finals, dtype=float)
+    if points.shape != (len(grid.rods), 2, 3) or not np.isfinite(points).all():
+        raise InputError(f"final ends must be finite and of the shape ({len(grid.rods)}, 2, 3), not {points.shape}")
+    apart = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+    for rod_line, distance in zip(grid.rods, apart, strict=True):
+        if distance > LONGEST_STRETCH * rod_line.length:
+            raise InputError(
+                f"rod {rod_line.name} is {rod_line.length:.4g} m long, but its final ends lie {distance:.4g} m apart: "
+                "move them closer, or give a longer rod"
+            )
+    found = pop_up_stages(grid, points, rod, edge=edge, progress=progress)
+    return PoppedUp(**{field.name: getattr(found, field.name) for field in fields(found)})

@@ -1,0 +1,159 @@
+"""The main job: drape, trim, map back, pop up, compare; and the pop-up of a table of rods on its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.errors import InputError
+from gridshell.formfinding.agreement import Agreement, agreement
+from gridshell.formfinding.drape import Method, drape
+from gridshell.formfinding.draped import Draped
+from gridshell.formfinding.popup import Ends, Popped, pop_up
+from gridshell.formfinding.progress import Progress, silent
+from gridshell.formfinding.trim import (
+    FEWEST_JOINTS,
+    NEAREST_JOINT,
+    Boundary,
+    Footprint,
+    Trimmed,
+    map_back,
+    trim,
+    untrimmed,
+)
+from gridshell.layout import FlatGrid, GridLayout, mesh_grid
+from gridshell.rods.section import Rod
+from gridshell.targets import Target
+
+Floats = NDArray[np.float64]
+
+EDGES_A_SPAN = 6
+
+
+@dataclass(frozen=True)
+class FoundForm:
+    """Every stage of the main job. A stage that was not reached, because one before did not converge, is missing.
+
+    Parameters
+    ----------
+    popped, agreement : by end condition, "pinned" and "clamped".
+    """
+
+    target: Target
+    layout: GridLayout
+    rod: Rod
+    draped: Draped
+    trimmed: Trimmed
+    footprint: Footprint
+    popped: dict[Ends, Popped]
+    agreement: dict[Ends, Agreement]
+
+    @property
+    def status(self) -> str:
+        """ "converged", or which stage stopped and what to do."""
+        if not self.draped.converged:
+            return f"drape {self.draped.report.status.sentence}"
+        return _popped_status(self.popped)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read before anything else."""
+        return (*self.draped.warnings, *_popped_warnings(self.popped))
+
+
+@dataclass(frozen=True)
+class PoppedTable:
+    """A table of rods, popped up from flat with pinned ends."""
+
+    rod: Rod
+    footprint: Footprint
+    boundary: Boundary
+    popped: dict[Ends, Popped]
+    dropped: tuple[tuple[str, str], ...]
+
+    @property
+    def status(self) -> str:
+        """ "converged", or what to do."""
+        return _popped_status(self.popped)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return _popped_warnings(self.popped)
+
+
+def find_stages(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    method: Method = "bound",
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    ends: Sequence[Ends] = ("pinned", "clamped"),
+    progress: Progress = silent,
+) -> FoundForm:
+    """Drape, trim, map back, pop up and compare; see `gridshell.find_form`."""
+    draped = drape(layout, rod, target, method=method, anchor=anchor, gravity=gravity, progress=progress)
+    trimmed = trim(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
+    footprint = map_back(trimmed)
+    popped: dict[Ends, Popped] = {}
+    if draped.converged:
+        popped = {end: pop_up(footprint, trimmed.boundary, rod, ends=end, progress=progress) for end in ends}
+    compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
+    return FoundForm(target, layout, rod, draped, trimmed, footprint, popped, compared)
+
+
+def pop_up_stages(
+    grid: FlatGrid, finals: Floats, rod: Rod, *, edge: float | None = None, progress: Progress = silent
+) -> PoppedTable:
+    """Pop up rods given by their flat lines and the final places of their ends.
+
+    Parameters
+    ----------
+    finals : (m, 2, 3) where the two ends of each rod of `grid` go [m].
+    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+
+    Raises
+    ------
+    InputError : no rod has three joints.
+    """
+    spans = _spans(grid)
+    joined = FlatGrid.of(grid.rods, margin=NEAREST_JOINT * spans)
+    kept, swinging = joined.without(lambda some: some.joint_counts() < FEWEST_JOINTS)
+    if not kept.rods:
+        raise InputError(
+            f"no rod of the table has {FEWEST_JOINTS} joints with others: such rods swing; give a denser grid"
+        )
+    row = {rod.name: k for k, rod in enumerate(grid.rods)}
+    rows = [row[rod.name] for rod in kept.rods]
+    footprint = Footprint(mesh_grid(kept, edge or spans / EDGES_A_SPAN))
+    points = finals[rows].reshape(-1, 3)
+    boundary = Boundary(points, np.zeros_like(points))
+    popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", progress=progress)
+    dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
+    return PoppedTable(rod, footprint, boundary, {"pinned": popped}, dropped)
+
+
+def _spans(grid: FlatGrid) -> float:
+    """Median distance between neighbouring joints [m]."""
+    gaps = []
+    for rod in range(len(grid.rods)):
+        on_rod = grid.crossings.at[grid.crossings.rods == rod]
+        gaps += np.diff(np.sort(on_rod)).tolist()
+    return float(np.median(gaps)) if gaps else min(rod.length for rod in grid.rods)
+
+
+def _popped_status(popped: dict[Ends, Popped]) -> str:
+    for ends, shell in popped.items():
+        if not shell.report.converged:
+            return f"pop-up ({ends}) {shell.report.status.sentence}"
+    return "converged"
+
+
+def _popped_warnings(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+    return tuple(
+        f"the popped-up shell with {ends} ends is not stable: {shell.report.negative_modes} negative modes"
+        for ends, shell in popped.items()
+        if shell.report.converged and not shell.report.stable
+    )

@@ -1,0 +1,136 @@
+"""A result with its states, and the folder that holds it: everything in the folder is made from the archive."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.errors import OutputError
+from gridshell.output.folder import read_json, replacing
+
+SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
+
+
+@dataclass(frozen=True)
+class Archive:
+    """A result as it is kept on disk.
+
+    Parameters
+    ----------
+    result : the content of result.json, SI units.
+    states : the content of states.npz: "flat", "draped", "popped_pinned", "popped_clamped" (n, 3) node
+        positions [m]; "gap_draped", "gap_pinned", "gap_clamped" (n,) signed distances to the target [m];
+        "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be missing.
+    case_toml : the full resolved input; empty if there was none.
+    """
+
+    result: dict[str, Any]
+    states: dict[str, NDArray[Any]]
+    case_toml: str = ""
+
+    @property
+    def name(self) -> str:
+        """What the result is called: its own name, else its target's kind."""
+        return str(self.result.get("name") or self.result.get("target", {}).get("kind") or "gridshell")
+
+    @property
+    def final(self) -> str | None:
+        """The best state in space that there is: clamped, else pinned, else draped."""
+        return next((state for state in reversed(SHELLS) if state in self.states), None)
+
+
+def write(archive: Archive, folder: str | os.PathLike[str]) -> Path:
+    """Write the whole result folder, replacing an older result; returns its absolute path.
+
+    Raises
+    ------
+    OutputError : the folder cannot be written, or holds something that is not a gridshell result.
+    """
+    with replacing(folder) as temporary:
+        for name, content in _files(archive).items():
+            file = temporary / name
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(content, encoding="utf-8", newline="\n")
+        with open(temporary / "states.npz", "wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **archive.states)
+    return Path(folder).expanduser().resolve()
+
+
+def read(folder: str | os.PathLike[str]) -> Archive:
+    """The archive of a result folder.
+
+    Raises
+    ------
+    OutputError : there is no result, or it cannot be read.
+    """
+    path = Path(folder).expanduser()
+    result = read_json(path / "result.json")
+    try:
+        with np.load(path / "states.npz", allow_pickle=False) as stored:
+            states = {name: stored[name] for name in stored.files}
+        case = path / "case.toml"
+        case_toml = case.read_text(encoding="utf-8") if case.exists() else ""
+    except Exception as error:  # numpy and zipfile have many ways to say that a file is broken
+        raise OutputError(f"cannot read the result in {path}: {error}") from error
+    return Archive(result, states, case_toml)
+
+
+def json_text(result: Mapping[str, Any]) -> str:
+    """`result` as strict JSON, a key or a rod on each line; what is not a finite number becomes null."""
+    lines = []
+    for key, value in _plain(result).items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            text = "[\n  " + ",\n  ".join(map(_dumps, value)) + "\n ]"
+        else:
+            text = _dumps(value)
+        lines.append(f" {_dumps(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _dumps(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    """`value` in JSON's own types; NumPy's arrays and numbers are converted."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    return value
+
+
+def _files(archive: Archive) -> dict[str, str]:
+    """Content of every text file of the folder."""
+    from gridshell.output.dxf import plan_dxf
+    from gridshell.output.models import obj_text, vtp_text
+    from gridshell.output.plan import flat_plan
+    from gridshell.output.plansvg import plan_svg
+    from gridshell.output.report import report_html
+    from gridshell.output.schedule import joints_csv, rods_csv
+
+    plan = flat_plan(archive)
+    files = {"case.toml": archive.case_toml} if archive.case_toml else {}
+    files |= {
+        "result.json": json_text(archive.result),
+        "drawings/plan.svg": plan_svg(plan),
+        "drawings/plan.dxf": plan_dxf(plan),
+        "schedule/rods.csv": rods_csv(archive),
+        "schedule/joints.csv": joints_csv(archive),
+    }
+    for state in SHELLS:
+        if state in archive.states:
+            files[f"model/{state}.obj"] = obj_text(archive, state)
+            files[f"model/{state}.vtp"] = vtp_text(archive, state)
+    files["report.html"] = report_html(archive)
+    return files

@@ -1,0 +1,23 @@
+"""Colours of numbers: two maps of even lightness steps, given by a few control points."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# Signed: dark in the middle, so that rods without a gap are drawn in ink on light paper.
+SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f28c3a")
+HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
+
+
+def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
+    """Colours at `shares` (k,) of the way through a map, 0 to 1."""
+    table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
+    at = np.linspace(0.0, 1.0, len(points))
+    channels = [np.interp(shares, at, table[:, k]) for k in range(3)]
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(channels).astype(int).T.tolist()]
+
+
+def mixed(colour: str, other: str, share: float) -> str:
+    """`colour` with a `share` of the `other`, 0 to 1."""
+    return hex_colours((colour, other), np.array([share]))[0]

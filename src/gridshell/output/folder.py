@@ -1,0 +1,125 @@
+"""A result folder that is replaced as a whole: a kill leaves the old result or the new one."""
+
+import ctypes
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from gridshell.errors import OutputError
+
+FORMAT = "gridshell-result"
+VERSION = 1
+
+
+def check_folder(folder: str | os.PathLike[str]) -> Path:
+    """The absolute path of `folder` if a result can be written there; worth asking before a long computation.
+
+    Raises
+    ------
+    OutputError : it is a file, another folder's content, the working folder, or it cannot be made.
+    """
+    path = Path(folder).expanduser().resolve()
+    if path.exists():
+        _check_replaceable(path)
+    parent = _existing_parent(path)
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write {path}: no permission to write in {parent}; choose another folder")
+    return path
+
+
+@contextmanager
+def replacing(folder: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary folder beside `folder`, which takes its place when the block ends without an error."""
+    path = check_folder(folder)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{path.name[:100]}-", dir=path.parent))
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}; choose another folder") from error
+    try:
+        temporary.chmod(0o777 & ~_umask())  # mkdtemp's folder is private, a result is not
+        yield temporary
+        _take_place(temporary, path)
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(f"cannot write {path}: {error.strerror or error}; nothing was changed") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The table in `path`, checked to be a result that this version understands."""
+    try:
+        result = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise OutputError(f"{path.parent} holds no gridshell result: it has no {path.name}") from error
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot read {path}: {error}") from error
+    if not isinstance(result, dict) or result.get("format") != FORMAT:
+        raise OutputError(f'{path} is not a gridshell result: its "format" is not "{FORMAT}"')
+    version = result.get("version")
+    if not isinstance(version, int) or version > VERSION:
+        raise OutputError(f"{path} has version {version}, this gridshell reads {VERSION}: install a newer one")
+    return result
+
+
+def _check_replaceable(path: Path) -> None:
+    if not path.is_dir():
+        raise OutputError(f"cannot write {path}: it is a file; choose a folder")
+    if Path.cwd().is_relative_to(path):
+        raise OutputError(f"cannot replace {path} while working in it: choose a folder inside, or leave it first")
+    if any(path.iterdir()):
+        try:
+            read_json(path / "result.json")
+        except OutputError as error:
+            raise OutputError(
+                f"will not replace {path}: it is not empty and holds no gridshell result; choose another folder"
+            ) from error
+
+
+def _existing_parent(path: Path) -> Path:
+    parent = path.parent
+    while not parent.exists():
+        parent = parent.parent
+    if not parent.is_dir():
+        raise OutputError(f"cannot write {path}: {parent} is a file; choose another folder")
+    return parent
+
+
+def _take_place(temporary: Path, path: Path) -> None:
+    """Move `temporary` to `path`; what was there is left at `temporary`, or is gone."""
+    if not path.exists():
+        temporary.rename(path)
+    elif not _exchange(temporary, path):
+        backup = Path(tempfile.mkdtemp(prefix=f".{path.name[:100]}-old-", dir=path.parent))
+        path.rename(backup / path.name)
+        try:
+            temporary.rename(path)
+        except OSError:
+            (backup / path.name).rename(path)
+            raise
+        finally:
+            with suppress(OSError):
+                shutil.rmtree(backup)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Swap two folders in one step (Linux); False where the system cannot."""
+    try:
+        renameat2 = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError, TypeError):
+        return False
+    here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return bool(renameat2(here, os.fsencode(one), here, os.fsencode(other), exchange) == 0)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

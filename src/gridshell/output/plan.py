@@ -1,0 +1,98 @@
+"""The flat plan: what its drawings show, in millimetres."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.output.archive import Archive
+from gridshell.output.labels import Label, place
+from gridshell.output.rods import JointRecord, RodRecord, end_curve, joints_of, rods_of
+
+Floats = NDArray[np.float64]
+
+NOTE = "Design aid, not code compliance"
+
+
+@dataclass(frozen=True)
+class FlatPlan:
+    """The content of the flat plan.
+
+    Parameters
+    ----------
+    rods, joints : as in the result [m].
+    lines : (r, 2, 2) start and end of each rod [mm].
+    marks : (c, 2) the joints, in the order of `joints` [mm].
+    footprint : (f, 2) closed curve through the rod ends [mm].
+    boundary : (g, 3) closed curve through the final rod ends [mm]; empty if there is none.
+    """
+
+    name: str
+    rods: list[RodRecord]
+    joints: list[JointRecord]
+    lines: Floats
+    marks: Floats
+    footprint: Floats
+    boundary: Floats
+
+    @cached_property
+    def extent(self) -> float:
+        """The longer side of the plan [mm]."""
+        return float(np.ptp(self.lines.reshape(-1, 2), axis=0).max()) if len(self.lines) else 1.0
+
+    @cached_property
+    def spacing(self) -> float:
+        """The median distance of neighbouring joints on a rod [mm]."""
+        steps = [np.diff(np.sort([at for _, at in rod.joints])) for rod in self.rods]
+        steps = [step[step > 1e-6] for step in steps]
+        known = np.concatenate(steps) if steps else np.empty(0)
+        return float(1e3 * np.median(known)) if len(known) else self.extent / 10
+
+    @cached_property
+    def text_size(self) -> float:
+        """Of the rods' labels [mm]: labels of neighbouring rods stand clear of each other."""
+        return min(0.5 * self.spacing, 0.02 * self.extent)
+
+    @cached_property
+    def labels(self) -> list[Label]:
+        return place([rod.id for rod in self.rods], self.lines, self.text_size)
+
+    @cached_property
+    def summary(self) -> str:
+        """The cut list in one line."""
+        lengths = [1e3 * rod.length for rod in self.rods]
+        return (
+            f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths) / 1e3:.2f} m in total, "
+            f"longest {max(lengths, default=0):.1f} mm"
+        )
+
+
+def flat_plan(archive: Archive) -> FlatPlan:
+    """The flat plan of an archive."""
+    rods = rods_of(archive)
+    joints = joints_of(rods)
+    lines = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
+    marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
+    footprint = np.array(archive.result.get("footprint") or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
+    boundary = np.array(archive.result.get("boundary") or [], dtype=float).reshape(-1, 3)
+    return FlatPlan(
+        archive.name, rods, joints, 1e3 * lines, 1e3 * marks,
+        1e3 * (end_curve(footprint) if len(footprint) else footprint),
+        1e3 * (end_curve(boundary) if len(boundary) else boundary),
+    )  # fmt: skip
+
+
+def nice_step(span: float, count: int) -> float:
+    """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less."""
+    if span <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(span / count))
+    return float(next(k * power for k in (1.0, 2.0, 5.0, 10.0) if k * power >= span / count * (1 - 1e-9)))
+
+
+def nice_ticks(low: float, high: float, count: int) -> list[float]:
+    """Round numbers from `low` to `high`, `count` + 1 at most."""
+    step = nice_step(high - low, count)
+    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+    return [float(k) * step for k in np.arange(first, last + 1)]

@@ -1,0 +1,181 @@
+"""From the stages of a job to what is kept of it: result.json and states.npz."""
+
+from importlib.metadata import version
+from math import degrees
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.formfinding import Agreement, Footprint, FoundForm, Popped, PoppedTable
+from gridshell.formfinding.bound import shape_of_net
+from gridshell.layout import GridLayout
+from gridshell.rods.section import Rod, Tube
+from gridshell.solve.report import SolveReport
+
+States = dict[str, NDArray[Any]]
+
+
+def form_result(form: FoundForm) -> dict[str, Any]:
+    """result.json of a form, SI units; the keys are those of the documentation's page on files."""
+    draped = form.draped
+    drape = {
+        "method": draped.method,
+        "status": draped.report.status.value,
+        "dofs": draped.report.dofs,
+        "levels": [_level(level) for level in draped.levels],
+        "seconds": sum(level.seconds for level in draped.levels),
+        "force_residual": draped.report.force_residual,
+        "max_strain": draped.report.max_strain,
+        "max_gap": draped.max_gap,
+        "negative_modes": draped.report.negative_modes,
+        "min_angle_deg": degrees(draped.min_angle),
+        "min_angle_at": list(draped.min_angle_at),
+        "contact_pulls": draped.pulls,
+    }
+    if draped.own_ends is not None:
+        drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
+    return {
+        **_head(form.target.name, form.status, form.warnings),
+        "target": {**form.target.parameters(), "size": form.target.size},
+        "layout": _layout(form.layout),
+        "rod": _rod(form.rod),
+        **({"net": shape_of_net(draped.net)} if draped.net is not None else {}),
+        **_grid(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
+        "agreement": {ends: _agreement(gap) for ends, gap in form.agreement.items()},
+        "drape": drape,
+        "pop_up": {ends: _popped(shell) for ends, shell in form.popped.items()},
+    }
+
+
+def form_states(form: FoundForm) -> States:
+    """states.npz of a form."""
+    target = form.target
+    states = _mesh_states(form.footprint)
+    states["draped"] = form.trimmed.positions
+    states["gap_draped"] = target.gap(form.trimmed.positions).distance
+    for ends, shell in form.popped.items():
+        states[f"popped_{ends}"] = shell.positions
+        if ends in form.agreement:
+            states[f"gap_{ends}"] = form.agreement[ends].gaps
+    return states
+
+
+def _mesh_states(footprint: Footprint) -> States:
+    mesh = footprint.mesh
+    return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
+
+
+def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
+    """result.json of a popped-up table of rods."""
+    return {
+        **_head(name, table.status, table.warnings),
+        "rod": _rod(table.rod),
+        **_grid(table.footprint, table.boundary.points, table.dropped),
+        "pop_up": {ends: _popped(shell) for ends, shell in table.popped.items()},
+    }
+
+
+def table_states(table: PoppedTable) -> States:
+    """states.npz of a popped-up table of rods."""
+    return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
+
+
+def _head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "format": "gridshell-result",
+        "version": 1,
+        "units": "SI",
+        "version_gridshell": version("gridshell"),
+        "name": name,
+        "status": status,
+        "warnings": list(warnings),
+    }
+
+
+def _grid(footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tuple[str, str], ...]) -> dict[str, Any]:
+    rods = [
+        {
+            "id": rod.name,
+            "family": rod.family,
+            "offset": rod.offset,
+            "start": rod.start,
+            "end": rod.end,
+            "length": rod.length,
+            "joints": [],
+        }
+        for rod in footprint.rods
+    ]
+    crossings = footprint.mesh.grid.crossings
+    for (a, b), (at_a, at_b) in zip(crossings.rods.tolist(), crossings.at.tolist(), strict=True):
+        rods[a]["joints"].append({"with": footprint.rods[b].name, "at": at_a - footprint.rods[a].start})
+        rods[b]["joints"].append({"with": footprint.rods[a].name, "at": at_b - footprint.rods[b].start})
+    for rod in rods:
+        rod["joints"].sort(key=lambda joint: joint["at"])
+    return {
+        "rods": rods,
+        "dropped": [{"id": name, "reason": reason} for name, reason in dropped],
+        "footprint": footprint.points.tolist(),
+        "boundary": boundary.tolist(),
+    }
+
+
+def _layout(layout: GridLayout) -> dict[str, Any]:
+    return {
+        "rods": layout.rods if layout.rods == "auto" else list(layout.rods),
+        "spacing": list(layout.spacing),
+        "length": layout.length,
+        "edge": layout.edge,
+        "rotate": layout.rotate,
+        "offset": list(layout.offset),
+    }
+
+
+def _rod(rod: Rod) -> dict[str, Any]:
+    section: dict[str, Any] = {"kind": "circle", "radius": rod.section.radius}
+    if isinstance(rod.section, Tube):
+        section = {"kind": "tube", "radius": rod.section.radius, "thickness": rod.section.thickness}
+    return {
+        "section": section,
+        "material": {
+            "youngs_modulus": rod.material.youngs_modulus,
+            "poisson_ratio": rod.material.poisson_ratio,
+            "density": rod.material.density,
+        },
+        "EA": rod.stretch_stiffness,
+        "EI": rod.bend_stiffness,
+        "GJ": rod.twist_stiffness,
+        "mass_per_length": rod.mass_per_length,
+    }
+
+
+def _level(report: SolveReport) -> dict[str, Any]:
+    return {
+        "dofs": report.dofs,
+        "status": report.status.value,
+        "iterations": report.iterations,
+        "factorizations": report.factorizations,
+        "seconds": report.seconds,
+    }
+
+
+def _popped(shell: Popped) -> dict[str, Any]:
+    report = shell.report
+    return {
+        **_level(report),
+        "start": shell.start,
+        "force_residual": report.force_residual,
+        "max_strain": report.max_strain,
+        "negative_modes": report.negative_modes,
+        "stable": report.stable,
+    }
+
+
+def _agreement(gap: Agreement) -> dict[str, Any]:
+    return {
+        "max": gap.max,
+        "rms": gap.rms,
+        "max_relative": gap.max_relative,
+        "rms_relative": gap.rms_relative,
+        "where": list(gap.where),
+    }

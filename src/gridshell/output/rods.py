@@ -1,0 +1,98 @@
+"""The rods and joints of a result, with their flat geometry."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.output.archive import Archive
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RodRecord:
+    """One rod of a result.
+
+    Parameters
+    ----------
+    flat : (2, 2) x, y of its two ends in the flat state [m].
+    nodes : (k,) its nodes in the states, from start to end; empty if the states do not hold them.
+    joints : (id of the rod that is met, distance from the start [m]) of each joint.
+    """
+
+    id: str
+    family: str
+    offset: float | None
+    start: float
+    end: float
+    length: float
+    flat: Floats
+    nodes: NDArray[np.intp]
+    joints: tuple[tuple[str, float], ...]
+
+    def point(self, at: float) -> Floats:
+        """x, y [m] of the flat point at the distance `at` from the start."""
+        along = self.flat[1] - self.flat[0]
+        return np.asarray(self.flat[0] + at / np.linalg.norm(along) * along)
+
+
+@dataclass(frozen=True)
+class JointRecord:
+    """Where two rods meet: rod indices, and the distance from each rod's start [m]."""
+
+    rods: tuple[int, int]
+    at: tuple[float, float]
+    id: str
+
+
+def rods_of(archive: Archive) -> list[RodRecord]:
+    """All rods, in the order of the result."""
+    nodes = _nodes(archive)
+    flat = archive.states.get("flat")
+    return [
+        _record(entry, nodes[k] if k < len(nodes) else np.empty(0, dtype=np.intp), flat)
+        for k, entry in enumerate(archive.result.get("rods", []))
+    ]
+
+
+def joints_of(rods: list[RodRecord]) -> list[JointRecord]:
+    """Every joint once, in the order of the rods; the rod that comes first is named first."""
+    index = {rod.id: k for k, rod in enumerate(rods)}
+    back = {(rod.id, other): at for rod in rods for other, at in rod.joints}
+    return [
+        JointRecord((k, index[other]), (at, back[other, rod.id]), f"{rod.id}/{other}")
+        for k, rod in enumerate(rods)
+        for other, at in rod.joints
+        if index.get(other, -1) > k and (other, rod.id) in back
+    ]
+
+
+def end_curve(points: Floats) -> Floats:
+    """The points (n, 2 or 3) in the order of their angle about the middle, seen from above."""
+    x, y = (points[:, :2] - points[:, :2].mean(axis=0)).T
+    return np.asarray(points[np.argsort(np.arctan2(y, x), kind="stable")])
+
+
+def _nodes(archive: Archive) -> list[NDArray[np.intp]]:
+    if "rod_nodes" not in archive.states or "rod_start" not in archive.states:
+        return []
+    return np.split(archive.states["rod_nodes"].astype(np.intp), archive.states["rod_start"][1:])
+
+
+def _record(entry: dict[str, Any], nodes: NDArray[np.intp], flat: Floats | None) -> RodRecord:
+    family, start, end = entry["family"], float(entry["start"]), float(entry["end"])
+    offset = None if entry.get("offset") is None else float(entry["offset"])
+    if family == "u" and offset is not None:
+        ends = np.array([[start, offset], [end, offset]])
+    elif family == "v" and offset is not None:
+        ends = np.array([[offset, start], [offset, end]])
+    elif flat is not None and len(nodes):
+        ends = np.asarray(flat[nodes[[0, -1]], :2], dtype=np.float64)
+    else:
+        ends = np.array([[start, 0.0], [end, 0.0]])
+    joints = tuple((str(joint["with"]), float(joint["at"])) for joint in entry.get("joints", []))
+    return RodRecord(
+        str(entry["id"]), family, offset, start, end, float(entry.get("length", end - start)), ends, nodes, joints
+    )

@@ -1,0 +1,95 @@
+"""Schedules of rods and joints as CSV: what to cut, where to drill, where each end goes. Millimetres."""
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.output.archive import Archive
+from gridshell.output.rods import RodRecord, joints_of, rods_of
+
+Floats = NDArray[np.float64]
+
+_ROD_COLUMNS = (
+    "id", "family", "offset_mm", "start_mm", "end_mm", "length_mm", "joints",
+    "flat_x0_mm", "flat_y0_mm", "flat_x1_mm", "flat_y1_mm", "final_state",
+    "final_x0_mm", "final_y0_mm", "final_z0_mm", "final_x1_mm", "final_y1_mm", "final_z1_mm", "joints_at_mm",
+)  # fmt: skip
+_JOINT_COLUMNS = (
+    "id", "rod_a", "rod_b", "at_a_mm", "at_b_mm", "flat_x_mm", "flat_y_mm", "final_state",
+    "final_x_mm", "final_y_mm", "final_z_mm", "flat_deg", "final_deg",
+)  # fmt: skip
+
+
+def rods_csv(archive: Archive) -> str:
+    """One line a rod; `joints_at_mm` lists every joint at its distance from the rod's start (ends: 0, 1)."""
+    final = archive.final
+    rows = []
+    for rod in rods_of(archive):
+        ends = _ends(rod, archive.states[final]) if final else None
+        rows.append([
+            rod.id, rod.family, _mm(rod.offset), _mm(rod.start), _mm(rod.end), _mm(rod.length), str(len(rod.joints)),
+            *map(_mm, rod.flat.ravel()), final if ends is not None else "",
+            *([""] * 6 if ends is None else map(_mm, ends.ravel())),
+            "; ".join(f"{other} {_mm(at)}" for other, at in sorted(rod.joints, key=lambda joint: joint[1])),
+        ])  # fmt: skip
+    return _csv(_ROD_COLUMNS, rows)
+
+
+def joints_csv(archive: Archive) -> str:
+    """One line a joint: where it is on both rods, in the plan and in space, and the angle between the rods.
+
+    The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines.
+    """
+    rods, final = rods_of(archive), archive.final
+    rows = []
+    for joint in joints_of(rods):
+        pair = rods[joint.rods[0]], rods[joint.rods[1]]
+        point, flat_deg = pair[0].point(joint.at[0]), _degrees(*(rod.flat[1] - rod.flat[0] for rod in pair))
+        where = [_on(archive, rod, at, final) for rod, at in zip(pair, joint.at, strict=True)] if final else []
+        if any(each is None for each in where):
+            where = []
+        space = [(x, t) for x, t in filter(None, where)]
+        rows.append([
+            joint.id, pair[0].id, pair[1].id, *map(_mm, joint.at), *map(_mm, point), final if space else "",
+            *(map(_mm, space[0][0]) if space else [""] * 3), f"{flat_deg:.4f}",
+            f"{_degrees(space[0][1], space[1][1]):.4f}" if space else "",
+        ])  # fmt: skip
+    return _csv(_JOINT_COLUMNS, rows)
+
+
+def _on(archive: Archive, rod: RodRecord, at: float, state: str) -> tuple[Floats, Floats] | None:
+    """Position [m] and unit tangent of a rod at the distance `at` [m] of the flat rod from its start."""
+    if len(rod.nodes) < 2 or "flat" not in archive.states:
+        return None
+    flat, x = archive.states["flat"][rod.nodes], archive.states[state][rod.nodes]
+    stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(flat, axis=0), axis=1))])
+    position = np.array([np.interp(at, stations, x[:, axis]) for axis in range(3)])
+    step = 0.5 * np.diff(stations).min()  # within the edges on both sides
+    around = [np.array([np.interp(at + side, stations, x[:, axis]) for axis in range(3)]) for side in (-step, step)]
+    tangent = around[1] - around[0]
+    return position, tangent / np.linalg.norm(tangent)
+
+
+def _ends(rod: RodRecord, positions: Floats) -> Floats | None:
+    return positions[rod.nodes[[0, -1]]] if len(rod.nodes) else None
+
+
+def _degrees(a: Floats, b: Floats) -> float:
+    """Angle between two vectors, exact also near 0 and 180 [degrees]."""
+    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    return float(np.degrees(2.0 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b))))
+
+
+def _mm(value: float | None) -> str:
+    return "" if value is None or not np.isfinite(value) else f"{1e3 * value + 0.0:.3f}".replace("-0.000", "0.000")
+
+
+def _csv(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    return stream.getvalue()

@@ -1,0 +1,43 @@
+"""One screen of text about a result."""
+
+from typing import Any
+
+
+def summary_text(result: dict[str, Any]) -> str:
+    """What was found, how good it is, and what to read first."""
+    rods = result["rods"]
+    joints = sum(len(rod["joints"]) for rod in rods) // 2
+    verdict = "converged" if result["status"] == "converged" else f"NOT CONVERGED: {result['status']}"
+    lines = [f"{result['name']}: {verdict}", f"  grid      {len(rods)} rods, {joints} joints"]
+    if net := result.get("net"):
+        lines.append(
+            f"  footprint known within {_mm(net['error_estimate'])} before extrapolation; "
+            f"smallest angle {net['min_angle_deg']:.1f} deg"
+        )
+    if drape := result.get("drape"):
+        work = sum(level["factorizations"] for level in drape["levels"])
+        line = f"  drape     {drape['method']}: {drape['dofs']} unknowns, {work} factorisations, {drape['seconds']:.2f} s, "
+        line += f"gap {_mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
+        lines.append(line + f"negative modes {drape['negative_modes']}")
+        if own := drape.get("own_ends"):
+            lines.append(f"            its own rod ends within {_mm(own['max'])}, median {_mm(own['median'])}")
+    for ends, shell in result.get("pop_up", {}).items():
+        state = "stable" if shell["stable"] else shell["status"] + ", NOT STABLE"
+        line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
+        if gap := result.get("agreement", {}).get(ends):
+            line += f"; gap max {_mm(gap['max'])} ({_percent(gap['max_relative'])}), "
+            line += f"rms {_mm(gap['rms'])} ({_percent(gap['rms_relative'])})"
+        lines.append(line)
+    lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
+    if len(result["dropped"]) > 6:
+        lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
+    lines += [f"  WARNING   {warning}" for warning in result["warnings"]]
+    return "\n".join(lines)
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.3g} mm" if abs(metres) >= 1e-9 else "0 mm"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"

@@ -1,0 +1,165 @@
+"""Quantities as people write them, "30 mm", "45 deg", "25 GPa", become SI numbers: at the edge only."""
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from difflib import get_close_matches
+from math import inf, isfinite
+from numbers import Real
+from typing import Literal
+
+from gridshell.errors import InputError
+
+Kind = Literal["length", "angle", "stress", "density", "acceleration", "number"]
+
+
+@dataclass(frozen=True)
+class _Units:
+    """One kind of quantity: its name in a sentence, an example, and the SI value of each unit, SI first."""
+
+    name: str
+    example: str
+    factors: dict[str, Decimal]
+
+    @property
+    def wanted(self) -> str:
+        si = next(iter(self.factors), "")
+        return f"{self.name} such as {self.example}" + (f", or a plain number in {si}" if si else "")
+
+
+def _factors(*groups: str) -> dict[str, Decimal]:
+    """{"mm": 0.001} from "factor spelling spelling"; exact decimals, so that "17 mm" is 0.017 to the bit."""
+    rows = (group.split() for group in groups)
+    return {spelling: Decimal(factor) for factor, *spellings in rows for spelling in spellings}
+
+
+_DEGREE = Decimal("3.14159265358979323846264338327950288") / 180
+
+_KINDS: dict[Kind, _Units] = {
+    "length": _Units(
+        "a length",
+        '"200 mm"',
+        _factors(
+            "1 m metre metres meter meters",
+            "0.001 mm",
+            "0.01 cm",
+            "0.1 dm",
+            "1000 km",
+            "0.000001 um µm μm",
+            '0.0254 in inch inches "',
+            "0.3048 ft foot feet '",
+        ),
+    ),
+    "angle": _Units("an angle", '"45 deg"', _factors("1 rad", f"{_DEGREE} deg ° degree degrees")),
+    "stress": _Units(
+        "a stress",
+        '"25 GPa"',
+        _factors(
+            "1 Pa N/m2",
+            "1e3 kPa kN/m2",
+            "1e6 MPa N/mm2 MN/m2",
+            "1e9 GPa kN/mm2 GN/m2",
+            "6894.757293168361 psi",
+            "6894757.293168361 ksi",
+        ),
+    ),
+    "density": _Units(
+        "a density",
+        '"1000 kg/m3"',
+        _factors("1 kg/m3", "1000 g/cm3 kg/dm3 t/m3", "16.01846337396014 lb/ft3"),
+    ),
+    "acceleration": _Units(
+        "an acceleration", '"9.81 m/s2"', _factors("1 m/s2", "0.01 cm/s2", "0.001 mm/s2", "0.3048 ft/s2")
+    ),
+    "number": _Units("a plain number", "0.5", {}),
+}
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+
+
+def parse_quantity(value: object, kind: Kind, key: str) -> float:
+    """A quantity in SI: a number as it is, a string by its unit (without one: SI).
+
+    Parameters
+    ----------
+    value : number, or text such as "30 mm", "1 g/cm3", "1.5e-3".
+    kind : of quantity that is wanted: m, rad, Pa, kg/m3, m/s2 or a plain number.
+    key : how the user knows the value, for the error message.
+
+    Raises
+    ------
+    InputError : not a number, not finite, an unknown unit or one of another kind; it says what would do.
+    """
+    try:
+        return read_quantity(value, kind)
+    except ValueError as reason:
+        raise InputError(f"{key} = {shown(value)}: {reason}") from None
+
+
+def read_quantity(value: object, kind: Kind) -> float:
+    """As `parse_quantity`, but raises ValueError with the reason alone: the caller names the key."""
+    units = _KINDS[kind]
+    if isinstance(value, str):
+        match = _QUANTITY.fullmatch(value)
+        if match is None:
+            raise ValueError(f"not a finite number; give {units.wanted}")
+        number = _scaled(match[1], read_unit(match[2], kind) if match[2] else Decimal(1))
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        number = _plain(value)
+    else:
+        raise ValueError(f"not a number; give {units.wanted}")
+    if not isfinite(number):
+        raise ValueError(f"not finite; give {units.wanted}")
+    return number
+
+
+def read_unit(text: str, kind: Kind) -> Decimal:
+    """SI value of one unit of this kind; ValueError with the reason where there is no such unit."""
+    unit = re.sub(r"\s|\^|\*\*", "", text).replace("²", "2").replace("³", "3")
+    units = _KINDS[kind]
+    if unit in units.factors:
+        return units.factors[unit]
+    for other in _KINDS.values():
+        if unit in other.factors:
+            raise ValueError(f"{text} is a unit of {other.name.split(' ', 1)[1]}; give {units.wanted}")
+    if not units.factors:
+        raise ValueError(f'takes no unit, and "{text}" follows the number; give {units.wanted}')
+    near = {name.lower(): name for name in reversed(units.factors)}
+    close = get_close_matches(unit.lower(), near, n=1, cutoff=0.5)
+    hint = f" (did you mean {near[close[0]]}?)" if close else ""
+    raise ValueError(f'unknown unit "{text}"{hint}; give {units.wanted}')
+
+
+def wanted(kind: Kind) -> str:
+    """What would do for this kind: 'a length such as "200 mm", or a plain number in m'."""
+    return _KINDS[kind].wanted
+
+
+def shown(value: object) -> str:
+    """A value as it would stand in a case file, cut short, on one line."""
+    if isinstance(value, str):
+        text = '"' + value.replace("\n", " ") + '"'
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, list | tuple):
+        text = "[" + ", ".join(shown(item) for item in value) + "]"
+    elif isinstance(value, dict):
+        text = "{ " + ", ".join(f"{key} = {shown(item)}" for key, item in value.items()) + " }"
+    else:
+        text = str(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _plain(value: Real) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer past the largest float
+        return inf
+
+
+def _scaled(number: str, factor: Decimal) -> float:
+    """number * factor, rounded once; infinite where no float can hold it."""
+    try:
+        return float(Decimal(number) * factor)
+    except ArithmeticError:
+        return inf

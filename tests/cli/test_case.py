@@ -1,0 +1,298 @@
+"""The case file: what is left out, what is written back, and what is refused."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gridshell.case import BUILT_IN, Case, case_keys, load_case
+from gridshell.errors import InputError
+
+DESIGN = """
+[target]
+kind = "hemisphere"
+radius = "200 mm"
+[layout]
+rods = [17, 17]
+spacing = "30 mm"
+length = "1.2 m"
+edge = "5 mm"
+rotate = "0 deg"
+offset = [0.0, 0.0]
+[rod]
+section = { kind = "circle", radius = "1 mm" }
+material = { youngs_modulus = "1 MPa", poisson_ratio = 0.5, density = "1000 kg/m3" }
+[joint]
+kind = "ball"
+[drape]
+method = "bound"
+gravity = 9.81
+height = "50 mm"
+"""
+"""The example of design.md, but for its anchor, which is the default."""
+
+FORMULA = {"target.kind": "heightfield", "target.formula": "0.1 - x**2"}
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Any:
+    def from_text(text: str, overrides: dict[str, object] | None = None) -> Case:
+        path = tmp_path / "dome.toml"
+        path.write_text(text, encoding="utf-8")
+        return load_case(path, overrides)
+
+    return from_text
+
+
+def test_the_built_in_hemisphere_is_the_example_of_the_design(load: Any) -> None:
+    assert load(DESIGN) == load_case("hemisphere")
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "rods"),
+    [
+        ("hemisphere", {"kind": "hemisphere", "radius": 0.2}, (17, 17)),
+        ("paraboloid", {"kind": "paraboloid", "radius": 0.2, "height": 0.12}, (15, 15)),
+        ("ellipsoid", {"kind": "ellipsoid", "a": 0.2, "b": 0.15, "c": 0.12}, (11, 15)),
+        ("cap", {"kind": "cap", "radius": 0.25, "base": 0.1}, (17, 17)),
+    ],
+)
+def test_built_in_cases_have_the_papers_values(
+    name: str, target: dict[str, object], rods: tuple[int, int]
+) -> None:
+    case = load_case(name)
+    assert case.target.model_dump() == target
+    assert case.layout.model_dump() == {
+        "rods": rods,
+        "spacing": (0.03, 0.03),
+        "length": 1.2,
+        "edge": 0.005,
+        "rotate": 0.0,
+        "offset": (0.0, 0.0),
+    }
+    assert case.rod.model_dump() == {
+        "section": {"kind": "circle", "radius": 0.001},
+        "material": {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0},
+    }
+
+
+def test_what_a_file_leaves_out_is_the_default_but_counts_and_lengths_are_auto(load: Any) -> None:
+    case = load("")
+    assert (case.layout.rods, case.layout.length) == ("auto", "auto")
+    built_in = load_case("hemisphere", {"layout.rods": "auto", "layout.length": "auto"})
+    assert case == built_in
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        *((name, {}) for name in BUILT_IN if name != "heightfield"),
+        ("heightfield", {"target.formula": 'x*y + "é𝑥\\ \x7f\n"', "layout.rotate": "45 deg"}),
+        ("heightfield", {**FORMULA, "target.domain": "rectangle", "target.size": "0.1,7 in"}),
+        ("hemisphere", {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm"}),
+        ("cap", {"target.base": "-180 mm", "drape.anchor": "0.1,1e-7", "layout.spacing": "17 mm, 31 mm"}),
+        ("hemisphere", {"drape.method": "gravity", "pop_up.ends": "clamped", "layout.rods": "auto"}),
+    ],
+)
+def test_case_to_toml_to_case_is_identical(load: Any, name: str, overrides: dict[str, object]) -> None:
+    case = load_case(name, overrides)
+    text = case.to_toml()
+    again = load(text)
+    assert again == case
+    assert again.to_toml() == text
+
+
+def test_toml_is_in_si_numbers() -> None:
+    text = load_case("hemisphere", {"target.radius": "10 in", "layout.rotate": "180 deg"}).to_toml()
+    data = tomllib.loads(text)
+    assert data["target"] == {"kind": "hemisphere", "radius": 0.254}
+    assert data["layout"]["rotate"] == pytest.approx(3.141592653589793, rel=1e-15)
+    assert data["rod"]["material"]["youngs_modulus"] == 1e6
+
+
+def test_an_override_is_what_the_file_would_say(load: Any) -> None:
+    overrides = {"target.radius": "250mm", "layout.rods": "13x11", "layout.spacing": "40 mm,50 mm"}
+    overrides |= {"drape.anchor": "0.1,0", "rod.material.youngs_modulus": "25 GPa"}
+    text = """
+    target.radius = "250 mm"
+    layout = { rods = [13, 11], spacing = [0.04, "50 mm"], length = "1.2 m" }
+    drape.anchor = ["100 mm", 0]
+    rod.material.youngs_modulus = 25e9
+    """
+    assert load_case("hemisphere", overrides) == load(text)
+
+
+def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
+    dome = '[target]\nkind = "cap"\nradius = 0.3\nbase = 0.05\n'
+    assert load(dome, {"target.kind": "hemisphere"}).target.model_dump() == {
+        "kind": "hemisphere",
+        "radius": 0.3,
+    }
+    tube = load("", {"rod.section.kind": "tube", "rod.section.thickness": "0.2 mm"}).rod.section
+    assert tube.model_dump() == {"kind": "tube", "radius": 0.001, "thickness": 0.0002}
+    disc = '[target]\nkind = "heightfield"\nformula = "x"\nradius = 1\n'
+    plan = load(disc, {"target.domain": "rectangle", "target.size": "1,2"}).target
+    assert (plan.radius, plan.size) == (None, (1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('target.radius = "-3 mm"', 'target.radius = "-3 mm": must be larger than zero; give a length'),
+        ("target.radius = 0", "target.radius = 0: must be larger than zero"),
+        ("layout.edge = 0.0", "layout.edge = 0.0: must be larger than zero"),
+        ('layout.length = "-1 m"', 'or "auto"'),
+        ('layout.spacing = ["30 mm", 0]', 'layout.spacing = ["30 mm", 0]: second value: must be larger'),
+        ("layout.spacing = [1, 2, 3]", "needs one or two values"),
+        ('target.radius = "3 parsec"', 'unknown unit "parsec"'),
+        ('rod.material.density = "3 mm"', "mm is a unit of length; give a density"),
+        ("target.radius = true", "target.radius = true: not a number"),
+        ("target.radius = nan", "target.radius = nan: not finite"),
+        ("target.radius = [1]", "target.radius = [1]: not a number"),
+        ("target.radus = 1", "unknown key target.radus: did you mean target.radius?"),
+        ("radius = 1", "unknown key radius: did you mean target.radius?"),
+        ("layot.rods = [3, 3]", "unknown key layot: did you mean layout?"),
+        ("rod.material.E = 1", "unknown key rod.material.E: [rod.material] has youngs_modulus,"),
+        ("xyzzy = 1", "the tables are target, layout, rod, joint, drape, pop_up"),
+        ("target.base = 1", 'kind "hemisphere" has no base: leave it out, or set target.kind to "cap"'),
+        ("rod.section.thickness = 1", 'kind "circle" has no thickness'),
+        ('target = { kind = "cap", cap = 1 }', "unknown key target.cap"),
+        ("target = 3", "target = 3: must be a table; [target] has kind, radius"),
+        ("rod.section = 3", "rod.section = 3: must be a table"),
+        ("[[layout]]\nedge = 1", "layout = [{ edge = 1 }]: must be a table"),
+        ('target.kind = "mesh"', 'target.kind = "mesh": not yet: use "hemisphere", "cap"'),
+        ('target.kind = "nurbs"', "not yet"),
+        ('target.kind = "hemispher"', "did you mean hemisphere?"),
+        ("target.kind = 3", "target.kind = 3: use"),
+        ("target.kind = []", "target.kind = []: use"),
+        ('target.file = "dome.obj"', "not yet: targets from files"),
+        ('joint.kind = "pin"', 'joint.kind = "pin": not yet: use "ball"'),
+        ('drape.method = "paper"', 'not yet: use "bound" or "gravity"'),
+        ('drape.method = "magic"', 'drape.method = "magic": use "bound" or "gravity"'),
+        ("drape.anchor = 1", "drape.anchor = 1: needs two values"),
+        ("drape.gravity = -9.81", "drape.gravity = -9.81: must be larger than zero"),
+        ('pop_up.ends = "clampd"', "did you mean clamped?"),
+        ('rod.section.kind = "tube"', "rod.section.thickness is missing: give the thickness"),
+        ("rod.material.poisson_ratio = 0.6", "must lie above -1 and not above 0.5"),
+        ("layout.rods = 17", "layout.rods = 17: give two counts of at least 2"),
+        ("layout.rods = [1, 17]", "two counts of at least 2"),
+        ("layout.rods = [5.0, 17]", "two counts of at least 2"),
+        ("layout.rods = [true, 17]", "two counts of at least 2"),
+        ('layout.rods = "17y17"', "two counts of at least 2"),
+        ('target.kind = "heightfield"', "target.formula is missing: give the height z = f(x, y)"),
+        ('target = { kind = "heightfield", formla = "x" }', "did you mean target.formula?"),
+        ('target = { kind = "heightfield", formula = 3 }', "target.formula = 3: must be text"),
+        ('target = { kind = "heightfield", formula = "x", size = [1, 1] }', "target.size is for domain"),
+        ('target = { kind = "heightfield", formula = "x", domain = "rectangle" }', "target.size is missing"),
+        (
+            'target = { kind = "heightfield", formula = "x", domain = "rectangle", radius = 1 }',
+            "target.radius is for domain",
+        ),
+        ('target = { kind = "heightfield", formula = "x", domain = "square" }', '"disc" or "rectangle"'),
+        ("target = ", "dome.toml is not valid TOML"),
+    ],
+)
+def test_a_bad_case_is_refused_in_one_clear_sentence(load: Any, text: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load(text)
+    said = str(caught.value)
+    assert message in said
+    assert "\n" not in said
+    assert len(said) < 220
+    assert "pydantic" not in said
+
+
+def test_an_unknown_override_names_the_nearest_key() -> None:
+    with pytest.raises(InputError, match=r"unknown key layout.spaceing: did you mean layout.spacing\?"):
+        load_case("hemisphere", {"layout.spaceing": "30 mm"})
+    with pytest.raises(InputError, match='kind "hemisphere" has no formula'):
+        load_case("hemisphere", {"target.formula": "x"})
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("hemispher", "did you mean hemisphere?"),
+        ("nothing.toml", 'no file named "nothing.toml"'),
+        (".", "is a folder"),
+        ("dome.obj", "not yet: targets from files"),
+    ],
+)
+def test_a_case_that_is_not_there_is_named(name: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_case(name)
+    assert message in str(caught.value)
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "dome.toml"
+    path.write_bytes(b"\xff\xfe[target]")
+    with pytest.raises(InputError, match="save it as UTF-8"):
+        load_case(path)
+
+
+def test_a_byte_order_mark_is_no_obstacle(tmp_path: Path) -> None:
+    path = tmp_path / "dome.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + DESIGN.encode())
+    assert load_case(path) == load_case("hemisphere")
+
+
+@pytest.mark.parametrize("name", ["hemisphere", "paraboloid", "ellipsoid", "cap"])
+def test_a_built_target_has_the_numbers_of_its_case(name: str) -> None:
+    case = load_case(name)
+    assert case.build().target.parameters() == case.target.model_dump()
+
+
+def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
+    from gridshell.layout import GridLayout
+    from gridshell.rods.section import Circle, Material, Rod, Tube
+
+    overrides = {"drape.anchor": "0.1,0", "drape.method": "gravity", "layout.rotate": 0.5}
+    _, layout, rod, options = load_case("ellipsoid", overrides).build()
+    assert layout == GridLayout.orthogonal(
+        rods=(11, 15), spacing=0.03, length=1.2, edge=0.005, rotate=0.5, offset=(0.0, 0.0)
+    )
+    assert rod == Rod(Circle(0.001), Material(1e6, 1000.0, 0.5))
+    assert options == {
+        "method": "gravity",
+        "anchor": (0.1, 0.0),
+        "gravity": 9.81,
+        "ends": ("pinned", "clamped"),
+    }
+    tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
+    built = load_case("hemisphere", tube).build()
+    assert built.rod.section == Tube(0.001, 0.0001)
+    assert built.drape_options["ends"] == ("pinned",)
+    assert built.drape_options["anchor"] is None
+
+
+def test_a_height_field_gets_its_formula_and_its_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    from gridshell import targets
+
+    monkeypatch.setattr(targets, "HeightField", lambda **given: given, raising=False)
+    disc = load_case("heightfield", {"target.formula": "x*y"}).build().target
+    assert disc == {"formula": "x*y", "domain": targets.Disc(0.2)}
+    overrides = {"target.formula": "x*y", "target.domain": "rectangle", "target.size": "0.4, 300 mm"}
+    plan = load_case("heightfield", overrides).build().target
+    assert plan == {"formula": "x*y", "domain": targets.Rectangle((0.4, 0.3))}
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {"layout.edge": "31 mm"},
+        {"rod.section.kind": "tube", "rod.section.thickness": "2 mm"},
+        {"target.kind": "cap", "target.base": "0.3 m"},
+    ],
+)
+def test_values_that_do_not_fit_together_are_refused_when_built(overrides: dict[str, object]) -> None:
+    case = load_case("hemisphere", overrides)
+    with pytest.raises(InputError):
+        case.build()
+
+
+def test_each_key_has_one_line_of_help() -> None:
+    for key in case_keys().values():
+        assert key.help
+        assert len(key.help) < 70, key

@@ -1,0 +1,445 @@
+"""The command line, in front of a form finder that only remembers what it was asked."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gridshell.case import case_keys, load_case
+from gridshell.cli import main
+from gridshell.cli.form import ALIASES
+from gridshell.cli.rodends import COLUMNS
+from gridshell.errors import NetLimitError
+
+CROSS = [
+    [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
+    [0.0, -0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0],
+]
+"""Two rods that cross, in metres."""
+
+
+class FakeForm:
+    def __init__(self, status: str) -> None:
+        self.status = status
+
+    def save(self, folder: Path, case_toml: str = "") -> None:
+        folder.mkdir(parents=True)
+        (folder / "case.toml").write_text(case_toml)
+
+    def summary(self) -> str:
+        return "agreement 0.01 mm"
+
+    def result(self) -> dict[str, Any]:
+        return {"format": "gridshell-result", "status": self.status}
+
+
+class FakeFinder(ModuleType):
+    """Stands in for gridshell.form: remembers its calls, and ends as it is told."""
+
+    def __init__(self) -> None:
+        super().__init__("gridshell.form")
+        self.calls = list[tuple[tuple[Any, ...], dict[str, Any]]]()
+        self.status = "converged"
+        self.fault: BaseException | None = None
+
+    def find_form(self, *args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
+        self.calls.append((args, options))
+        for stage, iteration in (("net", 1), ("drape", 1), ("drape", 2), ("pop up", 1)):
+            progress(stage, f"iteration {iteration}", 1e-3)
+        if self.fault:
+            raise self.fault
+        return FakeForm(self.status)
+
+    pop_up_table = find_form
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+
+
+@pytest.fixture
+def finder(monkeypatch: pytest.MonkeyPatch) -> FakeFinder:
+    fake = FakeFinder()
+    monkeypatch.setitem(sys.modules, "gridshell.form", fake)
+    monkeypatch.setattr("gridshell.cli.progress.compiled_before", lambda: True)
+    return fake
+
+
+def write_table(path: Path, rows: list[list[Any]], columns: tuple[str, ...] = COLUMNS) -> str:
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([columns, *rows])
+    return str(path)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) -> str:
+    """The one line that the command ends with."""
+    assert main(arguments) == code
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("gridshell: error: ")
+    assert said.err.count("\n") == 1
+    return said.err
+
+
+def test_form_asks_for_the_case_and_saves_its_full_input(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--radius", "250mm", "--rods", "13x11", "--rod.material.youngs_modulus", "25 GPa"]
+    options += ["--anchor", "-0.1,0", "--target.radius", "0.26"]
+    assert main(["form", "hemisphere", "--out", "dome", *options]) == 0
+    overrides = {"target.radius": 0.26, "layout.rods": [13, 11], "drape.anchor": [-0.1, 0]}
+    case = load_case("hemisphere", {**overrides, "rod.material.youngs_modulus": 25e9})
+    target, layout, rod, drape = case.build()
+    assert finder.calls == [((target, layout, rod), drape)]
+    assert load_case("dome/case.toml") == case
+    assert "agreement 0.01 mm" in capsys.readouterr().out
+
+
+def test_a_case_file_is_run_into_out_and_its_name(finder: FakeFinder) -> None:
+    Path("shell.toml").write_text("target.radius = '1 m'")
+    assert main(["form", "shell.toml"]) == 0
+    assert load_case("out/shell/case.toml") == load_case("shell.toml")
+
+
+def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["form", "--help"]) == 0
+    shown = capsys.readouterr().out
+    for key in case_keys():
+        assert f"--{key}" in shown
+        assert key.partition(".")[0] + "]" in shown
+    assert "(hemisphere, cap, paraboloid, heightfield)" in " ".join(shown.split())
+    for key, alias in ALIASES.items():
+        assert key in case_keys()
+        assert f"--{key}, {alias} " in shown
+
+
+@pytest.mark.parametrize("key", list(case_keys()))
+def test_each_option_reaches_its_key(
+    key: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert f"{key} = " in refused(capsys, "form", "hemisphere", f"--{key}", "no such value")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--radius", "-3 mm"], 'target.radius = "-3 mm": must be larger than zero'),
+        (["--radius", ""], 'target.radius = "": not a finite number'),
+        (["--spacing", "0"], 'layout.spacing = "0": must be larger than zero'),
+        (["--radius", "3 parsec"], 'unknown unit "parsec"'),
+        (["--rotate", "3 mm"], "mm is a unit of length; give an angle"),
+        (["--edge", "31 mm"], "use a shorter edge"),
+        (["--formula", "x*y"], 'kind "hemisphere" has no formula'),
+        (["--radios", "3"], "unknown option --radios: did you mean --radius?"),
+        (["--target.radus", "3"], "did you mean --target.radius?"),
+        (["--radius"], "'--radius' requires an argument"),
+        (["twice"], "unexpected extra argument"),
+        (["--target.kind", "mesh"], "not yet"),
+    ],
+)
+def test_bad_options_of_form_are_one_sentence_before_any_solve(
+    arguments: list[str], message: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert message in refused(capsys, "form", "hemisphere", *arguments)
+    assert finder.calls == []
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["fom"], "unknown command fom: did you mean form?"),
+        (["form"], "Missing argument"),
+        (["form", "dome.toml"], 'no file named "dome.toml"'),
+        (["--versoin"], "unknown option --versoin: did you mean --version?"),
+    ],
+)
+def test_a_wrong_command_is_one_sentence(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert message in refused(capsys, *arguments)
+
+
+def test_an_output_folder_that_cannot_be_written_is_refused_before_the_solve(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("file").write_text("")
+    assert "file is a file" in refused(capsys, "form", "hemisphere", "--out", "file/dome")
+    assert "file: it is a file" in refused(capsys, "form", "hemisphere", "--out", "file")
+    Path("thesis").mkdir()
+    Path("thesis/chapter.tex").write_text("")
+    assert "thesis: it is not empty" in refused(capsys, "form", "hemisphere", "--out", "thesis")
+    assert "thesis: it is not empty" in refused(
+        capsys, "popup", write_table(Path("rods.csv"), CROSS), "--unit", "m", "--out", "thesis"
+    )
+    monkeypatch.setattr("os.access", lambda *_: False)  # root may write everywhere
+    assert "no permission" in refused(capsys, "form", "hemisphere", "--out", "dome")
+    assert finder.calls == []
+
+
+def test_the_output_folder_is_left_alone_by_the_check(finder: FakeFinder) -> None:
+    finder.fault = NetLimitError("no net")
+    assert main(["form", "hemisphere", "--out", "a/b"]) == 2
+    assert list(Path.cwd().iterdir()) == []
+
+
+def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
+    Path("dome").mkdir()
+    Path("dome/result.json").write_text('{"format": "gridshell-result", "version": 1}')
+    finder.fault = NetLimitError("no net")
+    assert main(["form", "hemisphere", "--out", "dome"]) == 2
+    assert len(finder.calls) == 1
+
+
+def test_not_converged_saves_says_so_and_ends_with_3(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    finder.status = "stopped after 8 factorisations"
+    assert main(["form", "hemisphere"]) == 3
+    assert Path("out/hemisphere/case.toml").exists()
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last == (
+        "gridshell: NOT CONVERGED: stopped after 8 factorisations; partial results are in "
+        f"{Path('out/hemisphere').resolve()}"
+    )
+
+
+def test_an_error_of_the_library_is_one_line(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
+    finder.fault = NetLimitError("no net beyond\n(0.1, 0.2) m")
+    assert "no net beyond (0.1, 0.2) m" in refused(capsys, "form", "hemisphere", "--quiet")
+
+
+def test_a_bug_shows_its_traceback(finder: FakeFinder) -> None:
+    finder.fault = ZeroDivisionError("a bug")
+    with pytest.raises(ZeroDivisionError):
+        main(["form", "hemisphere"])
+
+
+def test_json_is_the_result_and_nothing_else_on_stdout(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "hemisphere", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "out": str(Path("out/hemisphere").resolve()),
+        "format": "gridshell-result",
+        "status": "converged",
+    }
+
+
+def test_progress_away_from_a_terminal_is_a_line_for_each_stage(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "hemisphere"]) == 0
+    assert capsys.readouterr().err.splitlines() == ["gridshell: net", "gridshell: drape", "gridshell: pop up"]
+
+
+def test_quiet_says_nothing(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["form", "hemisphere", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_the_first_run_announces_the_compilation(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "gridshell.form", finder)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    assert main(["form", "hemisphere", "--out", "a"]) == 0
+    assert "compiling kernels, once" in capsys.readouterr().err
+    kernel = f"stretch.energy-12.py{sys.version_info.major}{sys.version_info.minor}.nbi"
+    (tmp_path / "kernels" / "rods_1").mkdir(parents=True)
+    (tmp_path / "kernels" / "rods_1" / kernel).write_text("")
+    assert main(["form", "hemisphere", "--out", "b"]) == 0
+    assert "compiling" not in capsys.readouterr().err
+
+
+def test_popup_reads_a_table_in_its_unit(finder: FakeFinder) -> None:
+    rows = [["A", *(1000 * x for x in CROSS[0])], [], ["B", *(1000 * x for x in CROSS[1])]]
+    table = write_table(Path("rods.csv"), rows, ("id", *COLUMNS))
+    assert main(["popup", table, "--unit", "mm"]) == 0
+    (grid, flat, final, rod), _ = finder.calls[0]
+    assert [rod.name for rod in grid.rods] == ["A", "B"]
+    np.testing.assert_allclose(flat, [[[-0.1, 0], [0.1, 0]], [[0, -0.1], [0, 0.1]]], rtol=1e-15)
+    np.testing.assert_allclose(final[:, 1], [[0.08, 0, 0], [0, 0.08, 0]], rtol=1e-15)
+    # the paper's 1 mm rod belongs to a longest rod of 0.2 pi m; here it is 0.2 m
+    assert rod.section.radius == pytest.approx(0.001 / np.pi, rel=1e-12)
+    assert Path("out/rods-popup").is_dir()
+
+
+def test_a_table_may_be_separated_by_semicolons(finder: FakeFinder) -> None:
+    table = write_table(Path("rods.csv"), CROSS)
+    Path(table).write_text(Path(table).read_text().replace(",", ";"))
+    assert main(["popup", table, "--unit", "m"]) == 0
+    assert finder.calls[0][0][1].shape == (2, 2, 2)
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_a_missing_column_is_named(
+    column: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    left = tuple("oops" if name == column else name for name in COLUMNS)
+    table = write_table(Path("rods.csv"), CROSS, left)
+    assert f"rods.csv: the column {column} is missing" in refused(capsys, "popup", table, "--unit", "m")
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ([*CROSS[1][:9], "high"], 'rods.csv line 3, final_z1 = "high": not a finite number'),
+        ([*CROSS[1][:9], "nan"], 'rods.csv line 3, final_z1 = "nan": not a finite number'),
+        ([*CROSS[1][:9], "1e999"], 'rods.csv line 3, final_z1 = "1e999": not finite'),
+        ([*CROSS[1][:9], "3 mm"], "mm is a unit of length"),
+        ([*CROSS[1][:9], ""], 'rods.csv line 3, final_z1 = "": not a finite number'),
+        (CROSS[1][:9], "rods.csv line 3 has 9 cells, the header 10"),
+        ([1, 1, 1, 1, 0, 0, 0, 0, 0, 0], "has no length"),
+        ([5, 5, 6, 6, 5, 5, 0, 6, 6, 0], "cross no other rod"),
+    ],
+)
+def test_a_bad_row_is_named_with_its_line(
+    row: list[Any], message: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = write_table(Path("rods.csv"), [CROSS[0], row])
+    assert message in refused(capsys, "popup", table, "--unit", "m")
+    assert finder.calls == []
+
+
+@pytest.mark.parametrize(
+    ("ids", "message"), [(["A", "A"], 'the id "A" stands twice'), (["A", ""], "rod 2 has no id")]
+)
+def test_ids_must_tell_rods_apart(
+    ids: list[str], message: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [[name, *row] for name, row in zip(ids, CROSS, strict=True)]
+    table = write_table(Path("rods.csv"), rows, ("id", *COLUMNS))
+    assert message in refused(capsys, "popup", table, "--unit", "m")
+
+
+def test_a_table_needs_rods_and_a_known_unit(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
+    table = write_table(Path("rods.csv"), [])
+    assert "rods.csv has no rods" in refused(capsys, "popup", table, "--unit", "m")
+    assert "--unit is missing" in refused(capsys, "popup", table)
+    assert 'unknown unit "parsec"' in refused(capsys, "popup", table, "--unit", "parsec")
+    assert "deg is a unit of angle" in refused(capsys, "popup", table, "--unit", "deg")
+    Path("empty.csv").write_text("")
+    assert "column flat_x0 is missing" in refused(capsys, "popup", "empty.csv", "--unit", "m")
+    assert "cannot be read" in refused(capsys, "popup", "nothing.csv", "--unit", "m")
+
+
+@pytest.fixture
+def dome() -> Path:
+    """A result of two rods of three nodes that share the middle one."""
+    folder = Path("dome")
+    folder.mkdir()
+    rods = [
+        {"id": "U01", "family": "u", "offset": 0.0, "start": -0.1, "end": 0.1},
+        {"id": "V01", "family": "v", "offset": 0.0, "start": -0.1, "end": 0.1},
+    ]
+    result = {"format": "gridshell-result", "version": 1, "units": "SI", "rods": rods}
+    (folder / "result.json").write_text(json.dumps(result))
+    (folder / "case.toml").write_text(load_case("hemisphere", {"rod.section.radius": 0.007}).to_toml())
+    flat = np.array([[-0.1, 0, 0], [0, 0, 0], [0.1, 0, 0], [0, -0.1, 0], [0, 0.1, 0]])
+    draped = flat * 0.8 + [0, 0, 0.05]
+    np.savez(folder / "states.npz", flat=flat, draped=draped, rod_nodes=[0, 1, 2, 3, 1, 4], rod_start=[0, 3])
+    return folder
+
+
+def test_popup_reads_an_earlier_result(finder: FakeFinder, dome: Path) -> None:
+    assert main(["popup", str(dome)]) == 0
+    (grid, flat, final, rod), _ = finder.calls[0]
+    assert [rod.name for rod in grid.rods] == ["U01", "V01"]
+    assert flat.tolist() == [[[-0.1, 0], [0.1, 0]], [[0, -0.1], [0, 0.1]]]
+    np.testing.assert_allclose(final[1], [[0, -0.08, 0.05], [0, 0.08, 0.05]], rtol=1e-15)
+    assert rod == load_case("hemisphere", {"rod.section.radius": 0.007}).build().rod
+    assert Path("out/dome-popup").is_dir()
+
+
+def test_an_earlier_result_that_cannot_be_read_is_refused(
+    finder: FakeFinder, dome: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "leave --unit out" in refused(capsys, "popup", "dome", "--unit", "m")
+    assert "give another folder" in refused(capsys, "popup", "dome", "--out", "dome")
+    np.savez(dome / "states.npz", flat=np.zeros((5, 3)), rod_nodes=[0, 1, 2, 3, 1, 4], rod_start=[0, 3])
+    assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
+    np.savez(dome / "states.npz", draped=np.zeros((5, 3)))
+    assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
+    result = {"format": "gridshell-result", "version": 1, "rods": []}
+    (dome / "result.json").write_text(json.dumps(result))
+    assert "dome has no rods" in refused(capsys, "popup", "dome")
+    (dome / "result.json").write_text(json.dumps({**result, "rods": [{"id": "U01"}]}))
+    assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
+    (dome / "result.json").unlink()
+    assert "no gridshell result" in refused(capsys, "popup", "dome")
+
+
+def test_ctrl_c_ends_with_one_line_and_130(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
+    finder.fault = KeyboardInterrupt()
+    assert main(["form", "hemisphere"]) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "gridshell: interrupted"
+    assert not Path("out").exists()
+
+
+WAITING = """
+import sys, time, types
+fake = types.ModuleType("gridshell.form")
+def find_form(*args, progress, **options):
+    progress("drape", "level 1 of 1, iteration 3", 1e-4)
+    time.sleep(60)
+fake.find_form = find_form
+sys.modules["gridshell.form"] = fake
+from gridshell.cli import main
+sys.exit(main(["form", "hemisphere"]))
+"""
+
+
+def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it() -> None:
+    pty = pytest.importorskip("pty")
+    ours, theirs = pty.openpty()
+    job = subprocess.Popen(
+        [sys.executable, "-c", WAITING], stderr=theirs, env={**os.environ, "TERM": "xterm"}
+    )
+    os.close(theirs)
+    said, deadline = b"", time.monotonic() + 20
+    while b"residual 1.0e-04" not in said and time.monotonic() < deadline:
+        said += os.read(ours, 4096)
+    job.send_signal(signal.SIGINT)
+    assert job.wait(timeout=20) == 130
+    while b"interrupted" not in said and time.monotonic() < deadline:
+        said += os.read(ours, 4096)
+    os.close(ours)
+    assert b"drape: level 1 of 1, iteration 3, residual 1.0e-04" in said
+    assert b"Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("argument", "heavy"),
+    [
+        ("'--help'", {"numpy", "scipy", "numba", "pydantic", "rich"}),
+        ("'--version'", {"numpy", "scipy", "numba", "pydantic", "rich"}),
+        ("'form', '--help'", {"numpy", "scipy", "numba", "rich"}),
+    ],
+)
+def test_help_and_version_import_nothing_heavy(argument: str, heavy: set[str]) -> None:
+    code = f"import sys; from gridshell.cli import main; main([{argument}]); print(*sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "gridshell" in ended.stdout
+    assert heavy.isdisjoint(ended.stdout.split())
+
+
+def test_help_comes_without_arguments(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    assert "form" in capsys.readouterr().out

@@ -1,0 +1,94 @@
+"""Quantities with units become SI numbers, or one sentence that says what would do."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gridshell.errors import InputError
+from gridshell.units import Kind, parse_quantity
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "si"),
+    [
+        ("200 mm", "length", 0.2),
+        ("30mm", "length", 0.03),
+        ("1.2 m", "length", 1.2),
+        ("  -18 cm ", "length", -0.18),
+        ("0.5 km", "length", 500.0),
+        ("12 in", "length", 0.3048),
+        ('12"', "length", 0.3048),
+        ("1 ft", "length", 0.3048),
+        ("2.5e2 µm", "length", 2.5e-4),
+        ("45 deg", "angle", math.pi / 4),
+        ("90°", "angle", math.pi / 2),
+        ("0.5 rad", "angle", 0.5),
+        ("1 MPa", "stress", 1e6),
+        ("25 GPa", "stress", 25e9),
+        ("3 N/mm²", "stress", 3e6),
+        ("1 ksi", "stress", 6894757.293168361),
+        ("1000 kg/m3", "density", 1000.0),
+        ("1 g/cm^3", "density", 1000.0),
+        ("2.7 g / cm³", "density", 2700.0),
+        ("981 cm/s2", "acceleration", 9.81),
+        ("0.5", "number", 0.5),
+        ("0.03", "length", 0.03),
+        (0.03, "length", 0.03),
+        (2, "length", 2.0),
+    ],
+)
+def test_a_quantity_is_its_si_value_to_the_last_bit(text: object, kind: Kind, si: float) -> None:
+    value = parse_quantity(text, kind, "key")
+    assert value == si
+    assert isinstance(value, float)
+
+
+@given(st.decimals(min_value=-1000, max_value=1000, places=3))
+def test_millimetres_are_rounded_once(number: object) -> None:
+    assert parse_quantity(f"{number} mm", "length", "key") == float(f"{number}e-3")
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "reason"),
+    [
+        ("30 furlong", "length", 'unknown unit "furlong"'),
+        ("30 MM", "length", "did you mean mm?"),
+        ("30 mpa", "stress", "did you mean MPa?"),
+        ("3 kg/m3", "length", "kg/m3 is a unit of density"),
+        ("3 mm", "stress", "mm is a unit of length"),
+        ("3 mm", "angle", "mm is a unit of length"),
+        ("0.5 %", "number", "takes no unit"),
+        ("about 3 mm", "length", "not a finite number"),
+        ("", "length", "not a finite number"),
+        ("nan", "length", "not a finite number"),
+        (math.nan, "length", "not finite"),
+        (math.inf, "length", "not finite"),
+        ("1e400 m", "length", "not finite"),
+        ("1e999999999 km", "length", "not finite"),
+        (10**400, "length", "not finite"),
+        (True, "length", "not a number"),
+        (None, "length", "not a number"),
+        ([1], "length", "not a number"),
+    ],
+)
+def test_a_bad_quantity_is_one_sentence_with_key_reason_and_remedy(
+    value: object, kind: Kind, reason: str
+) -> None:
+    remedies = {"length": '"200 mm"', "stress": '"25 GPa"', "angle": '"45 deg"', "number": "0.5"}
+    with pytest.raises(InputError) as caught:
+        parse_quantity(value, kind, "target.radius")
+    message = str(caught.value)
+    assert message.startswith("target.radius = ")
+    assert reason in message
+    assert remedies[kind] in message
+    assert "\n" not in message
+    assert len(message) < 200
+
+
+def test_the_message_shows_the_value_as_given() -> None:
+    with pytest.raises(
+        InputError, match=r'^rotate = "45 dg": unknown unit "dg" \(did you mean deg\?\); give an angle'
+    ):
+        parse_quantity("45 dg", "angle", "rotate")

@@ -1,0 +1,150 @@
+"""A sample archive made from formulas: a hemisphere's rods, not a computed shell, but every key of a result."""
+
+from typing import Any
+
+import numpy as np
+
+from gridshell.output import Archive
+
+RADIUS = 0.2  # m
+LENGTH = 0.5 * np.pi * RADIUS  # of the flat state's radius: rim to top along a meridian [m]
+
+CASE = f"""[target]
+kind = "hemisphere"
+radius = {RADIUS}
+
+[layout]
+rods = [9, 9]
+spacing = [0.07, 0.07]
+edge = 0.01
+"""
+
+
+def sample_archive(count: int = 9, edges: int = 6) -> Archive:
+    """A dome of `count` rods in each family, with `edges` edges between two joints.
+
+    The flat state is a disc; a meridian keeps its length, so that rods of different offsets differ in length.
+    """
+    offsets = np.linspace(-1, 1, count) * LENGTH * (1 - 0.9 / count)
+    rods = _rods(offsets)
+    flat, rod_nodes, rod_start = _mesh(rods, offsets, edges)
+    states = {
+        "flat": flat,
+        "draped": dome(flat, 0.0),
+        "popped_pinned": dome(flat, 1.0),
+        "popped_clamped": dome(flat, 0.1),
+        "rod_nodes": rod_nodes,
+        "rod_start": rod_start,
+    }
+    for end, state in (("draped", "draped"), ("pinned", "popped_pinned"), ("clamped", "popped_clamped")):
+        states[f"gap_{end}"] = np.linalg.norm(states[state], axis=1) - RADIUS
+    return Archive(_result(rods, states), states, CASE)
+
+
+def table_archive() -> Archive:
+    """Four free rods from a table, popped up with pinned ends: no target, no footprint, no case."""
+    ends = np.array([[[-0.3, -0.2], [0.3, -0.1]], [[-0.3, 0.1], [0.3, 0.25]], [[-0.2, -0.35], [-0.1, 0.35]],
+                     [[0.2, -0.35], [0.1, 0.35]]])  # fmt: skip
+    names, crossings, shares = ["A", "B", "C <1>", "D"], {}, np.linspace(0, 1, 41)
+    for a in (0, 1):
+        for b in (2, 3):
+            sides = np.column_stack([ends[a, 1] - ends[a, 0], ends[b, 0] - ends[b, 1]])
+            crossings[a, b] = np.linalg.solve(sides, ends[b, 0] - ends[a, 0])
+    rods: list[dict[str, Any]] = []
+    points: list[np.ndarray] = []
+    for k, name in enumerate(names):
+        length = float(np.linalg.norm(ends[k, 1] - ends[k, 0]))
+        met = [(names[b if k == a else a], float(st[int(k == b)]) * length) for (a, b), st in crossings.items() if k in (a, b)]
+        rods.append({"id": name, "family": "free", "start": 0.0, "end": length, "length": length,
+                     "joints": [{"with": other, "at": at} for other, at in met]})  # fmt: skip
+        own = np.sort(np.concatenate([shares, [at / length for _, at in met]]))
+        points.append(ends[k, 0] + own[:, None] * (ends[k, 1] - ends[k, 0]))
+    plane = np.concatenate(points)
+    flat = np.column_stack([plane, np.zeros(len(plane))])
+    popped = np.column_stack([0.9 * plane, 0.12 * np.cos(3 * plane[:, 0]) * np.cos(3 * plane[:, 1])])
+    counts = [len(each) for each in points]
+    return Archive(
+        {"format": "gridshell-result", "version": 1, "units": "SI", "status": "converged", "name": "table of rods",
+         "rods": rods, "pop_up": {"pinned": {"status": "converged", "stable": True, "dofs": 500}}},
+        {"flat": flat, "popped_pinned": popped, "rod_nodes": np.arange(len(flat)),
+         "rod_start": np.cumsum([0, *counts[:-1]])},
+        "",
+    )  # fmt: skip
+
+
+def dome(flat: np.ndarray, bulge: float) -> np.ndarray:
+    """Flat points (n, 3) laid on the hemisphere along its meridians, and off it by up to 1 % of R times `bulge`."""
+    r = np.hypot(flat[:, 0], flat[:, 1])
+    share = r / LENGTH
+    off = RADIUS * (1 + bulge * (0.06 * share**2 * (1 - share) - 0.006 * (1 - share**2)))
+    angle = r / RADIUS
+    ring = np.divide(off * np.sin(angle), r, out=np.ones_like(r), where=r > 0)
+    return np.column_stack([ring * flat[:, 0], ring * flat[:, 1], off * np.cos(angle)])
+
+
+def _rods(offsets: np.ndarray) -> list[dict[str, Any]]:
+    rods = []
+    for family, other in (("u", "v"), ("v", "u")):
+        for k, offset in enumerate(offsets):
+            half = float(np.sqrt(LENGTH**2 - offset**2))
+            joints = [
+                {"with": f"{other.upper()}{j + 1:02}", "at": float(at + half)}
+                for j, at in enumerate(offsets) if abs(at) < half
+            ]  # fmt: skip
+            rods.append({"id": f"{family.upper()}{k + 1:02}", "family": family, "offset": float(offset),
+                         "start": -half, "end": half, "length": 2 * half, "joints": joints})  # fmt: skip
+    return rods
+
+
+def _mesh(rods: list[dict[str, Any]], offsets: np.ndarray, edges: int) -> tuple[np.ndarray, ...]:
+    """Nodes at joints, at ends and between; rods share a node at a joint."""
+    points: list[tuple[float, float, float]] = []
+    shared: dict[tuple[str, str], int] = {}
+    rod_nodes, rod_start = [], []
+    for rod in rods:
+        rod_start.append(len(rod_nodes))
+        met = {joint["at"] + rod["start"]: joint["with"] for joint in rod["joints"]}
+        stops = sorted({rod["start"], rod["end"], *met})
+        between = [np.linspace(a, b, edges + 1)[:-1] for a, b in zip(stops, stops[1:], strict=False)]
+        for s in [*np.concatenate(between), rod["end"]]:
+            node = shared.get((met.get(float(s), "none"), rod["id"]))
+            if node is None:
+                node = len(points)
+                points.append((float(s), rod["offset"], 0.0) if rod["family"] == "u" else (rod["offset"], float(s), 0.0))
+                if float(s) in met:
+                    shared[rod["id"], met[float(s)]] = node
+            rod_nodes.append(node)
+    return np.array(points), np.array(rod_nodes), np.array(rod_start)
+
+
+def _result(rods: list[dict[str, Any]], states: dict[str, np.ndarray]) -> dict[str, Any]:
+    ends = np.array([states["rod_nodes"][[a, b - 1]] for a, b in zip(
+        states["rod_start"], [*states["rod_start"][1:], len(states["rod_nodes"])], strict=True)]).ravel()  # fmt: skip
+    pop_up = {"status": "converged", "iterations": 9, "factorizations": 11, "dofs": 3 * len(states["flat"]),
+              "seconds": 1.25, "force_residual": 3.1e-12, "stable": True, "negative_modes": 0}  # fmt: skip
+    return {
+        "format": "gridshell-result", "version": 1, "units": "SI", "status": "converged", "name": "sample dome",
+        "version_gridshell": "0.1.0",
+        "target": {"kind": "hemisphere", "radius": RADIUS, "size": RADIUS},
+        "layout": {"rods": [9, 9], "spacing": [0.07, 0.07], "length": "auto", "edge": 0.01, "rotate": 0.0,
+                   "offset": [0.0, 0.0]},
+        "rod": {"section": {"kind": "circle", "radius": 1e-3},
+                "material": {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0}},
+        "rods": rods,
+        "footprint": states["flat"][ends, :2].tolist(), "boundary": states["draped"][ends].tolist(),
+        "agreement": {end: _agreement(states, end) for end in ("pinned", "clamped")},
+        "net": {"error_estimate": 2e-6, "min_angle_deg": 41.5, "min_angle_at": [0.12, 0.12, 0.02]},
+        "drape": {"method": "bound", "dofs": 1234, "seconds": 0.5, "force_residual": 1e-9, "max_strain": 2e-12,
+                  "max_gap": 1e-15, "negative_modes": 0, "min_angle_deg": 41.5,
+                  "levels": [{"dofs": 640, "iterations": 4, "factorizations": 4},
+                             {"dofs": 1234, "iterations": 3, "factorizations": 3}],
+                  "own_ends": {"max": 1.2e-4, "median": 3e-5}},
+        "pop_up": {"pinned": dict(pop_up), "clamped": dict(pop_up)},
+    }  # fmt: skip
+
+
+def _agreement(states: dict[str, np.ndarray], end: str) -> dict[str, Any]:
+    gap = np.abs(states[f"gap_{end}"])
+    top, rms = float(gap.max()), float(np.sqrt(np.mean(gap**2)))
+    return {"max": top, "rms": rms, "max_relative": top / RADIUS, "rms_relative": rms / RADIUS,
+            "where": states[f"popped_{end}"][int(gap.argmax())].tolist()}  # fmt: skip
