@@ -21,7 +21,7 @@ class Domain(Protocol):
         ...
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distance (n,) [m] of the points (n, 2), negative inside; its gradient (n, 2) and Hessian (n, 2, 2)."""
+        """Signed distance (n,) [m] of the points (n, 2), negative inside; its gradient (n, 2), Hessian (n, 2, 2)."""
         ...
 
 
@@ -59,20 +59,21 @@ class EllipseDomain:
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
         axes = np.array([self.a, self.b])
         # closest point: x_k = a_k^2 p_k / (a_k^2 + t) with sum (a_k p_k / (a_k^2 + t))^2 = 1; in s = t + min(a)^2
-        # the root is bracketed and the function convex, so Newton from the left end converges monotonically
-        p = np.abs(xy)
+        # the root is bracketed and the function convex, so Newton from the left end converges monotonically;
+        # off the axes by a hair, because the closest point to one on the long axis has two mirror images
+        p = np.maximum(np.abs(xy), 1e-12 * axes)
         low = np.min(axes) ** 2
         shift = axes**2 - low
-        t = np.maximum(np.max(axes * p - shift, axis=1), 1e-12 * low)
+        t = np.maximum(np.max(axes * p - shift, axis=1), 1e-14 * low)
         for _ in range(60):
             denominator = t[:, None] + shift
             f = np.sum((axes * p / denominator) ** 2, axis=1) - 1.0
             slope = -2.0 * np.sum((axes * p) ** 2 / denominator**3, axis=1)
             step = np.where(slope < 0, -f / np.minimum(slope, -1e-300), 0.0)
-            t = np.maximum(t + step, 1e-12 * low)
+            t = np.maximum(t + step, 1e-14 * low)
             if np.all(np.abs(step) <= 1e-14 * t):
                 break
-        foot = np.sign(xy) * axes**2 * p / (t[:, None] + shift)
+        foot = np.where(xy < 0, -1.0, 1.0) * axes**2 * p / (t[:, None] + shift)
         normal = foot / axes**2
         normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
         d = np.einsum("ij,ij->i", xy - foot, normal)

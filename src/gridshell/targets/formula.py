@@ -1,13 +1,12 @@
-"""Height formulas as people write them: "0.1 - 2*x^2 - y^2" becomes a function of x and y, without running any code."""
+"""Height formulas as people write them: "0.1 - 2*x^2 - y^2" becomes a function, without running any code."""
 
 import ast
 import operator
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from math import e, isfinite, pi
+from math import e, inf, isfinite, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,8 +56,8 @@ class Formula:
     ----------
     text : as it was written.
     constants : numbers in slots 2, 3, ...; slots 0 and 1 are x and y.
-    steps : the straight-line program, each a function of one or two earlier slots whose result takes the next;
-        every distinct part of the formula once.
+    steps : a straight-line program; each is a function of one or two earlier slots, and its result takes the
+        next. Every distinct part of the formula comes once.
     """
 
     text: str
@@ -76,7 +75,7 @@ class Formula:
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a formula in x and y: numbers, + - * / ^ (or **), parentheses, pi, e and the functions in `FUNCTIONS`.
+    """Read a formula in x and y: numbers, + - * / ^ (or **), parentheses, pi, e and `FUNCTIONS`.
 
     Raises
     ------
@@ -85,14 +84,18 @@ def parse_formula(text: str) -> Formula:
     if not isinstance(text, str):
         raise InputError(f"a formula must be text such as {shown('0.1 - 2*x^2 - y^2')}, not {shown(text)}")
     if len(text) > LONGEST:
-        raise InputError(f"the formula has {len(text)} characters, and at most {LONGEST} are read: write a shorter one")
+        raise InputError(
+            f"the formula has {len(text)} characters, and at most {LONGEST} are read: write a shorter one"
+        )
     source = " ".join(text.split())
     if not source:
         raise InputError(f"the formula is empty: write z in {ALLOWED}")
     if foreign := _FOREIGN.search(source):
         raise _refusal(text, foreign[0], FOREIGN.get(foreign[0]))
     if _nesting(source) > DEEPEST:
-        raise InputError(f"formula {shown(text)}: more than {DEEPEST} parentheses in each other: write a simpler one")
+        raise InputError(
+            f"formula {shown(text)}: more than {DEEPEST} parentheses in each other: write a simpler one"
+        )
     return _Compiler(text, source).formula()
 
 
@@ -119,9 +122,9 @@ class _Compiler:
         elif isinstance(result, str):
             self._step(operator.pos, result)
         constants = dict.fromkeys(a for step in self.steps for a in step[1:] if isinstance(a, float))
+        operands: list[_Operand] = ["x", "y", *constants, *self.steps.values()]
         place: dict[_Operand | None, Slot | None] = {None: None}
-        for operand in ("x", "y", *constants, *self.steps.values()):
-            place[operand] = len(place) - 1
+        place |= {operand: slot for slot, operand in enumerate(operands)}
         steps = tuple((function, place[a] or 0, place[b]) for function, a, b in self.steps)
         return Formula(self.text, tuple(constants), steps)
 
@@ -136,7 +139,9 @@ class _Compiler:
                 f"formula {shown(self.text)} cannot be read {where}: use {ALLOWED}; a product needs its *"
             ) from None
         except (ValueError, MemoryError, RecursionError):
-            raise InputError(f"formula {shown(self.text)} is nested too deeply: write a simpler one") from None
+            raise InputError(
+                f"formula {shown(self.text)} is nested too deeply: write a simpler one"
+            ) from None
 
     def _walk(self, root: ast.expr) -> _Operand:
         """Operands first, by a stack of our own: a long sum is a deep tree."""
@@ -177,10 +182,8 @@ class _Compiler:
                 return CONSTANTS.get(name, name)
             case ast.UnaryOp(ast.UAdd(), inner):
                 return done[inner]
-            case ast.Constant(value):
-                function, operands = float, ()
-                with suppress(OverflowError):  # an integer past the largest float
-                    operands = (float(value),)
+            case ast.Constant(int() | float() as value):
+                function, operands = float, (_number(value),)
             case ast.UnaryOp(_, inner):
                 function, operands = operator.neg, (done[inner],)
             case ast.BinOp(left, op, right):
@@ -189,11 +192,12 @@ class _Compiler:
                     raise self._wrong(node, "divides by zero: write a divisor other than 0")
             case ast.Call(ast.Name(name), [inner]):
                 function, operands = FUNCTIONS[name], (done[inner],)
-        if not all(isinstance(operand, float) for operand in operands):
+        numbers = [np.float64(operand) for operand in operands if isinstance(operand, float)]
+        if len(numbers) < len(operands):
             return self._step(function, *operands)
         with np.errstate(all="ignore"):
-            value = float(function(*(np.float64(operand) for operand in operands)))
-        if not (isfinite(value) and operands):
+            value = float(function(*numbers))
+        if not isfinite(value):
             raise self._wrong(node, "is no finite number: write a value that is")
         return value
 
@@ -222,6 +226,13 @@ def _meant(node: ast.expr) -> str | None:
             spelt = {"ln": "log"}.get(name, name.lower().replace("arc", "a"))
             return next(iter(get_close_matches(spelt, ["x", "y", *CONSTANTS, *FUNCTIONS], n=1)), None)
     return None
+
+
+def _number(literal: int | float) -> float:
+    try:
+        return float(literal)
+    except OverflowError:  # an integer past the largest float
+        return inf
 
 
 def _nesting(source: str) -> int:

@@ -24,16 +24,16 @@ SAME = 1e-3  # of the size: refined peaks this close are one
 class HeightField(Target):
     """z = f(x, y), ending at the edge of its domain.
 
-    The formula goes on past the edge, out to where it is no longer finite or turns steep (slope 4, or the
-    steepest inside); where that happens within 1.6 times the domain, Taylor polynomials of second degree
-    continue it from there, so that curvature stays continuous.
+    The formula goes on past the edge. Where it stops being finite or turns steep (slope 4, or twice the
+    steepest inside) within 1.6 times the domain, Taylor polynomials of second degree continue it from there,
+    so that the curvature stays continuous.
 
     Parameters
     ----------
     formula : in x and y [m], such as "0.1 - 2*x^2 - y^2"; see `parse_formula`.
-    function : instead of a formula: z(x, y) of arrays (n,). Made of arithmetic and numpy functions, it gets exact
-        derivatives (`Jet`); one that refuses jets gets central differences of fourth order, and creases in it go
-        unnoticed.
+    function : instead of a formula: z(x, y) of arrays (n,). Made of arithmetic and numpy functions, it gets
+        exact derivatives (`Jet`); one that refuses jets gets central differences of fourth order, is called up
+        to 1.61 times the domain, and must be smooth there: creases in it go unnoticed.
     domain : centred on the origin.
 
     Raises
@@ -128,7 +128,8 @@ def _takes_jets(function: Callable[[Any, Any], Any], size: float) -> bool:
         except Exception:  # whatever it does not like about jets, it takes arrays
             return False
     value = jet.value if isinstance(jet, Jet) else jet
-    return (isinstance(jet, Jet) or np.ndim(jet) == 0) and np.array_equal(value + 0 * x, plain, equal_nan=True)
+    exact = isinstance(jet, Jet) or np.ndim(jet) == 0
+    return exact and bool(np.allclose(value + 0 * x, plain, rtol=1e-12, atol=0, equal_nan=True))
 
 
 def _qualified_name(function: Callable[..., Any]) -> str:

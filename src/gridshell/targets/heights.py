@@ -1,4 +1,4 @@
-"""A height function with its derivatives at any plan point, continued past the region where it can be trusted."""
+"""A height function with its derivatives at any plan point, continued past where it can be trusted."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,8 +13,10 @@ from gridshell.targets.jet import Jet, differences
 
 Floats = NDArray[np.float64]
 
-NUDGE = 1e-7  # of the size: errors of 1e-14 in z, and far enough from a 0/0 for ten digits of its curvature
-DIFFERENCE = 2e-3  # of the size: step of the differences; truncation and round-off both some 1e-10 in curvature
+NUDGE = 1e-7  # of the size: far enough from a 0/0 for some digits of its curvature
+DIFFERENCE = (
+    2e-3  # of the size: step of the differences; truncation and round-off both some 1e-10 in curvature
+)
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,8 @@ class Heights:
     size : half the larger width of its domain [m].
     exact : derivatives by jets; otherwise by differences.
     trusted : where the function is taken as it is; None for everywhere. Beyond, every normal of the region's
-        edge carries the Taylor polynomial of second degree of the function in that direction (beyond a corner of
-        a rectangle, in both). The continued surface has continuous curvature, and its derivatives are exact:
+        edge carries the function's Taylor polynomial of second degree in that direction (beyond a corner of a
+        rectangle, in both). The continued surface has continuous curvature, and its derivatives are exact:
         those of the polynomial's coefficients come from jets of jets.
     """
 
@@ -58,7 +60,7 @@ class Heights:
         total = np.asarray(jet.value + jet.dxx + jet.dyy)
         if isfinite(float(np.add.reduce(total, axis=None))):
             return jet
-        # 0/0 at a point of a smooth surface, as in sqrt(x^2 + y^2) under a cosine: step aside, and back by Taylor
+        # 0/0 at a point of a smooth surface, as of sqrt(x^2 + y^2) in a cosine: step aside, and back by Taylor
         broken = np.flatnonzero(~np.isfinite(np.broadcast_to(total, x.shape)))
         h, k = NUDGE * self.size, 0.7 * NUDGE * self.size
         near = self._evaluate(x[broken] + h, y[broken] + k)

@@ -1,4 +1,4 @@
-"""Second-order forward differentiation: a value together with its exact gradient and Hessian in two variables."""
+"""Second-order forward differentiation: a value with its exact gradient and Hessian in two variables."""
 
 from collections.abc import Callable
 from numbers import Real
@@ -15,10 +15,10 @@ LN2, LN10 = float(np.log(2.0)), float(np.log(10.0))
 
 
 class Jet:
-    """A function of x and y at n points: value, gradient and Hessian, carried through arithmetic and numpy functions.
+    """A function of x and y at n points: value, gradient and Hessian through arithmetic and numpy functions.
 
     A part that is the same everywhere stays a float, and 0.0 and 1.0 cost nothing: most parts of x, of y and
-    of what depends on one of them alone. Parts may be jets themselves: a jet of jets holds higher derivatives.
+    of what depends on one of them alone. Parts may be jets: a jet of jets holds higher derivatives.
 
     What has no derivative here (comparisons, np.where, np.maximum, float()) is refused with a TypeError.
     """
@@ -93,11 +93,11 @@ class Jet:
     __array__ = __bool__ = __float__ = __int__ = __len__ = __iter__ = _refuse
     __lt__ = __le__ = __gt__ = __ge__ = _refuse
     __eq__ = __ne__ = _refuse  # type: ignore[assignment]
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
 
 
 def _times(a: Part, b: Part) -> Part:
-    """a b, for free where one is a plain 0 or 1: a part that is zero everywhere stays so, whatever the other."""
+    """a b, for free where one is a plain 0 or 1: a part that is zero everywhere stays so."""
     if a.__class__ is float:
         if a == 0.0:
             return 0.0
@@ -187,7 +187,9 @@ def _multiply(a: Any, b: Any) -> Jet:
 
 def _divide(a: Any, b: Any) -> Jet:
     if b.__class__ is not Jet:
-        return Jet(a.value / b, _over(a.dx, b), _over(a.dy, b), _over(a.dxx, b), _over(a.dxy, b), _over(a.dyy, b))
+        return Jet(
+            a.value / b, _over(a.dx, b), _over(a.dy, b), _over(a.dxx, b), _over(a.dxy, b), _over(a.dyy, b)
+        )
     a = a if a.__class__ is Jet else Jet(a)
     g, r, s = b.value, b.dx, b.dy
     f = a.value / g
@@ -208,7 +210,7 @@ def _power(a: Any, b: Any) -> Jet:
         if c == 0.0:
             return Jet(u * 0.0 + 1.0)
         if c == 1.0:
-            return a  # type: ignore[no-any-return]
+            return a
         if c == 2.0:
             return _chain(a, u * u, 2.0 * u, 2.0)
         if c == 3.0:
@@ -357,7 +359,8 @@ def differences(function: Callable[[Any, Any], Any], x: Floats, y: Floats, step:
     f = np.broadcast_to(np.asarray(function(*stencil), dtype=float), stencil[0].shape).reshape(17, -1)
     along_x, along_y, cross, wide = f[1:5], f[5:9], f[9:13], f[13:17]
     sign = np.array([1.0, -1.0, -1.0, 1.0])
-    first, second = np.array([8.0, -8.0, -1.0, 1.0]) / (12 * step), np.array([16.0, 16.0, -1.0, -1.0]) / (12 * step**2)
+    first = np.array([8.0, -8.0, -1.0, 1.0]) / (12 * step)
+    second = np.array([16.0, 16.0, -1.0, -1.0]) / (12 * step**2)
     return Jet(
         f[0].copy(),
         first @ along_x,

@@ -86,7 +86,7 @@ class Hemisphere(_Quadric):
 
 @dataclass(frozen=True)
 class Cap(Hemisphere):
-    """The part of a sphere of the given `radius` [m] above z = `height_of_base` [m], its centre being z = 0."""
+    """The part of a sphere of the given `radius` [m] above z = `base` [m], its centre being z = 0."""
 
     base_height: float = 0.0
 

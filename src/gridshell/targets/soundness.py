@@ -1,6 +1,7 @@
 """Is a height function fit to be a target? Looked at densely once, when the target is made."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,17 +11,18 @@ from gridshell.targets.domain import Disc, Rectangle
 from gridshell.targets.heights import Heights
 
 Floats = NDArray[np.float64]
+Region = Disc | Rectangle
 
 ROWS, COLUMNS = 65, 193  # of the lattice: some 3 mm apart on a target of 0.4 m
 STEEPEST = 1e3  # slope that counts as infinite (89.94 degrees)
 SHARPEST = 1e-2  # change of slope at a point that counts as a crease (0.6 degrees)
 SUSPECTS, HALVINGS = 64, 26  # pairs of neighbours searched for a crease; down to 1e-8 of their distance
-BAND = 1.6  # half extents; the net is marched past the edge, and the formula is good company as far as it goes
+BAND = 1.6  # half extents; the net is marched past the edge
 TAME = 4.0  # slope to which a formula is followed past the edge (76 degrees), or twice the steepest inside
 CLIMBERS = 500
 
 
-def sample(heights: Heights, domain: Disc | Rectangle) -> Floats:
+def sample(heights: Heights, domain: Region) -> Floats:
     """(8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy on a lattice that ends on the domain's edge.
 
     Rows of a disc are circles, from the centre to the edge.
@@ -34,7 +36,7 @@ def sample(heights: Heights, domain: Disc | Rectangle) -> Floats:
     return _look(heights, np.stack([x.ravel(), y.ravel()])).reshape(8, ROWS, COLUMNS)
 
 
-def require_smooth(heights: Heights, domain: Disc | Rectangle, samples: Floats, name: str) -> None:
+def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str) -> None:
     """Finite height, slope and curvature everywhere in the domain, and neither steps nor creases.
 
     Raises
@@ -59,24 +61,24 @@ def require_smooth(heights: Heights, domain: Disc | Rectangle, samples: Floats, 
                 )
 
 
-def trusted_region(heights: Heights, domain: Disc | Rectangle, samples: Floats, name: str) -> Disc | Rectangle | None:
-    """The largest of the growing domains in which the height function is finite and tame; None: all of the band."""
+def trusted_region(heights: Heights, domain: Region, samples: Floats, name: str) -> Region | None:
+    """The largest of the growing domains in which the heights are finite and tame; None: all of the band."""
     edge = _edge(domain)
     limit = max(TAME, 2 * float(np.hypot(samples[3], samples[4]).max()))
     growth = np.linspace(1.0, BAND, 61)
-    for before, now in zip(growth, growth[1:], strict=False):
+    for before, now in pairwise(growth):
         at = _look(heights, now * edge)
         if not np.all(np.isfinite(at).all(axis=0) & (np.hypot(at[3], at[4]) <= limit)):
             if not heights.exact:
                 raise InputError(
-                    f"{name} must be smooth to {BAND} times its domain, and it is not at {now:.2f} times: use a smaller "
-                    "domain, or a function made of arithmetic and numpy functions alone, which can be continued"
+                    f"{name} must be smooth to {BAND} times its domain, and it is not at {now:.2f} times: use a "
+                    "smaller domain, or arithmetic and numpy functions alone, which can be continued"
                 )
             return grown(domain, float(before))
     return None
 
 
-def climb(heights: Heights, domain: Disc | Rectangle) -> Floats:
+def climb(heights: Heights, domain: Region) -> Floats:
     """Points (n, 2) of the domain, its edge included, from which no step leads up; the highest is among them."""
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent
@@ -100,13 +102,13 @@ def climb(heights: Heights, domain: Disc | Rectangle) -> Floats:
     return xy
 
 
-def grown(domain: Disc | Rectangle, factor: float) -> Disc | Rectangle:
+def grown(domain: Region, factor: float) -> Region:
     if isinstance(domain, Disc):
         return replace(domain, radius=factor * domain.radius)
     return replace(domain, size=(factor * domain.size[0], factor * domain.size[1]))
 
 
-def relative_radius(domain: Disc | Rectangle, x: Floats, y: Floats) -> Floats:
+def relative_radius(domain: Region, x: Floats, y: Floats) -> Floats:
     """1 on the edge, 0 at the centre."""
     a, b = domain.half_extent
     if isinstance(domain, Disc):
@@ -121,16 +123,17 @@ def _look(heights: Heights, xy: Floats) -> Floats:
     return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in parts)])
 
 
-def _edge(domain: Disc | Rectangle) -> Floats:
+def _edge(domain: Region) -> Floats:
     a, b = domain.half_extent
     if isinstance(domain, Disc):
         angle = np.linspace(0.0, 2 * np.pi, 4 * ROWS)
         return np.stack([a * np.cos(angle), a * np.sin(angle)])
     along, full = np.linspace(-1.0, 1.0, ROWS), np.ones(ROWS)
-    return np.hstack([(a * along, b * full), (a * along, -b * full), (a * full, b * along), (-a * full, b * along)])
+    across, up = (a * along, b * full), (a * full, b * along)
+    return np.hstack([across, np.negative(across), up, np.negative(up)])
 
 
-def _refuse(at: Floats, domain: Disc | Rectangle, name: str) -> None:
+def _refuse(at: Floats, domain: Region, name: str) -> None:
     flat = np.isfinite(at[2:5]).all(axis=0)
     slope = np.hypot(at[3], at[4])
     for bad, what in (
@@ -143,13 +146,13 @@ def _refuse(at: Floats, domain: Disc | Rectangle, name: str) -> None:
             raise InputError(f"{name} has {what} at ({x:.4g}, {y:.4g}) m: use {_smaller(domain, x, y)}")
 
 
-def _nearest_centre(at: Floats, domain: Disc | Rectangle) -> tuple[float, float]:
+def _nearest_centre(at: Floats, domain: Region) -> tuple[float, float]:
     place = at[:2, int(np.argmin(relative_radius(domain, at[0], at[1])))]
     x, y = np.where(np.abs(place) < 1e-9 * max(domain.half_extent), 0.0, place)
     return float(x), float(y)
 
 
-def _smaller(domain: Disc | Rectangle, x: float, y: float) -> str:
+def _smaller(domain: Region, x: float, y: float) -> str:
     """A domain that ends before the place."""
     within = 0.95 * float(relative_radius(domain, np.array(x), np.array(y)))
     if within < 0.2:

@@ -23,7 +23,7 @@ class Implicit(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Signed distance (n,) to a surface [m], its gradient, the outward normal (n, 3), and its Hessian (n, 3, 3).
+    """Signed distance (n,) to a surface [m], its gradient (n, 3), the outward normal, and its Hessian (n, 3, 3).
 
     On the surface the Hessian is the shape operator: 1/R in every tangent direction of a sphere.
     """
@@ -130,7 +130,7 @@ class Target(ABC):
         return Gap(distance, n, _offset_shape(shape, distance))
 
     def contact(self, x: Floats) -> Gap:
-        """Signed distance (n,) to the body that a falling grid meets: the surface, and the wall below its rim."""
+        """Signed distance (n,) to the body that a falling grid meets: the surface and the wall below its rim."""
         y = self.closest(x)
         _, n, shape = self.on_surface(y)
         distance = np.einsum("ij,ij->i", x - y, n)
@@ -149,7 +149,7 @@ class Target(ABC):
         hessian = np.zeros((len(x), 3, 3))
         hessian[:, :2, :2] = bend
         above = np.flatnonzero((x[:, 2] > rim) & (across > 0))
-        if len(above):  # seen from the corner's normal cone; a corner that a node slides over has no curvature
+        if len(above):  # in the corner's normal cone; a corner that a node slides over has no curvature
             apart = np.column_stack([across[above, None] * normal[above], x[above, 2] - rim[above]])
             far = np.linalg.norm(apart, axis=1)
             across[above], n[above], hessian[above] = far, apart / far[:, None], 0.0
