@@ -27,6 +27,7 @@ Start = Literal["draped", "flat"]
 
 FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
 CLAMP_STEP = 0.25
+RELEASE_STEP = 0.1
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,8 @@ def pop_up(
     ----------
     ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp).
     start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
-        flat grid, which leaves its plane to the side of +z, then turns the clamps.
+        flat grid, which leaves its plane to the side that the boundary's directions point away from (without
+        directions to that of +z), then turns the clamps.
 
     Raises
     ------
@@ -84,15 +86,29 @@ def _problem(shell: Shell, length: float, goals: Floats | None = None) -> Proble
 def _release(
     footprint: Footprint, boundary: Boundary, rod: Rod, ends: Ends, length: float, progress: Progress
 ) -> Equilibrium:
-    """Let go of the draped state: the target's forces vanish, the ends stay."""
+    """Let go of the draped state: the target's forces vanish, the ends stay. At once, or slowly if that fails."""
     assert boundary.draped is not None
     shell = Shell.of(footprint.mesh, rod, clamped=ends == "clamped")
-    return find_stable(
+    state, forces = shell.state(boundary.draped, boundary.tangents), np.zeros(len(footprint.mesh.edges))
+    at_once = find_stable(
         _problem(shell, length),
-        shell.state(boundary.draped, boundary.tangents),
-        np.zeros(len(footprint.mesh.edges)),
+        state,
+        forces,
         progress=lambda k, step: progress("pop-up", f"{ends}, iteration {k}", step),
     )
+    if at_once.report.converged:
+        return at_once
+    holding = np.zeros_like(state)
+    for element in (*shell.elements, shell.stretch):
+        element.evaluate(state, holding)
+    slowly = follow(
+        lambda t: replace(_problem(shell, length), load=(1 - t) * holding),
+        state,
+        forces,
+        first_step=RELEASE_STEP,
+        progress=lambda t, k, step: progress("pop-up", f"{ends}, {100 * t:.0f} % released, iteration {k}", step),
+    )
+    return replace(slowly, report=slowly.report.after(at_once.report))
 
 
 def _rise(footprint: Footprint, boundary: Boundary, rod: Rod, length: float, progress: Progress) -> Equilibrium:
@@ -104,7 +120,7 @@ def _rise(footprint: Footprint, boundary: Boundary, rod: Rod, length: float, pro
 
     return follow(
         lambda t: _problem(shell, length, (1 - t) * first + t * boundary.points),
-        shell.state(_arched(footprint, flat, first, boundary.points)),
+        shell.state(_arched(footprint, flat, first, boundary)),
         np.zeros(len(mesh.edges)),
         first_step=FIRST_RISE,
         progress=lambda t, k, step: progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
@@ -123,20 +139,22 @@ def _aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
     return result
 
 
-def _arched(footprint: Footprint, flat: Floats, first: Floats, last: Floats) -> Floats:
+def _arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:
     """The flat grid raised to arches of about the rods' lengths over their ends at the first step.
 
-    A flat grid under compression is in equilibrium, only not a stable one: the arch chooses the side.
+    A flat grid under compression is in equilibrium, only not a stable one: the arch chooses the side. A rod
+    whose ends are to rise outwards sags; without directions all rods rise.
     """
     mesh = footprint.mesh
-    ends = (1 - FIRST_RISE) * first + FIRST_RISE * last
+    ends = (1 - FIRST_RISE) * first + FIRST_RISE * boundary.points
+    side = np.where(boundary.tangents[::2, 2] + boundary.tangents[1::2, 2] > 0, -1.0, 1.0)
     raised, weight = np.zeros_like(flat), np.zeros(len(flat))
     for k, rod in enumerate(mesh.grid.rods):
         nodes, s = mesh.nodes_of(k), mesh.stations[mesh.rod_slice(k)]
         share = ((s - s[0]) / rod.length)[:, None]
         chord = (1 - share) * ends[2 * k] + share * ends[2 * k + 1]
         short = max(rod.length**2 - float(np.sum((ends[2 * k + 1] - ends[2 * k]) ** 2)), 0.0)
-        height = 2 / np.pi * np.sqrt(short)  # a sine arch of this height has about the rod's length
+        height = side[k] * 2 / np.pi * np.sqrt(short)  # a sine arch of this height has about the rod's length
         chord[:, 2] += height * np.sin(np.pi * share[:, 0])
         raised[nodes] += chord
         weight[nodes] += 1
