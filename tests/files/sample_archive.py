@@ -1,5 +1,6 @@
-"""A sample archive made from formulas: a hemisphere's rods, not a computed shell, but every key of a result."""
+"""A sample archive made from formulas: no computed shell, but every key of a result."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,11 @@ def table_archive() -> Archive:
     points: list[np.ndarray] = []
     for k, name in enumerate(names):
         length = float(np.linalg.norm(ends[k, 1] - ends[k, 0]))
-        met = [(names[b if k == a else a], float(st[int(k == b)]) * length) for (a, b), st in crossings.items() if k in (a, b)]
+        met = [
+            (names[b if k == a else a], float(st[int(k == b)]) * length)
+            for (a, b), st in crossings.items()
+            if k in (a, b)
+        ]
         rods.append({"id": name, "family": "free", "start": 0.0, "end": length, "length": length,
                      "joints": [{"with": other, "at": at} for other, at in met]})  # fmt: skip
         own = np.sort(np.concatenate([shares, [at / length for _, at in met]]))
@@ -64,8 +69,9 @@ def table_archive() -> Archive:
     popped = np.column_stack([0.9 * plane, 0.12 * np.cos(3 * plane[:, 0]) * np.cos(3 * plane[:, 1])])
     counts = [len(each) for each in points]
     return Archive(
-        {"format": "gridshell-result", "version": 1, "units": "SI", "status": "converged", "name": "table of rods",
-         "rods": rods, "pop_up": {"pinned": {"status": "converged", "stable": True, "dofs": 500}}},
+        {"format": "gridshell-result", "version": 1, "units": "SI", "status": "converged",
+         "name": "table of rods", "rods": rods,
+         "pop_up": {"pinned": {"status": "converged", "stable": True, "dofs": 500}}},
         {"flat": flat, "popped_pinned": popped, "rod_nodes": np.arange(len(flat)),
          "rod_start": np.cumsum([0, *counts[:-1]])},
         "",
@@ -73,7 +79,7 @@ def table_archive() -> Archive:
 
 
 def dome(flat: np.ndarray, bulge: float) -> np.ndarray:
-    """Flat points (n, 3) laid on the hemisphere along its meridians, and off it by up to 1 % of R times `bulge`."""
+    """Flat points (n, 3) laid along the hemisphere's meridians, off it by `bulge` times 1 % of R or less."""
     r = np.hypot(flat[:, 0], flat[:, 1])
     share = r / LENGTH
     off = RADIUS * (1 + bulge * (0.06 * share**2 * (1 - share) - 0.006 * (1 - share**2)))
@@ -105,12 +111,14 @@ def _mesh(rods: list[dict[str, Any]], offsets: np.ndarray, edges: int) -> tuple[
         rod_start.append(len(rod_nodes))
         met = {joint["at"] + rod["start"]: joint["with"] for joint in rod["joints"]}
         stops = sorted({rod["start"], rod["end"], *met})
-        between = [np.linspace(a, b, edges + 1)[:-1] for a, b in zip(stops, stops[1:], strict=False)]
+        between = [np.linspace(a, b, edges + 1)[:-1] for a, b in pairwise(stops)]
         for s in [*np.concatenate(between), rod["end"]]:
             node = shared.get((met.get(float(s), "none"), rod["id"]))
             if node is None:
                 node = len(points)
-                points.append((float(s), rod["offset"], 0.0) if rod["family"] == "u" else (rod["offset"], float(s), 0.0))
+                points.append(
+                    (float(s), rod["offset"], 0.0) if rod["family"] == "u" else (rod["offset"], float(s), 0.0)
+                )
                 if float(s) in met:
                     shared[rod["id"], met[float(s)]] = node
             rod_nodes.append(node)
@@ -118,13 +126,13 @@ def _mesh(rods: list[dict[str, Any]], offsets: np.ndarray, edges: int) -> tuple[
 
 
 def _result(rods: list[dict[str, Any]], states: dict[str, np.ndarray]) -> dict[str, Any]:
-    ends = np.array([states["rod_nodes"][[a, b - 1]] for a, b in zip(
-        states["rod_start"], [*states["rod_start"][1:], len(states["rod_nodes"])], strict=True)]).ravel()  # fmt: skip
+    rod_nodes = np.split(states["rod_nodes"], states["rod_start"][1:])
+    ends = np.array([own[[0, -1]] for own in rod_nodes]).ravel()
     pop_up = {"status": "converged", "iterations": 9, "factorizations": 11, "dofs": 3 * len(states["flat"]),
               "seconds": 1.25, "force_residual": 3.1e-12, "stable": True, "negative_modes": 0}  # fmt: skip
     return {
-        "format": "gridshell-result", "version": 1, "units": "SI", "status": "converged", "name": "sample dome",
-        "version_gridshell": "0.1.0",
+        "format": "gridshell-result", "version": 1, "units": "SI", "status": "converged",
+        "name": "sample dome", "version_gridshell": "0.1.0",
         "target": {"kind": "hemisphere", "radius": RADIUS, "size": RADIUS},
         "layout": {"rods": [9, 9], "spacing": [0.07, 0.07], "length": "auto", "edge": 0.01, "rotate": 0.0,
                    "offset": [0.0, 0.0]},
@@ -134,8 +142,8 @@ def _result(rods: list[dict[str, Any]], states: dict[str, np.ndarray]) -> dict[s
         "footprint": states["flat"][ends, :2].tolist(), "boundary": states["draped"][ends].tolist(),
         "agreement": {end: _agreement(states, end) for end in ("pinned", "clamped")},
         "net": {"error_estimate": 2e-6, "min_angle_deg": 41.5, "min_angle_at": [0.12, 0.12, 0.02]},
-        "drape": {"method": "bound", "dofs": 1234, "seconds": 0.5, "force_residual": 1e-9, "max_strain": 2e-12,
-                  "max_gap": 1e-15, "negative_modes": 0, "min_angle_deg": 41.5,
+        "drape": {"method": "bound", "dofs": 1234, "seconds": 0.5, "force_residual": 1e-9,
+                  "max_strain": 2e-12, "max_gap": 1e-15, "negative_modes": 0, "min_angle_deg": 41.5,
                   "levels": [{"dofs": 640, "iterations": 4, "factorizations": 4},
                              {"dofs": 1234, "iterations": 3, "factorizations": 3}],
                   "own_ends": {"max": 1.2e-4, "median": 3e-5}},

@@ -1,9 +1,9 @@
-"""A result with its states, and the folder that holds it: everything in the folder is made from the archive."""
+"""A result with its states, and the folder that holds it; every file in it is made from the archive."""
 
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from gridshell.errors import OutputError
 from gridshell.output.folder import read_json, replacing
 
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
+GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class Archive:
     result : the content of result.json, SI units.
     states : the content of states.npz: "flat", "draped", "popped_pinned", "popped_clamped" (n, 3) node
         positions [m]; "gap_draped", "gap_pinned", "gap_clamped" (n,) signed distances to the target [m];
-        "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be missing.
+        "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
+        missing.
     case_toml : the full resolved input; empty if there was none.
     """
 
@@ -37,7 +39,8 @@ class Archive:
     @property
     def name(self) -> str:
         """What the result is called: its own name, else its target's kind."""
-        return str(self.result.get("name") or self.result.get("target", {}).get("kind") or "gridshell")
+        name = self.result.get("name") or (self.result.get("target") or {}).get("kind")
+        return printable(str(name or "gridshell"))
 
     @property
     def final(self) -> str | None:
@@ -52,6 +55,7 @@ def write(archive: Archive, folder: str | os.PathLike[str]) -> Path:
     ------
     OutputError : the folder cannot be written, or holds something that is not a gridshell result.
     """
+    archive = replace(archive, result=json.loads(json_text(archive.result)))  # what a reader will see
     with replacing(folder) as temporary:
         for name, content in _files(archive).items():
             file = temporary / name
@@ -91,6 +95,11 @@ def json_text(result: Mapping[str, Any]) -> str:
             text = _dumps(value)
         lines.append(f" {_dumps(key)}: {text}")
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def printable(text: str) -> str:
+    """`text` on one line, without the control characters that drawings and models cannot hold."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _dumps(value: Any) -> str:

@@ -54,15 +54,16 @@ def _write(plan: FlatPlan, space: "Modelspace") -> None:
     """All texts."""
     from ezdxf.enums import TextEntityAlignment as Align
 
+    height = CAP * plan.text_size
     for item in plan.labels:
-        size = {"layer": "LABEL", "height": CAP * plan.text_size, "rotation": float(np.degrees(item.angle))}
-        space.add_text(item.text, dxfattribs=size).set_placement(item.centre.tolist(), align=Align.MIDDLE_CENTER)
-    small = 0.12 * plan.spacing  # "U03/V05" fits between two joints
+        style = {"layer": "LABEL", "height": height, "rotation": float(np.degrees(item.angle))}
+        text = space.add_text(item.text, dxfattribs=style)
+        text.set_placement(item.centre.tolist(), align=Align.MIDDLE_CENTER)
+    small = {"layer": "LABEL-JOINTS", "height": CAP * 0.12 * plan.spacing}  # fits between two joints
     for joint, mark in zip(plan.joints, plan.marks, strict=True):
-        place = (mark + 0.06 * plan.spacing).tolist()
-        space.add_text(joint.id, dxfattribs={"layer": "LABEL-JOINTS", "height": CAP * small}).set_placement(place)
-    cloud = np.concatenate([plan.lines.reshape(-1, 2), np.zeros((1, 2))])
-    left, below, size = cloud[:, 0].min(), cloud[:, 1].min() - 6 * plan.text_size, 0.018 * plan.extent
+        space.add_text(joint.id, dxfattribs=small).set_placement((mark + 0.06 * plan.spacing).tolist())
+    size = 0.018 * plan.extent
+    left, below = plan.lines.reshape(-1, 2).min(axis=0, initial=0.0) - (0.0, 6 * plan.text_size)
     for k, line in enumerate((plan.name, "Flat plan, units mm, scale 1:1", plan.summary, NOTE)):
         title = {"layer": "TITLE", "height": CAP * size * (1.5 if k == 0 else 1.0)}
         space.add_text(line, dxfattribs=title).set_placement((left, below - 1.7 * (k + 1) * size))

@@ -65,7 +65,9 @@ def read_json(path: Path) -> dict[str, Any]:
         raise OutputError(f'{path} is not a gridshell result: its "format" is not "{FORMAT}"')
     version = result.get("version")
     if not isinstance(version, int) or version > VERSION:
-        raise OutputError(f"{path} has version {version}, this gridshell reads {VERSION}: install a newer one")
+        raise OutputError(
+            f"{path} has version {version}, this gridshell reads {VERSION}: install a newer one"
+        )
     return result
 
 
@@ -73,13 +75,16 @@ def _check_replaceable(path: Path) -> None:
     if not path.is_dir():
         raise OutputError(f"cannot write {path}: it is a file; choose a folder")
     if Path.cwd().is_relative_to(path):
-        raise OutputError(f"cannot replace {path} while working in it: choose a folder inside, or leave it first")
+        raise OutputError(
+            f"cannot replace {path} while working in it: choose a folder inside, or leave it first"
+        )
     if any(path.iterdir()):
         try:
             read_json(path / "result.json")
         except OutputError as error:
             raise OutputError(
-                f"will not replace {path}: it is not empty and holds no gridshell result; choose another folder"
+                f"will not replace {path}: it is not empty and holds no gridshell result; "
+                "choose another folder"
             ) from error
 
 

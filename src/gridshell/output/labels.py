@@ -10,7 +10,9 @@ Floats = NDArray[np.float64]
 
 LETTER = 0.62  # width of a capital or digit over the text size
 LINE = 0.95  # height of a line of text over its size, a little air included
-LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
+LOWEST = np.radians(
+    -75.0
+)  # angle of a text: readable from below or from the right, also when somewhat steeper
 NEAR, FAR = 14, 150  # places that are tried at an end: where no rod is covered either; at all
 
 
@@ -83,11 +85,10 @@ def _boxes_meet(box: Floats, others: Floats) -> bool:
     """Whether the rectangle (4, 2) covers a part of one of `others` (m, 4, 2): no axis separates them."""
     if not len(others):
         return False
-    sides = np.concatenate([np.broadcast_to(box[[1, 3]] - box[0], (len(others), 2, 2)),
-                            others[:, [1, 3]] - others[:, :1]], axis=1)  # fmt: skip
-    mine = np.einsum("mac,pc->map", sides, box)
-    theirs = np.einsum("mac,mpc->map", sides, others)
-    apart = (mine.max(-1) <= theirs.min(-1)) | (theirs.max(-1) <= mine.min(-1))
+    mine = np.broadcast_to(box[[1, 3]] - box[0], (len(others), 2, 2))
+    sides = np.concatenate([mine, others[:, [1, 3]] - others[:, :1]], axis=1)
+    p, q = np.einsum("mac,pc->map", sides, box), np.einsum("mac,mpc->map", sides, others)
+    apart = (p.max(-1) <= q.min(-1)) | (q.max(-1) <= p.min(-1))
     return bool(np.any(~apart.any(axis=1)))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.output.archive import Archive
+from gridshell.output.archive import Archive, printable
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +92,15 @@ def _record(entry: dict[str, Any], nodes: NDArray[np.intp], flat: Floats | None)
         ends = np.asarray(flat[nodes[[0, -1]], :2], dtype=np.float64)
     else:
         ends = np.array([[start, 0.0], [end, 0.0]])
-    joints = tuple((str(joint["with"]), float(joint["at"])) for joint in entry.get("joints", []))
+    joints = tuple((printable(str(joint["with"])), float(joint["at"])) for joint in entry.get("joints", []))
     return RodRecord(
-        str(entry["id"]), family, offset, start, end, float(entry.get("length", end - start)), ends, nodes, joints
+        printable(str(entry["id"])),
+        family,
+        offset,
+        start,
+        end,
+        float(entry.get("length", end - start)),
+        ends,
+        nodes,
+        joints,
     )

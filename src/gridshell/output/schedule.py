@@ -30,7 +30,7 @@ def rods_csv(archive: Archive) -> str:
     for rod in rods_of(archive):
         ends = _ends(rod, archive.states[final]) if final else None
         rows.append([
-            rod.id, rod.family, _mm(rod.offset), _mm(rod.start), _mm(rod.end), _mm(rod.length), str(len(rod.joints)),
+            rod.id, rod.family, *map(_mm, (rod.offset, rod.start, rod.end, rod.length)), str(len(rod.joints)),
             *map(_mm, rod.flat.ravel()), final if ends is not None else "",
             *([""] * 6 if ends is None else map(_mm, ends.ravel())),
             "; ".join(f"{other} {_mm(at)}" for other, at in sorted(rod.joints, key=lambda joint: joint[1])),
@@ -46,31 +46,28 @@ def joints_csv(archive: Archive) -> str:
     rods, final = rods_of(archive), archive.final
     rows = []
     for joint in joints_of(rods):
-        pair = rods[joint.rods[0]], rods[joint.rods[1]]
-        point, flat_deg = pair[0].point(joint.at[0]), _degrees(*(rod.flat[1] - rod.flat[0] for rod in pair))
-        where = [_on(archive, rod, at, final) for rod, at in zip(pair, joint.at, strict=True)] if final else []
-        if any(each is None for each in where):
-            where = []
-        space = [(x, t) for x, t in filter(None, where)]
-        rows.append([
-            joint.id, pair[0].id, pair[1].id, *map(_mm, joint.at), *map(_mm, point), final if space else "",
-            *(map(_mm, space[0][0]) if space else [""] * 3), f"{flat_deg:.4f}",
-            f"{_degrees(space[0][1], space[1][1]):.4f}" if space else "",
-        ])  # fmt: skip
+        a, b = (rods[k] for k in joint.rods)
+        flat_angle = _degrees(a.flat[1] - a.flat[0], b.flat[1] - b.flat[0])
+        on_a, on_b = (_on(archive, rod, at, final) for rod, at in zip((a, b), joint.at, strict=True))
+        space = [final or "", *map(_mm, on_a[0])] if on_a else [""] * 4
+        final_angle = f"{_degrees(on_a[1], on_b[1]):.4f}" if on_a and on_b else ""
+        flat = [*map(_mm, joint.at), *map(_mm, a.point(joint.at[0]))]
+        rows.append([joint.id, a.id, b.id, *flat, *space, f"{flat_angle:.4f}", final_angle])
     return _csv(_JOINT_COLUMNS, rows)
 
 
-def _on(archive: Archive, rod: RodRecord, at: float, state: str) -> tuple[Floats, Floats] | None:
+def _on(archive: Archive, rod: RodRecord, at: float, state: str | None) -> tuple[Floats, Floats] | None:
     """Position [m] and unit tangent of a rod at the distance `at` [m] of the flat rod from its start."""
-    if len(rod.nodes) < 2 or "flat" not in archive.states:
+    if state is None or len(rod.nodes) < 2 or "flat" not in archive.states:
         return None
     flat, x = archive.states["flat"][rod.nodes], archive.states[state][rod.nodes]
     stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(flat, axis=0), axis=1))])
-    position = np.array([np.interp(at, stations, x[:, axis]) for axis in range(3)])
-    step = 0.5 * np.diff(stations).min()  # within the edges on both sides
-    around = [np.array([np.interp(at + side, stations, x[:, axis]) for axis in range(3)]) for side in (-step, step)]
-    tangent = around[1] - around[0]
-    return position, tangent / np.linalg.norm(tangent)
+    step = 0.5 * np.diff(stations).min()  # stays within the edges on both sides
+    before, position, after = (
+        np.array([np.interp(s, stations, x[:, axis]) for axis in range(3)])
+        for s in (at - step, at, at + step)
+    )
+    return position, (after - before) / np.linalg.norm(after - before)
 
 
 def _ends(rod: RodRecord, positions: Floats) -> Floats | None:
@@ -84,7 +81,8 @@ def _degrees(a: Floats, b: Floats) -> float:
 
 
 def _mm(value: float | None) -> str:
-    return "" if value is None or not np.isfinite(value) else f"{1e3 * value + 0.0:.3f}".replace("-0.000", "0.000")
+    """A length [m] in mm to 0.001 mm; without a minus before a zero."""
+    return "" if value is None else f"{round(1e3 * value, 3) + 0.0:.3f}"
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -1,6 +1,7 @@
 """Writing SVG: elements with escaped attributes and text, and short numbers."""
 
-from xml.sax.saxutils import escape, quoteattr
+from html import escape
+from typing import Any
 
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
 
@@ -13,17 +14,17 @@ def number(value: float, digits: int = 2) -> str:
     return "0" if text == "-0" else text
 
 
-def tag(name: str, *children: str, **attributes: str | float) -> str:
-    """An element; `children` are markup, attribute names take - for _ (and lose one at their end)."""
+def tag(name: str, *children: str, **attributes: Any) -> str:
+    """An element; `children` are markup, attribute names take - for _."""
     words = [name]
     for key, value in attributes.items():
         shown = value if isinstance(value, str) else number(value, 3)
-        words.append(f"{key.rstrip('_').replace('_', '-')}={quoteattr(shown)}")
+        words.append(f'{key.replace("_", "-")}="{escape(shown)}"')
     opening = " ".join(words)
     return f"<{opening}>{''.join(children)}</{name}>" if children else f"<{opening}/>"
 
 
-def label(text: str, x: float, y: float, size: float, **attributes: str | float) -> str:
+def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:
     """One line of text with its baseline at (x, y)."""
     return tag("text", escape(text), x=x, y=y, font_size=size, **attributes)
 

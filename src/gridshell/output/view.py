@@ -52,6 +52,8 @@ class View:
 
     def depth(self, points: Floats) -> Floats:
         """(n,) nearness of the points to the eye, 0 (far) to 1 (near)."""
+        if not len(points):
+            return np.empty(0)
         nearness = points @ TOWARDS
         return np.asarray((nearness - nearness.min()) / max(np.ptp(nearness), 1e-12))
 
@@ -61,7 +63,9 @@ def ground_axes(view: View, colour: str, text: float) -> str:
     (x0, y0, z0), (x1, y1, z1) = view.low, view.high
     corner = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])
     outline = " ".join(f"{number(x)},{number(y)}" for x, y in view.project(corner))
-    parts = [tag("polygon", points=outline, fill="none", stroke=colour, stroke_width=0.8, stroke_opacity=0.45)]
+    parts = [
+        tag("polygon", points=outline, fill="none", stroke=colour, stroke_width=0.8, stroke_opacity=0.45)
+    ]
     span = 0.02 * max(x1 - x0, y1 - y0)
     along_x = [np.array([1e-3 * t, y0, z0]) for t in nice_ticks(1e3 * x0, 1e3 * x1, 5)]
     along_y = [np.array([x1, 1e-3 * t, z0]) for t in nice_ticks(1e3 * y0, 1e3 * y1, 5)]
@@ -73,7 +77,10 @@ def ground_axes(view: View, colour: str, text: float) -> str:
         parts.append(label(f"{name}, mm", x, y + 0.35 * text, text, text_anchor="middle", fill=colour))
     if z1 - z0 > span:
         foot, top = view.project(np.array([[x0, y0, z0], [x0, y0, z1]]))
-        parts += [_line(foot, top, colour), label("z, mm", top[0], top[1] - 0.8 * text, text, text_anchor="middle", fill=colour)]
+        parts += [
+            _line(foot, top, colour),
+            label("z, mm", top[0], top[1] - 0.8 * text, text, text_anchor="middle", fill=colour),
+        ]
         out = np.array([-0.6 * span, -0.6 * span, 0])
         parts += [_tick(view, p, out, p[2], colour, text) for p in along_z if p[2] > z0 + 0.05 * (z1 - z0)]
     return "".join(parts)

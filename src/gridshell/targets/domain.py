@@ -21,7 +21,7 @@ class Domain(Protocol):
         ...
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distance (n,) [m] of the points (n, 2), negative inside; its gradient (n, 2), Hessian (n, 2, 2)."""
+        """Signed distance (n,) of the points (n, 2) [m], negative inside; its gradient and Hessian."""
         ...
 
 
@@ -58,9 +58,9 @@ class EllipseDomain:
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
         axes = np.array([self.a, self.b])
-        # closest point: x_k = a_k^2 p_k / (a_k^2 + t) with sum (a_k p_k / (a_k^2 + t))^2 = 1; in s = t + min(a)^2
-        # the root is bracketed and the function convex, so Newton from the left end converges monotonically;
-        # off the axes by a hair, because the closest point to one on the long axis has two mirror images
+        # closest point: x_k = a_k^2 p_k / (a_k^2 + t) with sum (a_k p_k / (a_k^2 + t))^2 = 1;
+        # in s = t + min(a)^2 the root is bracketed and the function convex, so Newton from the left end
+        # converges monotonically; off the axes by a hair: on the long one a closest point has a mirror image
         p = np.maximum(np.abs(xy), 1e-12 * axes)
         low = np.min(axes) ** 2
         shift = axes**2 - low

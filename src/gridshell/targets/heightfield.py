@@ -32,8 +32,8 @@ class HeightField(Target):
     ----------
     formula : in x and y [m], such as "0.1 - 2*x^2 - y^2"; see `parse_formula`.
     function : instead of a formula: z(x, y) of arrays (n,). Made of arithmetic and numpy functions, it gets
-        exact derivatives (`Jet`); one that refuses jets gets central differences of fourth order, is called up
-        to 1.61 times the domain, and must be smooth there: creases in it go unnoticed.
+        exact derivatives (`Jet`). One that refuses jets gets central differences of fourth order, is called
+        up to 1.61 times the domain, and must be smooth there: creases in it go unnoticed.
     domain : centred on the origin.
 
     Raises

@@ -60,7 +60,7 @@ class Heights:
         total = np.asarray(jet.value + jet.dxx + jet.dyy)
         if isfinite(float(np.add.reduce(total, axis=None))):
             return jet
-        # 0/0 at a point of a smooth surface, as of sqrt(x^2 + y^2) in a cosine: step aside, and back by Taylor
+        # 0/0 at a point of a smooth surface, as cos(sqrt(x^2 + y^2)) has: step aside, and back by Taylor
         broken = np.flatnonzero(~np.isfinite(np.broadcast_to(total, x.shape)))
         h, k = NUDGE * self.size, 0.7 * NUDGE * self.size
         near = self._evaluate(x[broken] + h, y[broken] + k)

@@ -92,8 +92,8 @@ class Jet:
 
     __array__ = __bool__ = __float__ = __int__ = __len__ = __iter__ = _refuse
     __lt__ = __le__ = __gt__ = __ge__ = _refuse
-    __eq__ = __ne__ = _refuse  # type: ignore[assignment]
-    __hash__ = None
+    __eq__ = __ne__ = _refuse
+    __hash__ = None  # type: ignore[assignment]
 
 
 def _times(a: Part, b: Part) -> Part:

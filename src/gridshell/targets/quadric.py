@@ -113,7 +113,7 @@ class Cap(Hemisphere):
         return self.base_height
 
     @property
-    def size(self) -> float:  # type: ignore[override]
+    def size(self) -> float:
         """Half the width of the shell in plan [m]: the equator's, where the cap reaches below it."""
         return self.radius if self.base_height < 0 else max(self.plan.half_extent)
 

@@ -71,15 +71,15 @@ def trusted_region(heights: Heights, domain: Region, samples: Floats, name: str)
         if not np.all(np.isfinite(at).all(axis=0) & (np.hypot(at[3], at[4]) <= limit)):
             if not heights.exact:
                 raise InputError(
-                    f"{name} must be smooth to {BAND} times its domain, and it is not at {now:.2f} times: use a "
-                    "smaller domain, or arithmetic and numpy functions alone, which can be continued"
+                    f"{name} must be smooth to {BAND} times its domain, and is not at {now:.2f} times: use a "
+                    "smaller domain, or numpy functions alone, which can be continued"
                 )
             return grown(domain, float(before))
     return None
 
 
 def climb(heights: Heights, domain: Region) -> Floats:
-    """Points (n, 2) of the domain, its edge included, from which no step leads up; the highest is among them."""
+    """Points (n, 2) of the domain and its edge, from which no step leads up; the highest is among them."""
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent
     pitch = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)

@@ -23,7 +23,7 @@ class Implicit(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Signed distance (n,) to a surface [m], its gradient (n, 3), the outward normal, and its Hessian (n, 3, 3).
+    """Signed distance (n,) to a surface [m], its gradient, the outward normal (n, 3), and Hessian (n, 3, 3).
 
     On the surface the Hessian is the shape operator: 1/R in every tangent direction of a sphere.
     """
@@ -102,24 +102,50 @@ class Target(ABC):
         return Gap(np.zeros(len(x)), n, shape)
 
     def closest(self, x: Floats) -> Floats:
-        """Closest points (n, 3) of the continued surface [m]: Newton on y + F'(y) t = x, F(y) = 0."""
+        """Closest points (n, 3) of the continued surface [m]; a local minimum beyond a centre of curvature."""
         y = self.retract(x)
-        identity = np.eye(3)
-        for _ in range(30):
-            value, gradient, hessian = self.implicit(y)
-            square = np.einsum("ij,ij->i", gradient, gradient)
-            t = np.einsum("ij,ij->i", x - y, gradient) / square
-            system = np.empty((len(x), 4, 4))
-            system[:, :3, :3] = identity + t[:, None, None] * hessian
-            system[:, :3, 3] = system[:, 3, :3] = gradient
-            system[:, 3, 3] = 0.0
-            right = np.column_stack([x - y - t[:, None] * gradient, -value])
-            step = _solve(system, right)[:, :3]
+        settled = np.zeros(len(x), dtype=bool)
+        for _ in range(12):
+            step, convex = self._newton_to_closest(x, y, 0.0)
             length = np.linalg.norm(step, axis=1)
-            step *= np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
-            y = y + step
-            if np.max(length, initial=0.0) <= 1e-13 * self.size:
+            y = y + step * np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
+            settled = convex & (length <= 1e-13 * self.size)
+            if settled.all():
+                return y
+        left = np.flatnonzero(~settled)
+        y[left] = self._descend_to_closest(x[left])
+        return y
+
+    def _newton_to_closest(self, x: Floats, y: Floats, damping: float | Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """One step (n, 3) of Newton on y + F'(y) t = x, F(y) = 0; and whether the distance is convex at y."""
+        value, gradient, hessian = self.implicit(y)
+        square = np.einsum("ij,ij->i", gradient, gradient)
+        t = np.einsum("ij,ij->i", x - y, gradient) / square
+        bent = np.eye(3) * (1.0 + np.reshape(damping, (-1, 1, 1))) + t[:, None, None] * hessian
+        system = np.zeros((len(x), 4, 4))
+        system[:, :3, :3] = bent
+        system[:, :3, 3] = system[:, 3, :3] = gradient
+        right = np.column_stack([x - y - t[:, None] * gradient, -value])
+        both = np.einsum("nii->n", bent) - np.einsum("ni,nij,nj->n", gradient, bent, gradient) / square
+        convex = (np.linalg.det(system) < 0) & (both > 0)  # product and sum of the two tangential eigenvalues
+        return _solve(system, right)[:, :3], convex
+
+    def _descend_to_closest(self, x: Floats) -> Floats:
+        """The same with steps that are damped until they lead closer: for points beyond a centre of curvature."""
+        y = self.retract(x, 20)
+        damping = np.ones(len(x))
+        for _ in range(60):
+            step, convex = self._newton_to_closest(x, y, damping)
+            trial = self.retract(y + step)
+            nearer = convex & (np.linalg.norm(x - trial, axis=1) < np.linalg.norm(x - y, axis=1))
+            y[nearer] = trial[nearer]
+            damping = np.where(nearer, 0.1 * damping, 4.0 * damping + 0.1)
+            if np.all(~nearer & (damping > 1e3)):
                 break
+        for _ in range(2):  # comparing distances finds a minimum to half the digits only
+            step, convex = self._newton_to_closest(x, y, 0.0)
+            near = convex & (np.linalg.norm(step, axis=1) < 1e-3 * self.size)
+            y[near] += step[near]
         return y
 
     def gap(self, x: Floats) -> Gap:
@@ -130,30 +156,50 @@ class Target(ABC):
         return Gap(distance, n, _offset_shape(shape, distance))
 
     def contact(self, x: Floats) -> Gap:
-        """Signed distance (n,) to the body that a falling grid meets: the surface and the wall below its rim."""
+        """Signed distance (n,) to the body that a falling grid meets: surface, and wall below its rim."""
         y = self.closest(x)
         _, n, shape = self.on_surface(y)
         distance = np.einsum("ij,ij->i", x - y, n)
         hessian = _offset_shape(shape, distance)
-        below = np.flatnonzero(~(self.margin(y) >= 0))
-        if len(below):
-            distance[below], n[below], hessian[below] = self._wall(x[below])
+        ended = ~(self.margin(y) >= 0)
+        # under the surface the nearer of surface and wall counts; the wall stands under the base or the rim
+        under = np.flatnonzero((distance < 0) & (True if self.base is None else x[:, 2] < self.base))
+        ended[under] |= self.plan.distance(x[under, :2])[0] > distance[under]
+        if ended.any():
+            distance[ended], n[ended], hessian[ended] = self._wall(x[ended], distance[ended] > 0)
         return Gap(distance, n, hessian)
 
-    def _wall(self, x: Floats) -> Gap:
-        """The wall under the rim; above it, its upper corner."""
+    def _wall(self, x: Floats, over: NDArray[np.bool_]) -> Gap:
+        """The wall under the rim, or its upper corner; `over`: above the continued surface."""
         across, normal, bend = self.plan.distance(x[:, :2])
         foot = x[:, :2] - across[:, None] * normal
         rim = np.full(len(x), self.base) if self.base is not None else self.height(foot)
         n = np.column_stack([normal, np.zeros(len(x))])
         hessian = np.zeros((len(x), 3, 3))
         hessian[:, :2, :2] = bend
-        above = np.flatnonzero((x[:, 2] > rim) & (across > 0))
-        if len(above):  # in the corner's normal cone; a corner that a node slides over has no curvature
-            apart = np.column_stack([across[above, None] * normal[above], x[above, 2] - rim[above]])
+        above = np.where(across > 0, x[:, 2] > rim, over & (self.base is None))
+        if above.any():  # a corner that a node slides over has no curvature
+            apart = x[above] - self._nearest_of_rim(x[above], foot[above])
             far = np.linalg.norm(apart, axis=1)
-            across[above], n[above], hessian[above] = far, apart / far[:, None], 0.0
+            across[above], n[above], hessian[above] = far, apart / np.maximum(far, 1e-300)[:, None], 0.0
         return Gap(across, n, hessian)
+
+    def _nearest_of_rim(self, x: Floats, foot: Floats) -> Floats:
+        """Points (n, 3) of the rim closest to x; `foot` (n, 2) is closest in plan, which a level rim keeps."""
+        if self.base is not None:
+            return np.column_stack([foot, np.full(len(x), self.base)])
+        for _ in range(12):  # Gauss-Newton along the rim: an error shrinks by distance over radius
+            normal = self.plan.distance(foot)[1]
+            along = np.column_stack([-normal[:, 1], normal[:, 0]])
+            on_rim = np.column_stack([foot, self.height(foot)])
+            gradient = self.implicit(on_rim).gradient
+            rise = -np.einsum("ij,ij->i", gradient[:, :2], along) / gradient[:, 2]
+            tangent = np.column_stack([along, rise])
+            slide = np.einsum("ij,ij->i", x - on_rim, tangent) / (1.0 + rise**2)
+            foot = foot + slide[:, None] * along
+            across, normal, _ = self.plan.distance(foot)
+            foot = foot - across[:, None] * normal
+        return np.column_stack([foot, self.height(foot)])
 
     def lift(self, xy: Floats) -> Floats:
         """Points (n, 3) of the surface over the plan points (n, 2).

@@ -1,0 +1,91 @@
+"""Numbers as they stand in a report, with their units."""
+
+from collections.abc import Sequence
+from math import isfinite, pi
+from typing import Any
+
+UNKNOWN = "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+
+CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of the case, by its key
+    **dict.fromkeys(("radius", "height", "base", "size", "a", "b", "c", "spacing", "length"), (1e3, "mm")),
+    **dict.fromkeys(("edge", "offset", "thickness", "width"), (1e3, "mm")),
+    **dict.fromkeys(("EI", "EI1", "EI2", "GJ"), (1.0, "N m\N{SUPERSCRIPT TWO}")),
+    **dict.fromkeys(("mass", "mass_per_length"), (1.0, "kg/m")),
+    "EA": (1.0, "N"),
+    "youngs_modulus": (1e-6, "MPa"),
+    "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
+    "rotate": (180 / pi, "\N{DEGREE SIGN}"),
+}
+NAMES = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio"}
+
+
+def millimetres(metres: float | None, digits: int = 3) -> str:
+    """A length [m] in mm with about `digits` significant digits, 0.001 mm at the finest."""
+    if metres is None or not isfinite(metres):
+        return UNKNOWN
+    value = 1e3 * metres
+    if value and abs(value) < 1e-3:
+        return "under 0.001 mm"
+    whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
+    return f"{value:.{min(max(digits - whole, 0), 3)}f} mm"
+
+
+def percent(share: float | None) -> str:
+    """A share as a percentage with two significant digits."""
+    return UNKNOWN if share is None or not isfinite(share) else f"{100 * share:.2g} %"
+
+
+def newtons(force: float) -> str:
+    return f"{force:.1e} N"
+
+
+def seconds(time: float) -> str:
+    return f"{time:.2f} s"
+
+
+def degrees(angle: float) -> str:
+    return f"{angle:.1f}\N{DEGREE SIGN}"
+
+
+def small(value: float) -> str:
+    return f"{value:.1e}"
+
+
+def place(point: Sequence[float | None]) -> str:
+    """A point (3,) [m] in mm."""
+    known = [round(1e3 * x, 1) + 0.0 for x in point if x is not None]
+    return ", ".join(f"{x:.1f}".replace("-", MINUS) for x in known) + " mm" if len(known) == 3 else UNKNOWN
+
+
+def yes_or_no(value: object) -> str:
+    return "yes" if value else "no"
+
+
+def plain(value: object) -> str:
+    """A value of which no more is known than that it was recorded."""
+    return UNKNOWN if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def case_rows(table: object) -> list[tuple[str, str]]:
+    """The entries of a table of the case, in the units of a drawing."""
+    if not isinstance(table, dict):
+        return []
+    return [
+        (NAMES.get(key, key.replace("_", " ")), _case_value(key, value))
+        for key, value in table.items()
+        if value is not None and not isinstance(value, dict)
+    ]
+
+
+def _case_value(key: str, value: Any) -> str:
+    if isinstance(value, list | tuple):
+        between = ", " if key == "offset" else " \N{MULTIPLICATION SIGN} "
+        return between.join(_case_value(key, item) for item in value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    factor, unit = CASE_UNITS.get(key, (1.0, ""))
+    if key == "youngs_modulus" and value >= 1e8:
+        factor, unit = 1e-9, "GPa"
+    shown = f"{factor * value:.5g}".replace("-", MINUS)
+    return f"{shown}{unit}" if unit == "\N{DEGREE SIGN}" else f"{shown} {unit}".strip()

@@ -1,0 +1,485 @@
+"""What is written: every file tells the same lengths, is well formed, and replaces nothing but a result."""
+
+import csv
+import io
+import json
+import os
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+from sample_archive import sample_archive, table_archive
+
+from gridshell.errors import OutputError
+from gridshell.output import Archive, check_folder, picture_svg, read, write
+from gridshell.output import folder as folder_module
+from gridshell.output.labels import place
+from gridshell.output.plan import flat_plan
+
+TOLERANCE = 0.01  # mm: a tenth of what a saw or a laser holds
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def archive() -> Archive:
+    return sample_archive()
+
+
+@pytest.fixture(scope="module")
+def out(archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(archive, tmp_path_factory.mktemp("results") / "dome")
+
+
+@pytest.fixture(scope="module")
+def table_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(table_archive(), tmp_path_factory.mktemp("results") / "table")
+
+
+def rows(out: Path, name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO((out / "schedule" / name).read_text())))
+
+
+def layer(out: Path, kind: str, name: str) -> list:
+    return list(ezdxf.readfile(out / "drawings/plan.dxf").modelspace().query(f'{kind}[layer=="{name}"]'))
+
+
+def svg_rods(out: Path) -> dict[str, np.ndarray]:
+    """Ends (2, 2) of each rod in the SVG [mm], y up again."""
+    root = ET.parse(out / "drawings/plan.svg").getroot()
+    ends = {}
+    for line in root.iter(f"{SVG}line"):
+        if "data-rod" in line.attrib:
+            points = [[float(line.attrib[f"{axis}{k}"]) for axis in "xy"] for k in "12"]
+            ends[line.attrib["data-rod"]] = np.array(points) * (1, -1)
+    return ends
+
+
+def test_the_folder_holds_what_the_design_lists(out: Path, table_out: Path) -> None:
+    files = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
+    models = {f"model/{s}.{e}" for s in ("draped", "popped_pinned", "popped_clamped") for e in ("obj", "vtp")}
+    plain = {"result.json", "states.npz", "drawings/plan.svg", "drawings/plan.dxf", "schedule/rods.csv",
+             "schedule/joints.csv", "report.html"}  # fmt: skip
+    assert files == plain | models | {"case.toml"}
+    files = {str(path.relative_to(table_out)) for path in table_out.rglob("*") if path.is_file()}
+    assert files == plain | {"model/popped_pinned.obj", "model/popped_pinned.vtp"}
+
+
+@pytest.mark.parametrize("which", ["out", "table_out"])
+def test_cut_lengths_agree_in_every_file(which: str, request: pytest.FixtureRequest) -> None:
+    out = request.getfixturevalue(which)
+    result = {rod["id"]: 1e3 * rod["length"] for rod in json.loads((out / "result.json").read_text())["rods"]}
+    schedule = {row["id"]: float(row["length_mm"]) for row in rows(out, "rods.csv")}
+    svg = {name: float(np.linalg.norm(ends[1] - ends[0])) for name, ends in svg_rods(out).items()}
+    dxf = [line.dxf.start.distance(line.dxf.end) for line in layer(out, "LINE", "CUT")]
+    assert schedule.keys() == svg.keys() == result.keys()
+    assert len(dxf) == len(result)
+    for (name, length), drawn in zip(result.items(), dxf, strict=True):
+        assert schedule[name] == pytest.approx(length, abs=TOLERANCE)
+        assert svg[name] == pytest.approx(length, abs=TOLERANCE)
+        assert drawn == pytest.approx(length, abs=TOLERANCE)
+    assert (
+        len({round(length, 1) for length in result.values()}) > 2
+    )  # rods that differ, or swaps would not show
+
+
+def test_lines_lie_where_the_flat_state_has_its_ends(out: Path, archive: Archive) -> None:
+    nodes = np.split(archive.states["rod_nodes"], archive.states["rod_start"][1:])
+    svg, dxf = svg_rods(out), layer(out, "LINE", "CUT")
+    for rod, own, line, row in zip(archive.result["rods"], nodes, dxf, rows(out, "rods.csv"), strict=True):
+        ends = 1e3 * archive.states["flat"][own[[0, -1]], :2]
+        np.testing.assert_allclose(svg[rod["id"]], ends, atol=TOLERANCE)
+        np.testing.assert_allclose([line.dxf.start.vec2, line.dxf.end.vec2], ends, atol=TOLERANCE)
+        flat = [float(row[f"flat_{axis}{k}_mm"]) for k in "01" for axis in "xy"]
+        np.testing.assert_allclose(flat, ends.ravel(), atol=TOLERANCE)
+        final = [float(row[f"final_{axis}{k}_mm"]) for k in "01" for axis in "xyz"]
+        np.testing.assert_allclose(
+            final, 1e3 * archive.states["popped_clamped"][own[[0, -1]]].ravel(), atol=TOLERANCE
+        )
+        assert row["final_state"] == "popped_clamped"
+
+
+@pytest.mark.parametrize("which", ["out", "table_out"])
+def test_joint_marks_of_both_rods_coincide(which: str, request: pytest.FixtureRequest) -> None:
+    out = request.getfixturevalue(which)
+    lines = svg_rods(out)
+    circles = np.array([mark.dxf.center.vec2 for mark in layer(out, "CIRCLE", "MARK")])
+    names = {text.dxf.text for text in layer(out, "TEXT", "LABEL-JOINTS")}
+    joints = rows(out, "joints.csv")
+    assert len(joints) == len(circles) == len(names) > 3
+    for row, circle in zip(joints, circles, strict=True):
+        for side in "ab":
+            start, end = lines[row[f"rod_{side}"]]
+            mark = start + float(row[f"at_{side}_mm"]) * (end - start) / np.linalg.norm(end - start)
+            np.testing.assert_allclose(mark, circle, atol=TOLERANCE)
+        assert row["id"] in names
+    listed = {
+        row["id"]: dict(re.findall(r"([^;]+) (\S+?)(?:; |$)", row["joints_at_mm"]))
+        for row in rows(out, "rods.csv")
+    }
+    assert all(listed[row["rod_b"]][row["rod_a"]] == row["at_b_mm"] for row in joints)
+    assert sum(map(len, listed.values())) == 2 * len(joints)
+
+
+def test_joints_in_space_lie_on_the_final_state(out: Path, archive: Archive) -> None:
+    rod_nodes = np.split(archive.states["rod_nodes"], archive.states["rod_start"][1:])
+    nodes = {rod["id"]: own for rod, own in zip(archive.result["rods"], rod_nodes, strict=True)}
+    for row in rows(out, "joints.csv"):
+        (shared,) = np.intersect1d(nodes[row["rod_a"]], nodes[row["rod_b"]])
+        final = [float(row[f"final_{axis}_mm"]) for axis in "xyz"]
+        np.testing.assert_allclose(final, 1e3 * archive.states["popped_clamped"][shared], atol=TOLERANCE)
+        assert float(row["flat_deg"]) == pytest.approx(90.0)
+
+
+def test_opening_angle_matches_the_map_of_the_dome(out: Path) -> None:
+    """The sample's meridians keep their length and its circles shrink by sin(a)/a: the angle is known."""
+    row = next(row for row in rows(out, "joints.csv") if row["id"] == "U07/V07")
+    x, y = float(row["flat_x_mm"]), float(row["flat_y_mm"])
+    angle = np.hypot(x, y) / 200
+    meridian, circle = (
+        np.array([x, y]) / np.hypot(x, y),
+        np.array([-y, x]) / np.hypot(x, y) * np.sin(angle) / angle,
+    )
+    u, v = (np.array([meridian[k], circle[k]]) for k in (0, 1))
+    expected = np.degrees(np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)))
+    assert expected < 85  # so that neither 90 degrees nor the supplement would pass
+    assert float(row["final_deg"]) == pytest.approx(
+        expected, abs=0.5
+    )  # chords of 12 mm; the shell is off by 0.1 %
+
+
+def test_opening_angle_of_skew_rods_is_that_of_their_directions(table_out: Path) -> None:
+    lines = svg_rods(table_out)
+    for row in rows(table_out, "joints.csv"):
+        a, b = (np.diff(lines[row[f"rod_{side}"]], axis=0)[0] for side in "ab")
+        expected = np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b)))
+        assert float(row["flat_deg"]) == pytest.approx(expected, abs=1e-3)
+        assert row["final_state"] == "popped_pinned"
+
+
+@pytest.mark.parametrize("which", ["out", "table_out"])
+def test_dxf_passes_its_audit(which: str, request: pytest.FixtureRequest) -> None:
+    drawing = ezdxf.readfile(request.getfixturevalue(which) / "drawings/plan.dxf")
+    audit = drawing.audit()
+    assert audit.errors == []
+    assert audit.fixes == []
+    assert drawing.header["$INSUNITS"] == 4  # mm
+    assert {entity.dxf.layer for entity in drawing.modelspace()} <= {each.dxf.name for each in drawing.layers}
+
+
+def test_dxf_has_both_boundaries(out: Path, archive: Archive) -> None:
+    (flat,) = layer(out, "LWPOLYLINE", "BOUNDARY-FLAT")
+    (final,) = layer(out, "POLYLINE", "BOUNDARY-FINAL")
+    assert flat.closed
+    assert final.is_closed
+    assert final.is_3d_polyline
+    footprint = np.array([point[:2] for point in flat.get_points()])
+    turns = np.unwrap(np.arctan2(footprint[:, 1], footprint[:, 0]))
+    assert np.all(np.diff(turns) > 0)
+    assert turns[-1] - turns[0] < 2 * np.pi  # once around
+    boundary = {tuple(np.round(vertex.dxf.location, 3)) for vertex in final.vertices}
+    assert boundary == {tuple(np.round(1e3 * np.array(point), 3)) for point in archive.result["boundary"]}
+
+
+def test_svg_is_at_true_scale(out: Path) -> None:
+    root = ET.parse(out / "drawings/plan.svg").getroot()
+    box = [float(value) for value in root.attrib["viewBox"].split()]
+    assert root.attrib["width"] == f"{box[2]:g}mm"
+    assert root.attrib["height"] == f"{box[3]:g}mm"
+    assert {text.text for text in root.iter(f"{SVG}text")} >= {"U01", "V09", "sample dome"}
+
+
+@pytest.mark.parametrize("count", [9, 21, 40])
+def test_labels_do_not_cover_each_other(count: int) -> None:
+    plan = flat_plan(sample_archive(count, 1))
+    boxes = [label.box(plan.text_size) for label in plan.labels]
+    low, high = np.array([box.min(axis=0) for box in boxes]), np.array([box.max(axis=0) for box in boxes])
+    apart = np.any(
+        (high[:, None] <= low + 1e-9) | (high <= low[:, None] + 1e-9), axis=-1
+    )  # all upright or level
+    assert np.all(apart | np.eye(len(boxes), dtype=bool))
+    assert {label.text for label in plan.labels} == {rod.id for rod in plan.rods}
+    assert len(boxes) > 3.6 * count  # nearly all at both ends
+
+
+def test_labels_keep_clear_of_skew_neighbours() -> None:
+    fan = np.array([[[0.0, 0.0], [np.cos(a), np.sin(a)]] for a in np.radians([10, 25, 40, 55, 205])])
+    labels = place([f"R{k}" for k in range(5)], fan, 0.08)
+    assert {label.text for label in labels} == {"R0", "R1", "R2", "R3", "R4"}
+    for k, one in enumerate(labels):
+        for other in labels[k + 1 :]:  # no sample point of one text lies in the other
+            corners, box = one.box(0.08), other.box(0.08)
+            weights = np.stack(np.meshgrid(*[np.linspace(0, 1, 30)] * 2), axis=-1).reshape(-1, 2)
+            points = corners[0] + weights @ (corners[[1, 3]] - corners[0])
+            inside = np.linalg.solve((box[[1, 3]] - box[0]).T, (points - box[0]).T)
+            assert not np.any(np.all((inside > 0.001) & (inside < 0.999), axis=0))
+
+
+def test_vtp_holds_lines_points_and_gaps(out: Path, archive: Archive) -> None:
+    piece = ET.parse(out / "model/popped_pinned.vtp").getroot().find("PolyData/Piece")
+    assert piece is not None
+    data = {
+        array.attrib["Name"]: np.array((array.text or "").split(), dtype=float)
+        for array in piece.iter("DataArray")
+    }
+    n, m = len(archive.states["flat"]), len(archive.result["rods"])
+    assert (piece.attrib["NumberOfPoints"], piece.attrib["NumberOfLines"]) == (str(n), str(m))
+    np.testing.assert_allclose(data["Points"].reshape(n, 3), archive.states["popped_pinned"], atol=1e-9)
+    np.testing.assert_allclose(data["gap"], archive.states["gap_pinned"], atol=1e-9)
+    np.testing.assert_array_equal(data["connectivity"], archive.states["rod_nodes"])
+    np.testing.assert_array_equal(
+        data["offsets"], [*archive.states["rod_start"][1:], len(archive.states["rod_nodes"])]
+    )
+    np.testing.assert_array_equal(data["rod"], np.arange(m))
+
+
+def test_obj_polylines_are_the_states(out: Path, archive: Archive) -> None:
+    words = [line.split() for line in (out / "model/popped_clamped.obj").read_text().splitlines()]
+    points = np.array([word[1:] for word in words if word[0] == "v"], dtype=float)
+    lines = [np.array(word[1:], dtype=int) - 1 for word in words if word[0] == "l"]
+    nodes = np.split(archive.states["rod_nodes"], archive.states["rod_start"][1:])
+    assert [word[1] for word in words if word[0] == "o"] == [rod["id"] for rod in archive.result["rods"]]
+    for line, own in zip(lines, nodes, strict=True):
+        np.testing.assert_allclose(points[line], archive.states["popped_clamped"][own], atol=1e-8)
+
+
+class References(HTMLParser):
+    """Everything in a page that a browser would fetch, and the tags left open."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found += [
+            f"{tag} {key}={value}"
+            for key, value in attrs
+            if key in ("src", "href", "xlink:href", "data", "action")
+        ]
+        if tag not in ("meta", "link", "br", "img"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("which", ["out", "table_out"])
+def test_report_needs_nothing_else(which: str, request: pytest.FixtureRequest) -> None:
+    page = (request.getfixturevalue(which) / "report.html").read_text()
+    parser = References()
+    parser.feed(page)
+    assert parser.found == []
+    assert parser.open == []
+    assert not re.search(r"https?://|@import|url\(", page)
+
+
+def test_report_gives_the_verdict_first(out: Path) -> None:
+    page = (out / "report.html").read_text()
+    verdict = page.index("Converged and stable")
+    assert verdict < page.index("<h2>")
+    assert "A support that holds the rod&#39;s direction (clamped) is worth it" in page
+    assert "Design aid, not code compliance" in page
+    assert page.count("<figure>") == 5
+    assert "kind = &#34;hemisphere&#34;" in page
+
+
+def test_report_puts_failure_and_warnings_before_all(archive: Archive, tmp_path: Path) -> None:
+    shells = {
+        "pinned": {"status": "stalled", "stable": False},
+        "clamped": {"status": "converged", "stable": False, "negative_modes": 1},
+    }
+    words = {"warnings": ["<script>alert(1)</script>"], "dropped": [{"id": "U99", "reason": "no two ends"}]}
+    result = {**archive.result, "status": "stalled", "pop_up": shells, **words}
+    page = (write(replace(archive, result=result), tmp_path / "bad") / "report.html").read_text()
+    assert "Converged and stable" not in page
+    assert (
+        page.index("&lt;script&gt;alert(1)") < page.index("Not converged: do not build") < page.index("<h2>")
+    )
+    assert "<script>alert" not in page
+    assert (
+        "With clamped ends the shell would snap away from this unstable equilibrium (1 buckling mode)."
+        in page
+    )
+    assert "With pinned ends the shell stays" not in page  # a shell that did not converge has no gap
+    assert "U99: no two ends" in page
+
+
+def test_no_name_breaks_a_page_or_a_drawing(tmp_path: Path) -> None:
+    plain = table_archive()
+    name = '"><script>x</script> & \N{GREEK SMALL LETTER ALPHA}'
+    archive = Archive({**plain.result, "name": name}, plain.states, "# </pre><script>x</script>")
+    out = write(archive, tmp_path / "named")
+    assert "<script>x" not in (out / "report.html").read_text()
+    root = ET.parse(out / "drawings/plan.svg").getroot()
+    assert name in {text.text for text in root.iter(f"{SVG}text")}
+    for state in ("flat", "popped_pinned"):
+        ET.fromstring(picture_svg(archive, state))
+    assert not ezdxf.readfile(out / "drawings/plan.dxf").audit().errors
+
+
+def test_least_result_is_written(tmp_path: Path) -> None:
+    """A result with nothing but rods (a run stopped early) still gives its files."""
+    full = sample_archive()
+    result = {key: full.result[key] for key in ("format", "version", "units", "rods")}
+    out = write(
+        Archive({**result, "status": "diverged"}, {"flat": full.states["flat"]}, ""), tmp_path / "least"
+    )
+    assert "Not converged" in (out / "report.html").read_text()
+    assert len(rows(out, "rods.csv")) == 18
+    assert rows(out, "joints.csv")[0]["final_deg"] == ""
+
+
+def test_pictures_share_view_and_scale(archive: Archive) -> None:
+    pictures = {state: picture_svg(archive, state) for state in ("draped", "popped_pinned", "popped_clamped")}
+    boxes = {re.search(r'viewBox="[^"]+"', svg)[0] for svg in pictures.values()}
+    assert len(boxes) == 1
+    for state, svg in pictures.items():
+        texts = [text.text for text in ET.fromstring(svg).iter(f"{SVG}text")]
+        assert "gap to target in mm, + outside" in texts
+        assert ("\N{MINUS SIGN}1.2 mm" in texts) == (state == "popped_pinned")
+    with pytest.raises(OutputError, match="popped_clamped"):
+        picture_svg(archive, "popped")
+
+
+def test_table_is_coloured_by_height() -> None:
+    assert "height in mm" in picture_svg(table_archive(), "popped_pinned")
+
+
+def test_report_of_60_by_60_rods_stays_below_5_megabytes(tmp_path: Path) -> None:
+    out = write(sample_archive(60, 6), tmp_path / "large")
+    assert (out / "report.html").stat().st_size < 5e6
+
+
+def test_read_gives_back_what_was_written(out: Path, archive: Archive) -> None:
+    again = read(out)
+    assert again.result == archive.result
+    assert again.case_toml == archive.case_toml
+    assert again.states.keys() == archive.states.keys()
+    for name, values in archive.states.items():
+        np.testing.assert_array_equal(again.states[name], values)
+        assert again.states[name].dtype == values.dtype
+
+
+def test_json_holds_no_nan(archive: Archive, tmp_path: Path) -> None:
+    result = {**archive.result, "net": {"error_estimate": np.nan, "min_angle_deg": np.float64("inf"),
+              "min_angle_at": np.array([np.nan, 0.0, 1.0])}, "count": np.int64(3)}  # fmt: skip
+
+    def refuse(word: str) -> None:
+        raise AssertionError(word)
+
+    text = (write(replace(archive, result=result), tmp_path / "nan") / "result.json").read_text()
+    stored = json.loads(text, parse_constant=refuse)
+    assert stored["net"] == {"error_estimate": None, "min_angle_deg": None, "min_angle_at": [None, 0.0, 1.0]}
+    assert stored["count"] == 3
+
+
+def test_the_same_archive_gives_the_same_bytes(archive: Archive, out: Path, tmp_path: Path) -> None:
+    again = write(archive, tmp_path / "again")
+    for path in out.rglob("*"):
+        if path.is_file():
+            assert path.read_bytes() == (again / path.relative_to(out)).read_bytes(), path.name
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_an_older_result_is_replaced_whole(
+    archive: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool
+) -> None:
+    if not at_once:
+        monkeypatch.setattr(folder_module, "_exchange", lambda one, other: False)
+    write(archive, tmp_path / "dome")
+    write(table_archive(), tmp_path / "dome")
+    assert read(tmp_path / "dome").result["name"] == "table of rods"
+    assert not (tmp_path / "dome/case.toml").exists()
+    assert os.listdir(tmp_path) == ["dome"]
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_a_failure_midway_leaves_the_old_result(
+    archive: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    write(archive, tmp_path / "dome")
+
+    def fail(*args: object, **kwargs: object) -> None:
+        raise error
+
+    monkeypatch.setattr(np, "savez_compressed", fail)
+    with pytest.raises(OutputError if isinstance(error, OSError) else KeyboardInterrupt):
+        write(table_archive(), tmp_path / "dome")
+    assert read(tmp_path / "dome").result["name"] == "sample dome"
+    assert os.listdir(tmp_path) == ["dome"]
+
+
+def test_a_failed_rename_brings_the_old_result_back(
+    archive: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(archive, tmp_path / "dome")
+    monkeypatch.setattr(folder_module, "_exchange", lambda one, other: False)
+    rename = Path.rename
+
+    def broken(self: Path, target: Path) -> Path:
+        if (self / "report.html").exists() and self.name.startswith(".dome-"):
+            raise OSError(5, "Input/output error")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", broken)
+    with pytest.raises(OutputError, match="Input/output error"):
+        write(table_archive(), tmp_path / "dome")
+    assert read(tmp_path / "dome").result["name"] == "sample dome"
+    assert os.listdir(tmp_path) == ["dome"]
+
+
+@pytest.mark.parametrize("content", [{"notes.txt": "mine"}, {"result.json": '{"format": "other"}'},
+                                     {"result.json": "[1"}])  # fmt: skip
+def test_a_foreign_folder_is_not_replaced(archive: Archive, tmp_path: Path, content: dict[str, str]) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for name, text in content.items():
+        (mine / name).write_text(text)
+    with pytest.raises(OutputError, match="holds no gridshell result"):
+        write(archive, mine)
+    assert {path.name: path.read_text() for path in mine.iterdir()} == content
+    assert os.listdir(tmp_path) == ["mine"]
+
+
+def test_an_empty_folder_is_used(archive: Archive, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert read(write(archive, tmp_path / "empty")).result["name"] == "sample dome"
+
+
+def test_where_nothing_can_be_written_is_said(
+    archive: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    for folder in ("file/dome", "file/a/b", "file"):
+        with pytest.raises(OutputError, match="is a file"):
+            write(archive, tmp_path / folder)
+    monkeypatch.chdir(tmp_path)
+    write(archive, "dome")
+    monkeypatch.chdir("dome")
+    with pytest.raises(OutputError, match="while working in it"):
+        write(archive, ".")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    with pytest.raises(OutputError, match="no permission"):
+        check_folder(tmp_path / "deep/er/dome")
+    assert sorted(os.listdir(tmp_path)) == ["dome", "file"]
+
+
+def test_reading_what_is_no_result_says_so(out: Path, tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="holds no gridshell result"):
+        read(tmp_path)
+    (tmp_path / "result.json").write_text('{"format": "gridshell-result", "version": 99}')
+    with pytest.raises(OutputError, match="version 99"):
+        read(tmp_path)
+    (tmp_path / "result.json").write_bytes((out / "result.json").read_bytes())
+    (tmp_path / "states.npz").write_bytes(b"PK broken")
+    with pytest.raises(OutputError, match="cannot read"):
+        read(tmp_path)
