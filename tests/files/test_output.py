@@ -18,7 +18,7 @@ from sample_archive import sample_archive, table_archive
 from gridshell.errors import OutputError
 from gridshell.output import Archive, check_folder, picture_svg, read, write
 from gridshell.output import folder as folder_module
-from gridshell.output.labels import place
+from gridshell.output.labels import boxes_meet, lines_meet, place
 from gridshell.output.plan import flat_plan
 
 TOLERANCE = 0.01  # mm: a tenth of what a saw or a laser holds
@@ -82,9 +82,7 @@ def test_cut_lengths_agree_in_every_file(which: str, request: pytest.FixtureRequ
         assert schedule[name] == pytest.approx(length, abs=TOLERANCE)
         assert svg[name] == pytest.approx(length, abs=TOLERANCE)
         assert drawn == pytest.approx(length, abs=TOLERANCE)
-    assert (
-        len({round(length, 1) for length in result.values()}) > 2
-    )  # rods that differ, or swaps would not show
+    assert len({round(length, 1) for length in result.values()}) > 2  # rods that differ, or swaps would not show
 
 
 def test_lines_lie_where_the_flat_state_has_its_ends(out: Path, archive: Archive) -> None:
@@ -97,9 +95,7 @@ def test_lines_lie_where_the_flat_state_has_its_ends(out: Path, archive: Archive
         flat = [float(row[f"flat_{axis}{k}_mm"]) for k in "01" for axis in "xy"]
         np.testing.assert_allclose(flat, ends.ravel(), atol=TOLERANCE)
         final = [float(row[f"final_{axis}{k}_mm"]) for k in "01" for axis in "xyz"]
-        np.testing.assert_allclose(
-            final, 1e3 * archive.states["popped_clamped"][own[[0, -1]]].ravel(), atol=TOLERANCE
-        )
+        np.testing.assert_allclose(final, 1e3 * archive.states["popped_clamped"][own[[0, -1]]].ravel(), atol=TOLERANCE)
         assert row["final_state"] == "popped_clamped"
 
 
@@ -118,8 +114,7 @@ def test_joint_marks_of_both_rods_coincide(which: str, request: pytest.FixtureRe
             np.testing.assert_allclose(mark, circle, atol=TOLERANCE)
         assert row["id"] in names
     listed = {
-        row["id"]: dict(re.findall(r"([^;]+) (\S+?)(?:; |$)", row["joints_at_mm"]))
-        for row in rows(out, "rods.csv")
+        row["id"]: dict(re.findall(r"([^;]+) (\S+?)(?:; |$)", row["joints_at_mm"])) for row in rows(out, "rods.csv")
     }
     assert all(listed[row["rod_b"]][row["rod_a"]] == row["at_b_mm"] for row in joints)
     assert sum(map(len, listed.values())) == 2 * len(joints)
@@ -147,9 +142,7 @@ def test_opening_angle_matches_the_map_of_the_dome(out: Path) -> None:
     u, v = (np.array([meridian[k], circle[k]]) for k in (0, 1))
     expected = np.degrees(np.arccos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)))
     assert expected < 85  # so that neither 90 degrees nor the supplement would pass
-    assert float(row["final_deg"]) == pytest.approx(
-        expected, abs=0.5
-    )  # chords of 12 mm; the shell is off by 0.1 %
+    assert float(row["final_deg"]) == pytest.approx(expected, abs=0.5)  # chords of 12 mm; the shell is off by 0.1 %
 
 
 def test_opening_angle_of_skew_rods_is_that_of_their_directions(table_out: Path) -> None:
@@ -198,12 +191,30 @@ def test_labels_do_not_cover_each_other(count: int) -> None:
     plan = flat_plan(sample_archive(count, 1))
     boxes = [label.box(plan.text_size) for label in plan.labels]
     low, high = np.array([box.min(axis=0) for box in boxes]), np.array([box.max(axis=0) for box in boxes])
-    apart = np.any(
-        (high[:, None] <= low + 1e-9) | (high <= low[:, None] + 1e-9), axis=-1
-    )  # all upright or level
+    apart = np.any((high[:, None] <= low + 1e-9) | (high <= low[:, None] + 1e-9), axis=-1)  # all upright or level
     assert np.all(apart | np.eye(len(boxes), dtype=bool))
     assert {label.text for label in plan.labels} == {rod.id for rod in plan.rods}
     assert len(boxes) > 3.6 * count  # nearly all at both ends
+
+
+def test_boxes_meet_by_the_axes_of_both() -> None:
+    level = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
+    diamond = np.array([[0.0, -0.5], [0.5, 0.0], [0.0, 0.5], [-0.5, 0.0]])  # its tips reach over a corner's sides
+    apart, meeting = diamond + (2.3, 1.3), diamond + (2.2, 1.2)
+    for one, other in ((level, apart), (apart, level)):
+        assert not boxes_meet(one, other[None])
+    for one, other in ((level, meeting), (meeting, level)):
+        assert boxes_meet(one, other[None])
+    assert boxes_meet(level, np.array([apart, meeting]))
+    assert not boxes_meet(level, np.array([level + (2, 0), level + (0, 1)]))  # they touch
+
+
+def test_lines_meet_a_box_only_inside_it() -> None:
+    box = np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 2.0], [1.0, 2.0]])
+    through = np.array([[[0, 1.5], [4, 1.5]], [[2, 0], [2, 3]], [[0, 0], [4, 3]], [[1.5, 1.5], [2, 1.6]]], dtype=float)
+    past = np.array([[[0, 0.5], [4, 0.5]], [[3.5, 0], [3.5, 3]], [[0, 1.5], [0.9, 1.5]], [[0, 1.2], [1.2, 3]]])
+    assert all(lines_meet(box, line[None]) for line in through)
+    assert not lines_meet(box, past)
 
 
 def test_labels_keep_clear_of_skew_neighbours() -> None:
@@ -223,17 +234,14 @@ def test_vtp_holds_lines_points_and_gaps(out: Path, archive: Archive) -> None:
     piece = ET.parse(out / "model/popped_pinned.vtp").getroot().find("PolyData/Piece")
     assert piece is not None
     data = {
-        array.attrib["Name"]: np.array((array.text or "").split(), dtype=float)
-        for array in piece.iter("DataArray")
+        array.attrib["Name"]: np.array((array.text or "").split(), dtype=float) for array in piece.iter("DataArray")
     }
     n, m = len(archive.states["flat"]), len(archive.result["rods"])
     assert (piece.attrib["NumberOfPoints"], piece.attrib["NumberOfLines"]) == (str(n), str(m))
     np.testing.assert_allclose(data["Points"].reshape(n, 3), archive.states["popped_pinned"], atol=1e-9)
     np.testing.assert_allclose(data["gap"], archive.states["gap_pinned"], atol=1e-9)
     np.testing.assert_array_equal(data["connectivity"], archive.states["rod_nodes"])
-    np.testing.assert_array_equal(
-        data["offsets"], [*archive.states["rod_start"][1:], len(archive.states["rod_nodes"])]
-    )
+    np.testing.assert_array_equal(data["offsets"], [*archive.states["rod_start"][1:], len(archive.states["rod_nodes"])])
     np.testing.assert_array_equal(data["rod"], np.arange(m))
 
 
@@ -257,9 +265,7 @@ class References(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.found += [
-            f"{tag} {key}={value}"
-            for key, value in attrs
-            if key in ("src", "href", "xlink:href", "data", "action")
+            f"{tag} {key}={value}" for key, value in attrs if key in ("src", "href", "xlink:href", "data", "action")
         ]
         if tag not in ("meta", "link", "br", "img"):
             self.open.append(tag)
@@ -301,26 +307,21 @@ def test_report_puts_failure_and_warnings_before_all(archive: Archive, tmp_path:
     result = {**archive.result, "status": "stalled", "pop_up": shells, **words}
     page = (write(replace(archive, result=result), tmp_path / "bad") / "report.html").read_text()
     assert "Converged and stable" not in page
-    assert (
-        page.index("&lt;script&gt;alert(1)") < page.index("Not converged: do not build") < page.index("<h2>")
-    )
+    assert page.index("&lt;script&gt;alert(1)") < page.index("Not converged: do not build") < page.index("<h2>")
     assert "<script>alert" not in page
-    assert (
-        "With clamped ends the shell would snap away from this unstable equilibrium (1 buckling mode)."
-        in page
-    )
+    assert "With clamped ends the shell would snap away from this unstable equilibrium (1 buckling mode)." in page
     assert "With pinned ends the shell stays" not in page  # a shell that did not converge has no gap
     assert "U99: no two ends" in page
 
 
 def test_no_name_breaks_a_page_or_a_drawing(tmp_path: Path) -> None:
     plain = table_archive()
-    name = '"><script>x</script> & \N{GREEK SMALL LETTER ALPHA}'
+    name = '"><script>x</script> & \N{GREEK SMALL LETTER ALPHA}\x07'
     archive = Archive({**plain.result, "name": name}, plain.states, "# </pre><script>x</script>")
     out = write(archive, tmp_path / "named")
     assert "<script>x" not in (out / "report.html").read_text()
     root = ET.parse(out / "drawings/plan.svg").getroot()
-    assert name in {text.text for text in root.iter(f"{SVG}text")}
+    assert name.replace("\x07", " ") in {text.text for text in root.iter(f"{SVG}text")}
     for state in ("flat", "popped_pinned"):
         ET.fromstring(picture_svg(archive, state))
     assert not ezdxf.readfile(out / "drawings/plan.dxf").audit().errors
@@ -330,9 +331,7 @@ def test_least_result_is_written(tmp_path: Path) -> None:
     """A result with nothing but rods (a run stopped early) still gives its files."""
     full = sample_archive()
     result = {key: full.result[key] for key in ("format", "version", "units", "rods")}
-    out = write(
-        Archive({**result, "status": "diverged"}, {"flat": full.states["flat"]}, ""), tmp_path / "least"
-    )
+    out = write(Archive({**result, "status": "diverged"}, {"flat": full.states["flat"]}, ""), tmp_path / "least")
     assert "Not converged" in (out / "report.html").read_text()
     assert len(rows(out, "rods.csv")) == 18
     assert rows(out, "joints.csv")[0]["final_deg"] == ""
@@ -345,9 +344,24 @@ def test_pictures_share_view_and_scale(archive: Archive) -> None:
     for state, svg in pictures.items():
         texts = [text.text for text in ET.fromstring(svg).iter(f"{SVG}text")]
         assert "gap to target in mm, + outside" in texts
+        assert {"\N{MINUS SIGN}1", "0", "1"} <= set(texts[-4:-1])  # ticks of the scale that all share [mm]
         assert ("\N{MINUS SIGN}1.2 mm" in texts) == (state == "popped_pinned")
     with pytest.raises(OutputError, match="popped_clamped"):
         picture_svg(archive, "popped")
+
+
+def test_the_ring_is_where_the_agreement_found_the_largest_gap(archive: Archive) -> None:
+    """Between two nodes it may be larger than at either: picture and table give one number."""
+    between = {"pinned": {"max": 0.00135, "where": [0.0, 0.0, 0.2]}}
+    result = {**archive.result, "agreement": between}
+    root = ET.fromstring(picture_svg(replace(archive, result=result), "popped_pinned"))
+    texts = [text.text for text in root.iter(f"{SVG}text")]
+    assert "\N{MINUS SIGN}1.35 mm" in texts
+
+
+def test_fine_meshes_do_not_swell_a_picture() -> None:
+    coarse, fine = (len(picture_svg(sample_archive(30, edges), "popped_pinned")) for edges in (8, 80))
+    assert fine < 1.3 * coarse
 
 
 def test_table_is_coloured_by_height() -> None:
@@ -426,7 +440,7 @@ def test_a_failed_rename_brings_the_old_result_back(
     rename = Path.rename
 
     def broken(self: Path, target: Path) -> Path:
-        if (self / "report.html").exists() and self.name.startswith(".dome-"):
+        if (self / "report.html").exists() and self.name.startswith(".dome.gridshell-"):
             raise OSError(5, "Input/output error")
         return rename(self, target)
 
@@ -448,6 +462,16 @@ def test_a_foreign_folder_is_not_replaced(archive: Archive, tmp_path: Path, cont
         write(archive, mine)
     assert {path.name: path.read_text() for path in mine.iterdir()} == content
     assert os.listdir(tmp_path) == ["mine"]
+
+
+def test_what_a_killed_run_left_is_removed_later(archive: Archive, tmp_path: Path) -> None:
+    old, young, other = (tmp_path / name for name in (".dome.gridshell-a", ".dome.gridshell-b", ".dome.old-c"))
+    for left in (old, young, other):
+        (left / "model").mkdir(parents=True)
+    for left in (old, other):
+        os.utime(left, (1e9, 1e9))
+    write(archive, tmp_path / "dome")
+    assert {path.name for path in tmp_path.iterdir()} == {"dome", young.name, other.name}
 
 
 def test_an_empty_folder_is_used(archive: Archive, tmp_path: Path) -> None:

@@ -63,6 +63,8 @@ def bound_drape(
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
     warnings = list(net.warnings)
+    if not found.report.converged:
+        warnings += _tightest_bend(target, layout, found.state[on_target])
     if degrees(net.min_angle) < WARN_ANGLE:
         x, y, z = net.min_angle_at
         warnings.append(
@@ -120,6 +122,19 @@ def _nodes_on_target(mesh: GridMesh, cuts: list[FlatRod | None]) -> NDArray[np.i
             tiny = 1e-9 * cut.length
             chosen.append(mesh.nodes_of(k)[(s >= cut.start - tiny) & (s <= cut.end + tiny)])
     return np.unique(np.concatenate(chosen))
+
+
+def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[str]:
+    """Where the target curves too sharply for the spacing, which is what stops a bound drape that has a net."""
+    curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
+    k = int(np.argmax(curvature))
+    radius, (x, y, z) = 1.0 / curvature[k], points[k]
+    if radius > 2 * max(layout.spacing):
+        return []
+    return [
+        f"near ({x:.4g}, {y:.4g}, {z:.4g}) m the target's radius of curvature is {radius:.3g} m, the spacing "
+        f"{max(layout.spacing):.3g} m: a spacing below half of that radius would do"
+    ]
 
 
 def _own_ends(target: Target, mesh: GridMesh, cuts: list[FlatRod | None], positions: Floats) -> Floats:

@@ -7,8 +7,6 @@ fall short of the inextensible net: that is physics, and grows with the weight o
 """
 
 from dataclasses import replace
-from math import ceil, pi
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +15,7 @@ from gridshell.errors import InputError
 from gridshell.formfinding.draped import Draped, smallest_joint_angle
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
+from gridshell.nets import chebyshev_net
 from gridshell.model import Freedom, Shell
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
@@ -28,6 +27,7 @@ Floats = NDArray[np.float64]
 
 DEPTH = 1e-5  # of the size: deepest node inside the target
 CONTACT_UPDATES = 12
+OVERHANG = 4.0  # spacings that a rod of automatic length hangs over the target's end
 REFINE = 3.0  # edge length from level to level
 MOST_COLD, MOST_WARM = 300, 80
 SLIPPED = 0.2  # of the size: a joint of the axes that has moved so far from its vertical plane has slid off
@@ -49,7 +49,7 @@ def gravity_drape(
     top = target.lift(np.array([[x, y]]))[0]
     if target.margin(top[None])[0] <= 0:
         raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim")
-    grid = _grid(target, layout)
+    grid = _grid(target, layout, anchor)
     mesh, state, levels = None, None, list[SolveReport]()
     for edge in _edges(layout):
         coarse, mesh = mesh, mesh_grid(grid, edge, marks=_middle_marks(grid, layout))
@@ -64,10 +64,10 @@ def gravity_drape(
     inside = target.margin(state) > 0
     angle, where = smallest_joint_angle(mesh, state, inside)
     warnings = []
-    if levels[-1].converged and levels[-1].negative_modes:
+    if levels[-1].negative_modes:
         warnings.append(
-            f"the draped state is a saddle ({levels[-1].negative_modes} negative modes): without friction the grid "
-            'would slide off; method "bound" does not depend on this'
+            f"the draped state is a saddle or near one ({levels[-1].negative_modes} negative modes): without friction "
+            'the grid would slide off; method "bound" does not depend on this'
         )
     return Draped(
         method="gravity",
@@ -90,22 +90,17 @@ def gravity_drape(
     )
 
 
-def _grid(target: Target, layout: GridLayout) -> FlatGrid:
-    """The layout's grid; "auto" counts and lengths reach well past a quarter of the way around the target."""
-    reach = 0.5 * pi * max(target.size, float(np.ptp(target.height(_profile(target)))) if target.size else 0.0)
-    length = layout.length if layout.length != "auto" else 2 * reach + 4 * max(layout.spacing)
-    counts = layout.rods
-    if counts == "auto":
-        u, v = (2 * ceil(reach / spacing) + 1 for spacing in layout.spacing)
-        counts = (u, v)
-    return layout.flat_grid(counts, length)
-
-
-def _profile(target: Target) -> Floats:
-    """Plan points just inside the rim and at the summit: the target's height range."""
-    angle = np.linspace(0, 2 * pi, 33)[:-1]
-    rim = 0.7 * np.column_stack([np.cos(angle), np.sin(angle)]) * np.array(target.plan.half_extent)
-    return np.vstack([rim, np.array([target.summit])])
+def _grid(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> FlatGrid:
+    """The layout's grid; "auto" takes the lines that the net finds on the target, and lengths that hang over."""
+    if layout.rods != "auto" and layout.length != "auto":
+        return layout.flat_grid(layout.rods, layout.length)
+    net = chebyshev_net(target, layout, anchor=anchor)
+    rods = [rod for rod in net.rods if not rod.virtual]
+    if layout.length != "auto":
+        half = layout.length / 2
+        return FlatGrid.of([rod.cut(*(layout.middle(rod.family) + end for end in (-half, half))) for rod in rods])
+    over = OVERHANG * max(layout.spacing)
+    return FlatGrid.of([rod.cut(rod.start - over, rod.end + over) for rod in rods])
 
 
 def _edges(layout: GridLayout) -> list[float]:

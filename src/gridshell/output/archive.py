@@ -141,5 +141,5 @@ def _files(archive: Archive) -> dict[str, str]:
         if state in archive.states:
             files[f"model/{state}.obj"] = obj_text(archive, state)
             files[f"model/{state}.vtp"] = vtp_text(archive, state)
-    files["report.html"] = report_html(archive)
+    files["report.html"] = report_html(archive, plan)
     return files

@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,6 +15,7 @@ from gridshell.errors import OutputError
 
 FORMAT = "gridshell-result"
 VERSION = 1
+FORGOTTEN = 3600.0  # s; writing takes seconds, so an older temporary folder has lost its process
 
 
 def check_folder(folder: str | os.PathLike[str]) -> Path:
@@ -38,7 +40,8 @@ def replacing(folder: str | os.PathLike[str]) -> Iterator[Path]:
     path = check_folder(folder)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{path.name[:100]}-", dir=path.parent))
+        _sweep(path)
+        temporary = Path(tempfile.mkdtemp(prefix=_prefix(path), dir=path.parent))
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror}; choose another folder") from error
     try:
@@ -65,9 +68,7 @@ def read_json(path: Path) -> dict[str, Any]:
         raise OutputError(f'{path} is not a gridshell result: its "format" is not "{FORMAT}"')
     version = result.get("version")
     if not isinstance(version, int) or version > VERSION:
-        raise OutputError(
-            f"{path} has version {version}, this gridshell reads {VERSION}: install a newer one"
-        )
+        raise OutputError(f"{path} has version {version}, this gridshell reads {VERSION}: install a newer one")
     return result
 
 
@@ -75,16 +76,13 @@ def _check_replaceable(path: Path) -> None:
     if not path.is_dir():
         raise OutputError(f"cannot write {path}: it is a file; choose a folder")
     if Path.cwd().is_relative_to(path):
-        raise OutputError(
-            f"cannot replace {path} while working in it: choose a folder inside, or leave it first"
-        )
+        raise OutputError(f"cannot replace {path} while working in it: choose a folder inside, or leave it first")
     if any(path.iterdir()):
         try:
             read_json(path / "result.json")
         except OutputError as error:
             raise OutputError(
-                f"will not replace {path}: it is not empty and holds no gridshell result; "
-                "choose another folder"
+                f"will not replace {path}: it is not empty and holds no gridshell result; choose another folder"
             ) from error
 
 
@@ -102,7 +100,7 @@ def _take_place(temporary: Path, path: Path) -> None:
     if not path.exists():
         temporary.rename(path)
     elif not _exchange(temporary, path):
-        backup = Path(tempfile.mkdtemp(prefix=f".{path.name[:100]}-old-", dir=path.parent))
+        backup = Path(tempfile.mkdtemp(prefix=f".{path.name[:100]}.old-", dir=path.parent))
         path.rename(backup / path.name)
         try:
             temporary.rename(path)
@@ -122,6 +120,18 @@ def _exchange(one: Path, other: Path) -> bool:
         return False
     here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
     return bool(renameat2(here, os.fsencode(one), here, os.fsencode(other), exchange) == 0)
+
+
+def _sweep(path: Path) -> None:
+    """Remove what runs that were killed left beside `path`."""
+    for left in path.parent.iterdir():
+        with suppress(OSError):
+            if left.name.startswith(_prefix(path)) and time.time() - left.stat().st_mtime > FORGOTTEN:
+                shutil.rmtree(left)
+
+
+def _prefix(path: Path) -> str:
+    return f".{path.name[:100]}.gridshell-"
 
 
 def _umask() -> int:

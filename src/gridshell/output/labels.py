@@ -10,9 +10,7 @@ Floats = NDArray[np.float64]
 
 LETTER = 0.62  # width of a capital or digit over the text size
 LINE = 0.95  # height of a line of text over its size, a little air included
-LOWEST = np.radians(
-    -75.0
-)  # angle of a text: readable from below or from the right, also when somewhat steeper
+LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 NEAR, FAR = 14, 150  # places that are tried at an end: where no rod is covered either; at all
 
 
@@ -65,7 +63,7 @@ def _first_free(
         box = label.box(size)
         if step >= NEAR and not must:
             return None
-        if not _boxes_meet(box, boxes) and (step >= NEAR or not _lines_meet(box, rods)):
+        if not boxes_meet(box, boxes) and (step >= NEAR or not lines_meet(box, rods)):
             return label
     return next(_places(text, end, other, size))[0]
 
@@ -81,7 +79,7 @@ def _places(text: str, end: Floats, other: Floats, size: float) -> Iterator[tupl
         yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2), step
 
 
-def _boxes_meet(box: Floats, others: Floats) -> bool:
+def boxes_meet(box: Floats, others: Floats) -> bool:
     """Whether the rectangle (4, 2) covers a part of one of `others` (m, 4, 2): no axis separates them."""
     if not len(others):
         return False
@@ -92,7 +90,7 @@ def _boxes_meet(box: Floats, others: Floats) -> bool:
     return bool(np.any(~apart.any(axis=1)))
 
 
-def _lines_meet(box: Floats, lines: Floats) -> bool:
+def lines_meet(box: Floats, lines: Floats) -> bool:
     """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2)."""
     middle, sides = box.mean(axis=0), box[[1, 3]] - box[0]
     local = np.einsum("mpc,ac->mpa", lines - middle, sides / np.sum(sides**2, axis=1)[:, None])  # box: +-1/2

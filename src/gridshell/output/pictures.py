@@ -63,7 +63,7 @@ def picture_svg(archive: Archive, state: str) -> str:
         _supports(view, points[ends[~front]], state, len(ends)),
         *layers[half:],
         _supports(view, points[ends[front]], state, len(ends)),
-        "" if scale is None or GAPS[state] not in archive.states else _largest(view, points, scale),
+        "" if scale is None or GAPS[state] not in archive.states else _largest(archive, state, view, scale),
         "" if scale is None else colour_bar(scale, WIDTH, float(view.size[1]) + BELOW + BAR - 10, INK, SOFT),
     )
 
@@ -136,15 +136,20 @@ def _supports(view: View, ends: Floats, state: str, count: int) -> str:
     return tag("g", *dots, fill=fill, stroke=INK, stroke_width=0.4 * radius)
 
 
-def _largest(view: View, points: Floats, scale: Scale) -> str:
-    """A ring around the largest gap, and its size."""
-    gaps = np.nan_to_num(np.abs(scale.values))
-    node = int(np.argmax(gaps))
-    if gaps[node] <= FINEST:
+def _largest(archive: Archive, state: str, view: View, scale: Scale) -> str:
+    """A ring around the largest gap, and its size: the agreement's own, which also looks between the nodes."""
+    points, gaps = archive.states[state], np.nan_to_num(scale.values)
+    place, gap = points[int(np.argmax(np.abs(gaps)))], float(gaps[int(np.argmax(np.abs(gaps)))])
+    found = (archive.result.get("agreement") or {}).get(state.removeprefix("popped_")) or {}
+    if found.get("where") is not None and found.get("max") is not None:
+        place = np.array(found["where"], dtype=float)
+        nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
+        gap = float(np.copysign(1e3 * found["max"], gaps[nearest]))
+    if abs(gap) <= FINEST:
         return ""
-    x, y = view.project(points[node][None])[0]
+    x, y = view.project(place[None])[0]
     side, anchor = (-1, "end") if x > view.size[0] / 2 else (1, "start")
-    text = f"{scale.values[node]:+.3g} mm".replace("-", MINUS)
+    text = f"{gap:+.3g} mm".replace("-", MINUS)
 
     def words(**paint: str) -> str:
         return label(text, x + 9 * side, y - 7, 13, text_anchor=anchor, font_weight="600", **paint)

@@ -3,7 +3,7 @@
 from gridshell.output.archive import SHELLS, Archive
 from gridshell.output.figures import key_figures, levels_table, rods_table, supports_table
 from gridshell.output.pictures import picture_svg
-from gridshell.output.plan import NOTE, flat_plan
+from gridshell.output.plan import NOTE, FlatPlan
 from gridshell.output.plansvg import plan_svg
 from gridshell.output.svg import inline
 from gridshell.output.verdict import verdict
@@ -16,8 +16,8 @@ CAPTIONS = {
 }
 
 
-def report_html(archive: Archive) -> str:
-    """The whole page."""
+def report_html(archive: Archive, plan: FlatPlan) -> str:
+    """The whole page; `plan` is the archive's."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -28,7 +28,7 @@ def report_html(archive: Archive) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    plan, result = flat_plan(archive), archive.result
+    result = archive.result
     shown = [state for state in CAPTIONS if state in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,

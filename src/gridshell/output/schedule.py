@@ -44,11 +44,12 @@ def joints_csv(archive: Archive) -> str:
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines.
     """
     rods, final = rods_of(archive), archive.final
+    placed = [_joints_in_space(archive, rod, final) for rod in rods]
     rows = []
     for joint in joints_of(rods):
-        a, b = (rods[k] for k in joint.rods)
+        (i, j), (a, b) = joint.rods, (rods[k] for k in joint.rods)
         flat_angle = _degrees(a.flat[1] - a.flat[0], b.flat[1] - b.flat[0])
-        on_a, on_b = (_on(archive, rod, at, final) for rod, at in zip((a, b), joint.at, strict=True))
+        on_a, on_b = placed[i].get(b.id), placed[j].get(a.id)
         space = [final or "", *map(_mm, on_a[0])] if on_a else [""] * 4
         final_angle = f"{_degrees(on_a[1], on_b[1]):.4f}" if on_a and on_b else ""
         flat = [*map(_mm, joint.at), *map(_mm, a.point(joint.at[0]))]
@@ -56,18 +57,18 @@ def joints_csv(archive: Archive) -> str:
     return _csv(_JOINT_COLUMNS, rows)
 
 
-def _on(archive: Archive, rod: RodRecord, at: float, state: str | None) -> tuple[Floats, Floats] | None:
-    """Position [m] and unit tangent of a rod at the distance `at` [m] of the flat rod from its start."""
+def _joints_in_space(archive: Archive, rod: RodRecord, state: str | None) -> dict[str, tuple[Floats, Floats]]:
+    """Position (3,) [m] and a tangent (3,) of a rod at its joints, by the rod that is met; empty if not known."""
     if state is None or len(rod.nodes) < 2 or "flat" not in archive.states:
-        return None
+        return {}
     flat, x = archive.states["flat"][rod.nodes], archive.states[state][rod.nodes]
     stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(flat, axis=0), axis=1))])
+    at = np.array([at for _, at in rod.joints])
     step = 0.5 * np.diff(stations).min()  # stays within the edges on both sides
     before, position, after = (
-        np.array([np.interp(s, stations, x[:, axis]) for axis in range(3)])
-        for s in (at - step, at, at + step)
+        np.column_stack([np.interp(s, stations, x[:, axis]) for axis in range(3)]) for s in (at - step, at, at + step)
     )
-    return position, (after - before) / np.linalg.norm(after - before)
+    return {other: (position[k], after[k] - before[k]) for k, (other, _) in enumerate(rod.joints)}
 
 
 def _ends(rod: RodRecord, positions: Floats) -> Floats | None:

@@ -67,18 +67,12 @@ def _unstable(result: Mapping[str, Any]) -> list[str]:
 def _gaps(result: Mapping[str, Any]) -> list[str]:
     """How near the converged shells come to the target, and what the better support is."""
     shells, gaps = entries(result, "pop_up"), entries(result, "agreement")
-    known = [
-        ends
-        for ends in ENDS
-        if gaps.get(ends, {}).get("max") is not None and _converged(shells.get(ends, {}))
-    ]
+    known = [ends for ends in ENDS if gaps.get(ends, {}).get("max") is not None and _converged(shells.get(ends, {}))]
     words = []
     for ends in known:
         size = gaps[ends].get("max_relative")
         share = "" if size is None else f" ({percent(size)} of its size)"
-        words.append(
-            f"With {ends} ends the shell stays within {millimetres(gaps[ends]['max'])} of the target{share}."
-        )
+        words.append(f"With {ends} ends the shell stays within {millimetres(gaps[ends]['max'])} of the target{share}.")
     if len(known) == len(ENDS):
         words.append(_advice(gaps["clamped"], gaps["pinned"]))
     elif shells and not result.get("target"):

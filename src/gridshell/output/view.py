@@ -63,9 +63,7 @@ def ground_axes(view: View, colour: str, text: float) -> str:
     (x0, y0, z0), (x1, y1, z1) = view.low, view.high
     corner = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])
     outline = " ".join(f"{number(x)},{number(y)}" for x, y in view.project(corner))
-    parts = [
-        tag("polygon", points=outline, fill="none", stroke=colour, stroke_width=0.8, stroke_opacity=0.45)
-    ]
+    parts = [tag("polygon", points=outline, fill="none", stroke=colour, stroke_width=0.8, stroke_opacity=0.45)]
     span = 0.02 * max(x1 - x0, y1 - y0)
     along_x = [np.array([1e-3 * t, y0, z0]) for t in nice_ticks(1e3 * x0, 1e3 * x1, 5)]
     along_y = [np.array([x1, 1e-3 * t, z0]) for t in nice_ticks(1e3 * y0, 1e3 * y1, 5)]

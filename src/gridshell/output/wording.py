@@ -17,7 +17,7 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
     "rotate": (180 / pi, "\N{DEGREE SIGN}"),
 }
-NAMES = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio"}
+NAMES = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio", "size": "size, for relative gaps"}
 
 
 def millimetres(metres: float | None, digits: int = 3) -> str:

@@ -84,18 +84,14 @@ def parse_formula(text: str) -> Formula:
     if not isinstance(text, str):
         raise InputError(f"a formula must be text such as {shown('0.1 - 2*x^2 - y^2')}, not {shown(text)}")
     if len(text) > LONGEST:
-        raise InputError(
-            f"the formula has {len(text)} characters, and at most {LONGEST} are read: write a shorter one"
-        )
+        raise InputError(f"the formula has {len(text)} characters, and at most {LONGEST} are read: write a shorter one")
     source = " ".join(text.split())
     if not source:
         raise InputError(f"the formula is empty: write z in {ALLOWED}")
     if foreign := _FOREIGN.search(source):
         raise _refusal(text, foreign[0], FOREIGN.get(foreign[0]))
     if _nesting(source) > DEEPEST:
-        raise InputError(
-            f"formula {shown(text)}: more than {DEEPEST} parentheses in each other: write a simpler one"
-        )
+        raise InputError(f"formula {shown(text)}: more than {DEEPEST} parentheses in each other: write a simpler one")
     return _Compiler(text, source).formula()
 
 
@@ -139,9 +135,7 @@ class _Compiler:
                 f"formula {shown(self.text)} cannot be read {where}: use {ALLOWED}; a product needs its *"
             ) from None
         except (ValueError, MemoryError, RecursionError):
-            raise InputError(
-                f"formula {shown(self.text)} is nested too deeply: write a simpler one"
-            ) from None
+            raise InputError(f"formula {shown(self.text)} is nested too deeply: write a simpler one") from None
 
     def _walk(self, root: ast.expr) -> _Operand:
         """Operands first, by a stack of our own: a long sum is a deep tree."""

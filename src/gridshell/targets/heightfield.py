@@ -117,7 +117,9 @@ def _takes_jets(function: Callable[[Any, Any], Any], size: float) -> bool:
     x, y = 0.3 * size * np.array([[0.1, 0.5, -0.7, 0.2, -0.3], [0.6, -0.4, -0.2, 0.3, 0.5]])
     with np.errstate(all="ignore"):
         try:
-            plain = np.broadcast_to(np.asarray(function(x.copy(), y.copy()), dtype=float), x.shape)
+            plain = np.broadcast_to(np.asarray(function(x.copy(), y.copy())), x.shape)
+            if plain.dtype.kind not in "fiu":
+                raise TypeError("its heights are no real numbers")
         except Exception as reason:
             raise InputError(
                 f"{_qualified_name(function)}(x, y) fails with arrays of plan coordinates ({reason}): "

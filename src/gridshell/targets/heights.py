@@ -13,10 +13,8 @@ from gridshell.targets.jet import Jet, differences
 
 Floats = NDArray[np.float64]
 
-NUDGE = 1e-7  # of the size: far enough from a 0/0 for some digits of its curvature
-DIFFERENCE = (
-    2e-3  # of the size: step of the differences; truncation and round-off both some 1e-10 in curvature
-)
+NUDGE = 1e-5  # of the size: a 0/0 leaves round-off of 1e-16 / (nudge size)^2 in curvature, Taylor hardly less
+DIFFERENCE = 2e-3  # of the size: step of the differences; truncation and round-off both some 1e-10 in curvature
 
 
 @dataclass(frozen=True)

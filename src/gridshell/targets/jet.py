@@ -187,9 +187,7 @@ def _multiply(a: Any, b: Any) -> Jet:
 
 def _divide(a: Any, b: Any) -> Jet:
     if b.__class__ is not Jet:
-        return Jet(
-            a.value / b, _over(a.dx, b), _over(a.dy, b), _over(a.dxx, b), _over(a.dxy, b), _over(a.dyy, b)
-        )
+        return Jet(a.value / b, _over(a.dx, b), _over(a.dy, b), _over(a.dxx, b), _over(a.dxy, b), _over(a.dyy, b))
     a = a if a.__class__ is Jet else Jet(a)
     g, r, s = b.value, b.dx, b.dy
     f = a.value / g

@@ -17,6 +17,7 @@ ROWS, COLUMNS = 65, 193  # of the lattice: some 3 mm apart on a target of 0.4 m
 STEEPEST = 1e3  # slope that counts as infinite (89.94 degrees)
 SHARPEST = 1e-2  # change of slope at a point that counts as a crease (0.6 degrees)
 SUSPECTS, HALVINGS = 64, 26  # pairs of neighbours searched for a crease; down to 1e-8 of their distance
+TIGHTEST = 1e-4  # of the size: a smaller radius of curvature counts as a crease
 BAND = 1.6  # half extents; the net is marched past the edge
 TAME = 4.0  # slope to which a formula is followed past the edge (76 degrees), or twice the steepest inside
 CLIMBERS = 500
@@ -45,6 +46,8 @@ def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str)
     """
     _refuse(samples.reshape(8, -1), domain, name)
     if heights.exact:  # differences round off a crease
+        tight = _tighten(heights, domain, samples.reshape(8, -1))
+        _refuse(tight, domain, name)
         p, q = _close_in(heights, samples)
         _refuse(p, domain, name)
         _refuse(q, domain, name)
@@ -52,9 +55,10 @@ def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str)
         room = 1.0 + np.hypot(p[3], p[4]) + np.hypot(q[3], q[4])
         step = np.abs(q[2] - p[2]) > 10 * apart * room
         crease = np.hypot(*(q[3:5] - p[3:5])) > SHARPEST * room
-        for bad, what in ((step, "a step"), (crease, "a crease")):
+        tip = _bend(tight) * heights.size > 1 / TIGHTEST
+        for at, bad, what in ((p, step, "a step"), (p, crease, "a crease"), (tight, tip, "a sharp point")):
             if bad.any():
-                x, y = _nearest_centre(p[:, bad], domain)
+                x, y = _nearest_centre(at[:, bad], domain)
                 raise InputError(
                     f"{name} has {what} at ({x:.4g}, {y:.4g}) m, and a target must be smooth: "
                     f"round it off (sqrt(u^2 + 0.01^2) for abs(u)), or use {_smaller(domain, x, y)}"
@@ -177,6 +181,26 @@ def _close_in(heights: Heights, at: Floats) -> tuple[Floats, Floats]:
         first = ~(_misfit(p, middle) < _misfit(middle, q))
         p, q = np.where(first, p, middle), np.where(first, middle, q)
     return p, q
+
+
+def _tighten(heights: Heights, domain: Region, at: Floats) -> Floats:
+    """Points (8, k) of strongest curvature nearby: a sharp point between the samples shows in its growth."""
+    a, b = domain.half_extent
+    at = at[:, np.argsort(_bend(at))[-SUSPECTS:]]
+    step = np.array([[i, j] for i in (0, 1, -1) for j in (0, 1, -1)], dtype=float)
+    reach = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)
+    while reach > 1e-6 * max(a, b):  # closer to a smooth 0/0 there is only round-off
+        xy = at[:2, None, :] + 0.5 * reach * step.T[:, :, None]
+        xy /= np.maximum(1.0, relative_radius(domain, *xy))
+        around = _look(heights, xy.reshape(2, -1)).reshape(8, len(step), -1)
+        best = np.argmax(_bend(around), axis=0)
+        at = np.take_along_axis(around, best[None, None, :], axis=1)[:, 0]
+        reach *= 0.6
+    return at
+
+
+def _bend(at: Floats) -> Floats:
+    return np.asarray(np.abs(at[5:]).max(axis=0))
 
 
 def _misfit(p: Floats, q: Floats) -> Floats:

@@ -162,9 +162,10 @@ class Target(ABC):
         distance = np.einsum("ij,ij->i", x - y, n)
         hessian = _offset_shape(shape, distance)
         ended = ~(self.margin(y) >= 0)
-        # under the surface the nearer of surface and wall counts; the wall stands under the base or the rim
-        under = np.flatnonzero((distance < 0) & (True if self.base is None else x[:, 2] < self.base))
-        ended[under] |= self.plan.distance(x[under, :2])[0] > distance[under]
+        # beside the wall, which stands under the base or the rim, the nearer of surface and wall counts
+        low = np.flatnonzero(distance < 0 if self.base is None else x[:, 2] < self.base)
+        across, from_surface = self.plan.distance(x[low, :2])[0], distance[low]
+        ended[low] |= np.where(from_surface < 0, across > from_surface, across < from_surface)
         if ended.any():
             distance[ended], n[ended], hessian[ended] = self._wall(x[ended], distance[ended] > 0)
         return Gap(distance, n, hessian)
