@@ -22,7 +22,6 @@ from gridshell.output.summary import summary_text
 from gridshell.rods.section import Rod
 from gridshell.targets import Target
 
-
 LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
 
 

@@ -58,9 +58,7 @@ def test_the_built_in_hemisphere_is_the_example_of_the_design(load: Any) -> None
         ("cap", {"kind": "cap", "radius": 0.25, "base": 0.1}, (17, 17)),
     ],
 )
-def test_built_in_cases_have_the_papers_values(
-    name: str, target: dict[str, object], rods: tuple[int, int]
-) -> None:
+def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, object], rods: tuple[int, int]) -> None:
     case = load_case(name)
     assert case.target.model_dump() == target
     assert case.layout.model_dump() == {

@@ -128,9 +128,7 @@ def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
 
 
 @pytest.mark.parametrize("key", list(case_keys()))
-def test_each_option_reaches_its_key(
-    key: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_each_option_reaches_its_key(key: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     assert f"{key} = " in refused(capsys, "form", "hemisphere", f"--{key}", "no such value")
 
 
@@ -205,9 +203,7 @@ def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
     assert len(finder.calls) == 1
 
 
-def test_not_converged_saves_says_so_and_ends_with_3(
-    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_not_converged_saves_says_so_and_ends_with_3(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     finder.status = "stopped after 8 factorisations"
     assert main(["form", "hemisphere"]) == 3
     assert Path("out/hemisphere/case.toml").exists()
@@ -229,9 +225,7 @@ def test_a_bug_shows_its_traceback(finder: FakeFinder) -> None:
         main(["form", "hemisphere"])
 
 
-def test_json_is_the_result_and_nothing_else_on_stdout(
-    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_is_the_result_and_nothing_else_on_stdout(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["form", "hemisphere", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
         "out": str(Path("out/hemisphere").resolve()),
@@ -290,9 +284,7 @@ def test_a_table_may_be_separated_by_semicolons(finder: FakeFinder) -> None:
 
 
 @pytest.mark.parametrize("column", COLUMNS)
-def test_a_missing_column_is_named(
-    column: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missing_column_is_named(column: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     left = tuple("oops" if name == column else name for name in COLUMNS)
     table = write_table(Path("rods.csv"), CROSS, left)
     assert f"rods.csv: the column {column} is missing" in refused(capsys, "popup", table, "--unit", "m")
@@ -319,9 +311,7 @@ def test_a_bad_row_is_named_with_its_line(
     assert finder.calls == []
 
 
-@pytest.mark.parametrize(
-    ("ids", "message"), [(["A", "A"], 'the id "A" stands twice'), (["A", ""], "rod 2 has no id")]
-)
+@pytest.mark.parametrize(("ids", "message"), [(["A", "A"], 'the id "A" stands twice'), (["A", ""], "rod 2 has no id")])
 def test_ids_must_tell_rods_apart(
     ids: list[str], message: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -411,9 +401,7 @@ sys.exit(main(["form", "hemisphere"]))
 def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it() -> None:
     pty = pytest.importorskip("pty")
     ours, theirs = pty.openpty()
-    job = subprocess.Popen(
-        [sys.executable, "-c", WAITING], stderr=theirs, env={**os.environ, "TERM": "xterm"}
-    )
+    job = subprocess.Popen([sys.executable, "-c", WAITING], stderr=theirs, env={**os.environ, "TERM": "xterm"})
     os.close(theirs)
     said, deadline = b"", time.monotonic() + 20
     while b"residual 1.0e-04" not in said and time.monotonic() < deadline:

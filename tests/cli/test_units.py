@@ -73,9 +73,7 @@ def test_millimetres_are_rounded_once(number: object) -> None:
         ([1], "length", "not a number"),
     ],
 )
-def test_a_bad_quantity_is_one_sentence_with_key_reason_and_remedy(
-    value: object, kind: Kind, reason: str
-) -> None:
+def test_a_bad_quantity_is_one_sentence_with_key_reason_and_remedy(value: object, kind: Kind, reason: str) -> None:
     remedies = {"length": '"200 mm"', "stress": '"25 GPa"', "angle": '"45 deg"', "number": "0.5"}
     with pytest.raises(InputError) as caught:
         parse_quantity(value, kind, "target.radius")
@@ -88,7 +86,5 @@ def test_a_bad_quantity_is_one_sentence_with_key_reason_and_remedy(
 
 
 def test_the_message_shows_the_value_as_given() -> None:
-    with pytest.raises(
-        InputError, match=r'^rotate = "45 dg": unknown unit "dg" \(did you mean deg\?\); give an angle'
-    ):
+    with pytest.raises(InputError, match=r'^rotate = "45 dg": unknown unit "dg" \(did you mean deg\?\); give an angle'):
         parse_quantity("45 dg", "angle", "rotate")

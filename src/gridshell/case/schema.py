@@ -79,9 +79,7 @@ class EllipsoidTable(Table):
 class HeightFieldTable(Table):
     kind: Literal["heightfield"] = "heightfield"
     formula: str = Field(description='height z = f(x, y) in metres, such as "0.1 - 2*x**2 - y**2"')
-    domain: Literal["disc", "rectangle"] = Field(
-        default="disc", description="the plan, centred on the origin"
-    )
+    domain: Literal["disc", "rectangle"] = Field(default="disc", description="the plan, centred on the origin")
     radius: Length | None = Field(default=None, description="radius; of a height field: of its disc")
     size: Size | None = Field(default=None, description="width along x and depth along y of a rectangle")
 
@@ -110,17 +108,11 @@ class HeightFieldTable(Table):
 
 
 class LayoutTable(Table):
-    rods: Counts = Field(
-        default="auto", description='rods along x and y: 17x17, or "auto" for all that touch'
-    )
-    spacing: Lengths = Field(
-        default=(0.03, 0.03), description="between neighbouring rods: one length, or u,v"
-    )
+    rods: Counts = Field(default="auto", description='rods along x and y: 17x17, or "auto" for all that touch')
+    spacing: Lengths = Field(default=(0.03, 0.03), description="between neighbouring rods: one length, or u,v")
     length: LengthOrAuto = Field(default="auto", description='length of every rod before trimming, or "auto"')
     edge: Length = Field(default=0.005, description="longest edge of the mesh")
-    rotate: Angle = Field(
-        default=0.0, description="turn of the grid about the vertical through the target's centre"
-    )
+    rotate: Angle = Field(default=0.0, description="turn of the grid about the vertical through the target's centre")
     offset: Point = Field(default=(0.0, 0.0), description="shift x,y of the lattice against the axes")
 
     def build(self) -> "GridLayout":
@@ -171,20 +163,14 @@ class JointTable(Table):
 
 
 class DrapeTable(Table):
-    method: Literal["bound", "gravity"] = Field(
-        default="bound", description="slide on the target, or fall on it"
-    )
-    anchor: Point | None = Field(
-        default=None, description="point x,y where the axes cross; default: the highest"
-    )
+    method: Literal["bound", "gravity"] = Field(default="bound", description="slide on the target, or fall on it")
+    anchor: Point | None = Field(default=None, description="point x,y where the axes cross; default: the highest")
     gravity: Acceleration = Field(default=9.81, description="acceleration of gravity, for method gravity")
     height: Length = Field(default=0.05, description="height of a fall; an equilibrium does not depend on it")
 
 
 class PopUpTable(Table):
-    ends: Literal["pinned", "clamped", "both"] = Field(
-        default="both", description="how the rod ends are held"
-    )
+    ends: Literal["pinned", "clamped", "both"] = Field(default="both", description="how the rod ends are held")
 
 
 class Built(NamedTuple):

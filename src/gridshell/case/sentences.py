@@ -74,9 +74,7 @@ def _not_a_choice(key: CaseKey, value: object) -> str:
 def _nearest(path: str, keys: Mapping[str, CaseKey]) -> str | None:
     """The known key or table whose name looks most like this one: in the same table, else anywhere."""
     table, _, name = path.rpartition(".")
-    everywhere = {key.name: key.path for key in reversed(list(keys.values()))} | {
-        top: top for top in _inside("")
-    }
+    everywhere = {key.name: key.path for key in reversed(list(keys.values()))} | {top: top for top in _inside("")}
     for candidates in ({inner: f"{table}.{inner}" for inner in _inside(table)} if table else {}, everywhere):
         if close := get_close_matches(name, candidates, n=1):
             return candidates[close[0]]

@@ -41,9 +41,7 @@ class CaseCommand(click.Command):
         sections = dict[str, list[tuple[str, str]]]()
         for option in self.get_params(ctx):
             if isinstance(option, click.Option) and (record := option.get_help_record(ctx)):
-                table = (
-                    f"[{option.key.path.partition('.')[0]}]" if isinstance(option, CaseOption) else "Output"
-                )
+                table = f"[{option.key.path.partition('.')[0]}]" if isinstance(option, CaseOption) else "Output"
                 sections.setdefault(table, []).append(record)
         for title, records in sections.items():
             with formatter.section(title):
@@ -82,6 +80,4 @@ def run(case: Case, name: str, *, out: str | None, as_json: bool, quiet: bool) -
 
     with Progress(quiet=quiet) as progress:
         form = find_form(target, layout, rod, progress=progress, **options)
-    return deliver(
-        form, lambda where: form.save(where, case_toml=case.to_toml()), folder, as_json=as_json, quiet=quiet
-    )
+    return deliver(form, lambda where: form.save(where, case_toml=case.to_toml()), folder, as_json=as_json, quiet=quiet)

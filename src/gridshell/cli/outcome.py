@@ -36,9 +36,7 @@ def output_folder(out: str | None, name: str) -> Path:
     return check_folder(out or Path("out") / Path(name).stem)
 
 
-def deliver(
-    result: Result, save: Callable[[Path], object], folder: Path, *, as_json: bool, quiet: bool
-) -> int:
+def deliver(result: Result, save: Callable[[Path], object], folder: Path, *, as_json: bool, quiet: bool) -> int:
     """Save a result, print its summary, and return the exit code."""
     save(folder)
     if as_json:

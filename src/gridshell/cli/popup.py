@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from gridshell.cli.rodends import RodEnds
     from gridshell.rods.section import Rod
 
-PAPER_ROD_LENGTH = (
-    pi * 0.2
-)  # of the hemisphere's middle rod [HQK section 3.1], which the default rod belongs to
+PAPER_ROD_LENGTH = pi * 0.2  # of the hemisphere's middle rod [HQK section 3.1], which the default rod belongs to
 
 
 @click.command()

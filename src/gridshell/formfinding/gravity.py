@@ -6,7 +6,9 @@ saddle; the negative modes of its exact Hessian say so (numerics.md, section 4).
 fall short of the inextensible net: that is physics, and grows with the weight over the stretch stiffness.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,9 +16,9 @@ from gridshell.contact.unilateral import UnilateralContact
 from gridshell.errors import InputError
 from gridshell.formfinding.draped import Draped, smallest_joint_angle
 from gridshell.formfinding.progress import Progress, silent
-from gridshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
-from gridshell.nets import chebyshev_net
+from gridshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from gridshell.model import Freedom, Shell
+from gridshell.nets import chebyshev_net
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Equilibrium, Problem, find_equilibrium
@@ -50,7 +52,9 @@ def gravity_drape(
     if target.margin(top[None])[0] <= 0:
         raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim")
     grid = _grid(target, layout, anchor)
-    mesh, state, levels = None, None, list[SolveReport]()
+    mesh: GridMesh | None = None
+    state: Floats | None = None
+    levels = list[SolveReport]()
     for edge in _edges(layout):
         coarse, mesh = mesh, mesh_grid(grid, edge, marks=_middle_marks(grid, layout))
         start = _over(mesh, layout, top) if coarse is None or state is None else coarse.prolong(state, mesh)
@@ -60,7 +64,8 @@ def gravity_drape(
         state = found.state
         if not found.report.converged:
             break
-    assert mesh is not None and state is not None
+    assert mesh is not None
+    assert state is not None
     inside = target.margin(state) > 0
     angle, where = smallest_joint_angle(mesh, state, inside)
     warnings = []
@@ -168,7 +173,7 @@ def _settle(
             forces,
             descend=update == 0,
             most_iterations=MOST_COLD if cold and update == 0 else MOST_WARM,
-            progress=lambda k, step, n=update: progress("drape", f"gravity, {name}, contact {n + 1}, {k}", step),
+            progress=_telling(progress, f"gravity, {name}, contact {update + 1}"),
         )
         state, forces = found.state, found.forces
         reports.append(found.report)
@@ -185,6 +190,10 @@ def _settle(
     return replace(found, report=report), contact
 
 
+def _telling(progress: Progress, where: str) -> Callable[[int, float], None]:
+    return lambda iteration, step: progress("drape", f"{where}, iteration {iteration}", step)
+
+
 def _slid_off(mesh: GridMesh, state: Floats, layout: GridLayout, top: Floats, target: Target) -> bool:
     """Whether the rod nearest the heading's axis has left the vertical plane that symmetry would keep it in."""
     rods = [k for k, rod in enumerate(mesh.grid.rods) if rod.family == "u"]
@@ -194,5 +203,3 @@ def _slid_off(mesh: GridMesh, state: Floats, layout: GridLayout, top: Floats, ta
     inside = target.margin(x) > 0
     sideways = (x - top) @ across - mesh.grid.rods[axis].offset
     return bool(np.abs(sideways[inside]).max(initial=0.0) > SLIPPED * target.size)
-
-

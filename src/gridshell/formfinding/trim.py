@@ -126,9 +126,7 @@ def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]
             continue
         first, last = np.flatnonzero(inside)[[0, -1]]
         if first == 0 or last == len(s) - 1:
-            raise InputError(
-                f"rod {rod.name} is too short to reach the end of the target: use a longer layout length"
-            )
+            raise InputError(f"rod {rod.name} is too short to reach the end of the target: use a longer layout length")
         ends = [_crossing(draped, k, first - 1), _crossing(draped, k, last)]
         kept.append(rod.cut(ends[0], ends[1]))
     return tuple(kept), dropped

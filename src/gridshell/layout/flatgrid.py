@@ -88,7 +88,8 @@ class FlatGrid:
         end = np.array([rod.end for rod in rods])
         a, b = np.triu_indices(len(rods), k=1)
         sine = _cross(direction[a], direction[b])
-        a, b, sine = (values[np.abs(sine) > 1e-9] for values in (a, b, sine))
+        crossing = np.abs(sine) > 1e-9
+        a, b, sine = a[crossing], b[crossing], sine[crossing]
         apart = origin[b] - origin[a]
         at = np.column_stack([_cross(apart, direction[b]) / sine, _cross(apart, direction[a]) / sine])
         slack = margin - 1e-9 * (end - start)  # a crossing exactly at an end is a joint at that end
@@ -108,7 +109,7 @@ class FlatGrid:
         while (out := leave_out(grid)).any():
             names += [rod.name for rod, gone in zip(grid.rods, out, strict=True) if gone]
             index = np.cumsum(~out) - 1
-            kept = grid.crossings.select(~out[grid.crossings.rods].any(axis=1))
+            kept = grid.crossings.select(np.logical_not(out[grid.crossings.rods].any(axis=1)))
             rods = tuple(rod for rod, gone in zip(grid.rods, out, strict=True) if not gone)
             grid = FlatGrid(rods, Crossings(index[kept.rods], kept.at))
             if not rods:

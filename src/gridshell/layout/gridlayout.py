@@ -78,7 +78,7 @@ class GridLayout:
             return None
         side = 0 if family == "u" else 1
         count = self.rods[side]
-        return self.offset[1 - side] + (np.arange(count) - (count - 1) / 2) * self.spacing[side]
+        return np.asarray(self.offset[1 - side] + (np.arange(count) - (count - 1) / 2) * self.spacing[side])
 
     def half_length(self) -> float:
         """Half the length of every rod [m]; infinite where the length is "auto"."""
@@ -92,7 +92,9 @@ class GridLayout:
         """The whole rectangular grid before trimming, with `counts` and `length` [m] standing in for "auto"."""
         whole = GridLayout(counts, self.spacing, length, self.edge, self.rotate, self.offset)
         rods = list[FlatRod]()
-        for family, make in (("u", FlatRod.u), ("v", FlatRod.v)):
+        families: tuple[Family, ...] = ("u", "v")
+        for family in families:
+            make = FlatRod.u if family == "u" else FlatRod.v
             middle = whole.middle(family)
             offsets = whole.offsets(family)
             assert offsets is not None

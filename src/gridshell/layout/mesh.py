@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +148,7 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
                 fixed.append((s, next_node))
                 next_node += 1
         fixed.sort()
-        for (s0, n0), (s1, _) in zip(fixed, fixed[1:], strict=False):
+        for (s0, n0), (s1, _) in pairwise(fixed):
             pieces = edge_count(s1 - s0, edge)
             rod_nodes += [n0, *range(next_node, next_node + pieces - 1)]
             stations += np.linspace(s0, s1, pieces, endpoint=False).tolist()
@@ -168,7 +169,9 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own.
     """
     parent = {rod.name: index for index, rod in enumerate(mesh.grid.rods)}
-    joint_of = {tuple(pair): int(node) for pair, node in zip(mesh.grid.crossings.rods.tolist(), mesh.joint_nodes, strict=True)}
+    joint_of = {
+        tuple(pair): int(node) for pair, node in zip(mesh.grid.crossings.rods.tolist(), mesh.joint_nodes, strict=True)
+    }
     index = [parent[rod.name] for rod in rods]
     grid = FlatGrid.of(rods, margin=margin)
     known = np.array([(min(index[a], index[b]), max(index[a], index[b])) in joint_of for a, b in grid.crossings.rods])

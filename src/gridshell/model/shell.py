@@ -60,9 +60,7 @@ class Shell:
             outward = np.column_stack([_inner_nodes(mesh), mesh.ends.ravel(), ghosts])
             bends = np.vstack([bends, outward])
             lengths = np.append(lengths, 0.5 * _last_edges(mesh))
-        stretch = Stretch.elastic(
-            mesh.edges, mesh.edge_lengths, np.full(len(mesh.edges), rod.stretch_stiffness)
-        )
+        stretch = Stretch.elastic(mesh.edges, mesh.edge_lengths, np.full(len(mesh.edges), rod.stretch_stiffness))
         carried = twist_matters(joint or Ball()) if twist is None else twist
         elements: tuple[Elements, ...]
         if carried:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gridshell.layout import FlatGrid, FlatRod
 from gridshell.nets.chebyshev import ChebyshevNet
 
-
 RINGS = 2  # one leaves the ends 0.5 mm off the net on a 0.2 m hemisphere at 40 mm spacing, two 0.1 mm
 
 

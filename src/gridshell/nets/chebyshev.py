@@ -7,6 +7,7 @@ built still shape the net: they are kept as virtual rods.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import cos, degrees, sin
 
 import numpy as np
@@ -97,7 +98,9 @@ def chebyshev_net(target: Target, layout: GridLayout, *, anchor: tuple[float, fl
     ends, error = _extrapolate(target, lines, (coarse, fine), inside)
     rods, dropped, warnings = _name_rods(layout, lines, ends)
     _require_length(layout, rods)
-    return ChebyshevNet(target, layout, rods, (lines.u, lines.v), fine, error, angle, where, tuple(dropped), tuple(warnings))
+    return ChebyshevNet(
+        target, layout, rods, (lines.u, lines.v), fine, error, angle, where, tuple(dropped), tuple(warnings)
+    )
 
 
 def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
@@ -154,9 +157,7 @@ def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> 
     return offsets if (offsets == 0.0).any() else np.sort(np.append(offsets, 0.0))
 
 
-def _march_lines(
-    target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int
-) -> Net:
+def _march_lines(target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int) -> Net:
     u, v = (_subdivide(offsets, layout.edge, refine) for offsets in (lines.u, lines.v))
     if len(u) * len(v) > MOST_NODES:
         raise InputError(f"the net would have {len(u)} x {len(v)} nodes: use longer edges or a larger spacing")
@@ -166,7 +167,7 @@ def _march_lines(
 def _subdivide(offsets: Floats, edge: float, refine: int) -> Floats:
     """Three steps or more from line to line, twice as many where `refine` is 2, meeting the nodes of the mesh."""
     pieces = []
-    for low, high in zip(offsets[:-1], offsets[1:], strict=True):
+    for low, high in pairwise(offsets.tolist()):
         edges = edge_count(high - low, edge)
         steps = edges // 2 if edges % 2 == 0 and edges >= 6 else max(3, edges)
         pieces.append(np.linspace(low, high, refine * steps, endpoint=False))
@@ -195,9 +196,7 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
     )
 
 
-def _smallest_angle(
-    target: Target, net: Net, inside: NDArray[np.bool_]
-) -> tuple[float, tuple[float, float, float]]:
+def _smallest_angle(target: Target, net: Net, inside: NDArray[np.bool_]) -> tuple[float, tuple[float, float, float]]:
     """Smallest angle between the families over the inside nodes [rad], from central differences."""
     i, j = np.nonzero(inside)
     along = net.points[i + 1, j] - net.points[i - 1, j]

@@ -134,15 +134,20 @@ def _fill_quadrants(target: Target, net: Net) -> None:
         if len(i) == 0:
             break
         i_back, j_back = i - np.sign(i - i0), j - np.sign(j - j0)
-        a, b, d = net.points[i, j_back], net.points[i_back, j], net.points[i_back, j_back]
-        ready = np.flatnonzero(np.isfinite(a[:, 0] + b[:, 0] + d[:, 0]))
+        earlier = net.points[i, j_back, 0] + net.points[i_back, j, 0] + net.points[i_back, j_back, 0]
+        ready = np.flatnonzero(np.isfinite(earlier))
         if len(ready) == 0:
             continue
-        i, j, a, b, d = i[ready], j[ready], a[ready], b[ready], d[ready]
-        step_v = np.abs(net.v[j] - net.v[j_back[ready]])
-        step_u = np.abs(net.u[i] - net.u[i_back[ready]])
-        side = np.sign(i - i0) * np.sign(j - j0)
-        net.points[i, j] = _compass(target, a, b, d, step_v, step_u, side)
+        i, j, i_back, j_back = i[ready], j[ready], i_back[ready], j_back[ready]
+        net.points[i, j] = _compass(
+            target,
+            a=net.points[i, j_back],
+            b=net.points[i_back, j],
+            d=net.points[i_back, j_back],
+            from_a=np.abs(net.v[j] - net.v[j_back]),
+            from_b=np.abs(net.u[i] - net.u[i_back]),
+            side=np.sign(i - i0) * np.sign(j - j0),
+        )
 
 
 def _compass(

@@ -30,6 +30,7 @@ def _crossing_angle() -> OdeSolution:
         lambda sigma, f: [f[1], -(f[1] + np.sin(f[0])) / sigma],
         (s, 1.95), first, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True,
     )  # fmt: skip
+    assert solution.sol is not None
     return solution.sol
 
 
@@ -77,7 +78,8 @@ def sphere_net_end(radius: float, offset: float, base: float = 0.0) -> float:
     if not abs(base) < radius or a >= pi or np.cos(a) * radius <= base:
         raise InputError(f"the rod at offset {offset} m does not touch the cap above z = {base} m")
     furthest = radius * min(LIMIT / a if a else np.inf, 2 * pi)
-    met = sphere_net_rod(radius, offset, furthest, base).t_events[0]
+    events = sphere_net_rod(radius, offset, furthest, base).t_events
+    met = np.empty(0) if events is None else events[0]
     if len(met) == 0:
         raise InputError(f"the net folds before the rod at offset {offset} m reaches z = {base} m")
     return float(radius * met[0])

@@ -19,7 +19,7 @@ States = dict[str, NDArray[Any]]
 def form_result(form: FoundForm) -> dict[str, Any]:
     """result.json of a form, SI units; the keys are those of the documentation's page on files."""
     draped = form.draped
-    drape = {
+    drape: dict[str, Any] = {
         "method": draped.method,
         "status": draped.report.status.value,
         "dofs": draped.report.dofs,
@@ -37,7 +37,7 @@ def form_result(form: FoundForm) -> dict[str, Any]:
         drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
     return {
         **_head(form.target.name, form.status, form.warnings),
-        "target": {**form.target.parameters(), "size": form.target.size},
+        "target": {**form.target.parameters(), "reference_size": form.target.size},
         "layout": _layout(form.layout),
         "rod": _rod(form.rod),
         **({"net": shape_of_net(draped.net)} if draped.net is not None else {}),
@@ -94,7 +94,7 @@ def _head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _grid(footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tuple[str, str], ...]) -> dict[str, Any]:
-    rods = [
+    rods: list[dict[str, Any]] = [
         {
             "id": rod.name,
             "family": rod.family,

@@ -16,7 +16,8 @@ def summary_text(result: dict[str, Any]) -> str:
         )
     if drape := result.get("drape"):
         work = sum(level["factorizations"] for level in drape["levels"])
-        line = f"  drape     {drape['method']}: {drape['dofs']} unknowns, {work} factorisations, {drape['seconds']:.2f} s, "
+        line = f"  drape     {drape['method']}: {drape['dofs']} unknowns, {work} factorisations, "
+        line += f"{drape['seconds']:.2f} s, "
         line += f"gap {_mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
         lines.append(line + f"negative modes {drape['negative_modes']}")
         if own := drape.get("own_ends"):

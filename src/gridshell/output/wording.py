@@ -8,7 +8,9 @@ UNKNOWN = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
 CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of the case, by its key
-    **dict.fromkeys(("radius", "height", "base", "size", "a", "b", "c", "spacing", "length"), (1e3, "mm")),
+    **dict.fromkeys(
+        ("radius", "height", "base", "size", "reference_size", "a", "b", "c", "spacing", "length"), (1e3, "mm")
+    ),
     **dict.fromkeys(("edge", "offset", "thickness", "width"), (1e3, "mm")),
     **dict.fromkeys(("EI", "EI1", "EI2", "GJ"), (1.0, "N m\N{SUPERSCRIPT TWO}")),
     **dict.fromkeys(("mass", "mass_per_length"), (1.0, "kg/m")),
@@ -17,7 +19,11 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
     "rotate": (180 / pi, "\N{DEGREE SIGN}"),
 }
-NAMES = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio", "size": "size, for relative gaps"}
+NAMES = {
+    "youngs_modulus": "Young's modulus",
+    "poisson_ratio": "Poisson's ratio",
+    "reference_size": "size, for relative gaps",
+}
 
 
 def millimetres(metres: float | None, digits: int = 3) -> str:

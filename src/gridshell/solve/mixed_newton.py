@@ -8,13 +8,13 @@ a manifold: steps in the tangent directions, the constraint's curvature in the H
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.model import Assembly, Freedom
+from gridshell.model import Assembly
 from gridshell.rods.elements import Elements
 from gridshell.rods.stretch import Stretch
 from gridshell.solve.constraint import Constraint

@@ -8,6 +8,19 @@ from gridshell.targets.quadric import Cap, Ellipsoid, Hemisphere, Paraboloid
 from gridshell.targets.target import Gap, Implicit, Target
 
 __all__ = [
-    "Cap", "Disc", "Domain", "Ellipsoid", "EllipseDomain", "Formula", "Gap", "HeightField", "Hemisphere",
-    "Implicit", "Jet", "Paraboloid", "Rectangle", "Target", "parse_formula",
+    "Cap",
+    "Disc",
+    "Domain",
+    "Ellipsoid",
+    "EllipseDomain",
+    "Formula",
+    "Gap",
+    "HeightField",
+    "Hemisphere",
+    "Implicit",
+    "Jet",
+    "Paraboloid",
+    "Rectangle",
+    "Target",
+    "parse_formula",
 ]
