@@ -133,7 +133,9 @@ def gravity_rows() -> Iterator[Row]:
         rms = 1e3 * float(np.sqrt(np.mean(np.square(short))))
         kind = "stable" if draped.report.stable else f"saddle: {draped.report.negative_modes} negative modes, said so"
         said = draped.report.stable or any("saddle" in warning for warning in draped.warnings)
-        yield Row(f"gravity drape, {name}", "not converged, or a saddle not said", float(not draped.converged or not said), 0)
+        yield Row(
+            f"gravity drape, {name}", "not converged, or a saddle not said", float(not draped.converged or not said), 0
+        )
         yield Row(f"gravity drape, {name}", "G0 short of the exact net, rms", rms, high, "mm", kind)
         yield Row(f"gravity drape, {name}", "the same, at least", -rms, -low, "mm")
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.formfinding.popup import Popped
+from gridshell.geometry.curves import on_curve
 from gridshell.layout import GridMesh
 from gridshell.targets import Target
 
@@ -64,14 +65,5 @@ def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     result = []
     for rod in range(len(mesh.grid.rods)):
         x, s = positions[mesh.nodes_of(rod)], mesh.stations[mesh.rod_slice(rod)]
-        count = min(4, len(s))
-        first = np.clip(np.arange(len(s) - 1) - 1, 0, len(s) - count)
-        window = first[:, None] + np.arange(count)
-        middle = 0.5 * (s[:-1] + s[1:])
-        apart, weight = middle[:, None] - s[window], np.ones((len(middle), count))
-        for j in range(count):
-            for k in range(count):
-                if j != k:
-                    weight[:, j] *= apart[:, k] / (s[window[:, j]] - s[window[:, k]])
-        result.append(np.einsum("nj,njd->nd", weight, x[window]))
+        result.append(on_curve(s, x, 0.5 * (s[:-1] + s[1:])))
     return np.concatenate(result)

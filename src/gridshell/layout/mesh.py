@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
+from gridshell.geometry.curves import on_curve
 from gridshell.layout.flatgrid import FlatGrid, FlatRod
 
 Ints = NDArray[np.intp]
@@ -106,22 +106,15 @@ class GridMesh:
         return total
 
     def prolong(self, positions: Floats, fine: "GridMesh", *, rods: Sequence[int] | None = None) -> Floats:
-        """Positions (n, 3) of the nodes of `fine`, by a cubic spline along each rod of this mesh [m].
+        """Positions (n, 3) of the nodes of `fine`, by local cubics along each rod of this mesh [m].
 
         `rods` names, for each rod of `fine`, the rod of this mesh that it is a part of; default: the same.
         """
         result = np.empty((fine.node_count, 3))
         for k, rod in enumerate(rods if rods is not None else range(len(self.rod_start))):
             here, there = self.rod_slice(rod), fine.rod_slice(k)
-            points = positions[self.rod_nodes[here]]
-            spline = CubicSpline(self.stations[here], points) if len(points) > 2 else None
-            s = fine.stations[there]
-            if spline is None:
-                share = ((s - s[0]) / (s[-1] - s[0]))[:, None]
-                values = (1 - share) * points[0] + share * points[-1]
-            else:
-                values = spline(s)
-            result[fine.rod_nodes[there]] = values
+            curve = on_curve(self.stations[here], positions[self.rod_nodes[here]], fine.stations[there])
+            result[fine.rod_nodes[there]] = curve
         return result
 
 

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError, NetLimitError
+from gridshell.geometry.curves import on_curve
 from gridshell.geometry.vectors import cross, dot
 from gridshell.layout import FlatRod, GridLayout
 from gridshell.layout.flatgrid import Family
 from gridshell.layout.gridlayout import rod_name
 from gridshell.layout.mesh import edge_count
 from gridshell.nets.compass import Net, march
-from gridshell.nets.cuts import Cut, cut_lines, inside_nodes, lagrange
+from gridshell.nets.cuts import Cut, cut_lines, inside_nodes
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
@@ -64,10 +65,7 @@ class ChebyshevNet:
         else:
             knots, points = self.net.v, self.net.points[int(np.argmin(np.abs(self.net.u - rod.offset)))]
         known = np.flatnonzero(np.isfinite(points[:, 0]))
-        knots, points = knots[known], points[known]
-        first = np.clip(np.searchsorted(knots, s) - 2, 0, len(knots) - 4)
-        window = first[:, None] + np.arange(4)
-        return lagrange(knots[window], points[window], s)
+        return on_curve(knots[known], points[known], s)
 
 
 def chebyshev_net(target: Target, layout: GridLayout, *, anchor: tuple[float, float] | None = None) -> ChebyshevNet:

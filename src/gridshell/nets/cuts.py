@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gridshell.geometry.curves import lagrange
 from gridshell.nets.compass import Net
 from gridshell.targets import Target
 
@@ -94,14 +95,3 @@ def _roots(target: Target, s: Floats, lines: Floats, windows: list[tuple[int, in
         outside = (target.margin(lagrange(knots, points, middle)) < 0) == rising
         low, high = np.where(outside, middle, low), np.where(outside, high, middle)
     return 0.5 * (low + high)
-
-
-def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
-    """Points (n, 3) at `s` (n,) of the polynomials through `points` (n, p, 3) at `knots` (n, p)."""
-    apart = s[:, None] - knots
-    weight = np.ones_like(knots)
-    for j in range(knots.shape[1]):
-        for k in range(knots.shape[1]):
-            if j != k:
-                weight[:, j] *= apart[:, k] / (knots[:, j] - knots[:, k])
-    return np.asarray(np.einsum("nj,njd->nd", weight, points))

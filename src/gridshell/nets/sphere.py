@@ -8,11 +8,14 @@ give its path.
 
 from functools import lru_cache
 from math import pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolution, solve_ivp
-from scipy.integrate._ivp.ivp import OdeResult
+
+if TYPE_CHECKING:  # scipy.integrate costs a third of a second, and only this reference needs it
+    from scipy.integrate import OdeSolution
+    from scipy.integrate._ivp.ivp import OdeResult
 
 from gridshell.errors import InputError
 
@@ -22,8 +25,10 @@ LIMIT = 1.8616  # f vanishes first at this sigma: the net folds
 
 
 @lru_cache
-def _crossing_angle() -> OdeSolution:
+def _crossing_angle() -> "OdeSolution":
     """f and f' as functions of sigma, started from the series pi/2 - s + s^3/18 off the singular point."""
+    from scipy.integrate import solve_ivp
+
     s = 1e-3
     first = [pi / 2 - s + s**3 / 18 - 7 * s**5 / 1800, -1 + s**2 / 6 - 7 * s**4 / 360]
     solution = solve_ivp(
@@ -44,13 +49,15 @@ def crossing_angle(sigma: float) -> tuple[float, float]:
     return (float(f), float(slope)) if sigma >= 0 else (pi - float(f), float(slope))
 
 
-def sphere_net_rod(radius: float, offset: float, length: float, base: float | None = None) -> OdeResult:
+def sphere_net_rod(radius: float, offset: float, length: float, base: float | None = None) -> "OdeResult":
     """Path of the rod at `offset` from its middle to `length`, or to z = `base` if it comes first [m].
 
     The anchor is the north pole (0, 0, radius); the rod crosses the great circle x = 0 at arc length `offset`
     and starts along x. The result's `sol(s / radius)` is the position over the radius (3) and the unit
     tangent (3); `t_events` holds s / radius where the base is met.
     """
+    from scipy.integrate import solve_ivp
+
     a = offset / radius
     start = np.array([0.0, np.sin(a), np.cos(a), 1.0, 0.0, 0.0])
 
