@@ -509,6 +509,7 @@ def test_a_function_cannot_write_into_the_points():
 
     for function in (rude, rude_and_plain):
         field = HeightField(function=function, domain=DISC)
+        assert field._heights.exact == (function is rude)
         x = sample_points()
         kept = x.copy()
         assert field.implicit(x).value == pytest.approx(x[:, 2] - 0.1 + 4 * x[:, 0] ** 2)
@@ -683,6 +684,7 @@ SUMMITS = {
     "0.1 - (x-.031)^4 - y^2": (0.031, 0),  # flat: known to 1e-5 m only
     "0.05*exp(-((x-.09)^2 + y^2)/.005) + 0.051*exp(-((x+.09)^2 + y^2)/.005)": (-0.09, 0),  # the higher of two
     "0.05*exp(-((x-.09)^2 + y^2)/.005) + 0.05*exp(-((x+.09)^2 + y^2)/.005)": (0, 0),  # tie
+    "0.05*exp(-((x-.09)^2 + y^2)/.005) + 0.05000001*exp(-((x+.09)^2 + y^2)/.005)": (0, 0),  # nearly a tie
     "0.1*cos(30*sqrt(x^2 + y^2))": (0, 0),  # a peak and a ring as high
     "0.1 - x^2": (0, 0),  # a ridge
     "x": (0, 0),  # highest on the edge
@@ -701,6 +703,12 @@ def test_the_summit_is_the_one_highest_point_inside_or_the_centre(formula, domai
     if SUMMITS[formula] != (0, 0):
         slope = top.implicit(np.array([[*found, 0.0]])).gradient[0, :2]
         assert np.abs(slope).max() < 1e-12
+
+
+def test_a_peak_just_outside_does_not_count():
+    """A ring as high as the summit at (0.05, 0) passes the disc at a distance of 2 mm."""
+    found = HeightField(formula="0.1*cos(24.9*sqrt((x-.05)^2 + y^2))", domain=DISC).summit
+    assert found == pytest.approx((0.05, 0), abs=1e-5)  # the formula's 0/0 lies there
 
 
 def test_parameters_are_those_of_a_case_file():

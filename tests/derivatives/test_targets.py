@@ -229,8 +229,9 @@ def test_contact_normal_and_hessian_are_those_of_its_distance(name):
         assert_taylor(lambda p, t=target: t.contact(p).normal, contact.hessian, x, rng, step=1e-4, floor=floor * 10)
 
 
-@every_target
+@pytest.mark.parametrize("name", [name for name in TARGETS if name != "cap below the equator"])
 def test_contact_normal_is_the_gradient_above_the_corner(name):
+    """An overhang has no corner in free air."""
     target, rng = TARGETS[name], np.random.default_rng(9)
     rim = rim_points(target, rng, 100)
     if isinstance(target.plan, Rectangle):
@@ -239,8 +240,6 @@ def test_contact_normal_is_the_gradient_above_the_corner(name):
     outward = target.plan.distance(rim[:, :2])[1]
     into_cone = n + 0.5 * np.column_stack([outward, np.zeros(len(rim))])
     x = rim + 0.005 * into_cone
-    if name == "cap below the equator":
-        pytest.skip("its wall stands under an overhang: no corner in free air")
     contact = target.contact(x)
     assert_taylor(lambda p: target.contact(p).distance, contact.normal, x, rng, step=1e-5, floor=1e-12)
 

@@ -140,15 +140,6 @@ def test_an_empty_set_of_elements_adds_nothing():
     np.testing.assert_array_equal(alone, with_nothing)
 
 
-def test_a_shell_that_is_held_everywhere_has_an_empty_system():
-    rng = np.random.default_rng(14)
-    sets, hessians = random_elements(rng)
-    held = random_freedom(rng, np.zeros(BLOCKS, dtype=int))
-    assembly = Assembly.of(sets, held)
-    assert held.size == 0
-    assert len(assembly.assemble(hessians, sets, held)) == 0
-
-
 # Free directions
 
 
@@ -201,27 +192,26 @@ def compressed(dense):
     return np.array(indptr), np.array(indices), np.array(data)
 
 
-def assert_inertia_and_solution(solver, dense, data, digits):
-    """`digits`: largest error of the solution, relative, in units of round-off times the condition number."""
+def assert_inertia_and_solution(solver, dense, data):
     eigenvalues = eigvalsh(dense)
     assert solver.factor(data) == np.count_nonzero(eigenvalues < 0)
     x = np.random.default_rng(0).normal(size=len(dense))
     found = solver.solve(dense @ x)
     condition = np.abs(eigenvalues).max() / np.abs(eigenvalues).min()
-    assert norm(found - x) <= digits * np.finfo(float).eps * condition * norm(x)
+    # 0.26 measured: factors without pivoting may grow, the refinement makes up for it
+    assert norm(found - x) <= 2.0 * np.finfo(float).eps * condition * norm(x)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("lowest", [0.5, -0.7, -4.0], ids=["definite", "few negative", "many negative"])
-def test_solver_counts_negative_eigenvalues_and_solves(seed, lowest):
-    """A random matrix, shifted so that its lowest eigenvalue is the one given, times its spread."""
+@pytest.mark.parametrize("negative", [0, 3, 20, 40])
+def test_solver_counts_negative_eigenvalues_and_solves(seed, negative):
     dense = chain_matrix(np.random.default_rng(seed))
-    spread = eigvalsh(dense)
-    shift = lowest - spread[0] if lowest > -1 else 0.0
-    dense += shift * np.eye(len(dense))
+    eigenvalues = np.concatenate([[-12.0], eigvalsh(dense), [12.0]])
+    dense -= 0.5 * (eigenvalues[negative] + eigenvalues[negative + 1]) * np.eye(len(dense))
     indptr, indices, data = compressed(dense)
-    # without pivoting the factors may grow: at most 9 was measured
-    assert_inertia_and_solution(Qdldl(indptr, indices), dense, data, 50)
+    solver = Qdldl(indptr, indices)
+    assert_inertia_and_solution(solver, dense, data)
+    assert solver.factor(data) == negative
 
 
 @pytest.mark.parametrize("side", [1e-9, -1e-9])
@@ -232,7 +222,7 @@ def test_solver_tells_the_sign_of_a_nearly_vanishing_eigenvalue(seed, side):
     dense += (side - middle) * np.eye(len(dense))
     indptr, indices, data = compressed(dense)
     assert np.abs(eigvalsh(dense)).min() == pytest.approx(1e-9, rel=1e-3)
-    assert_inertia_and_solution(Qdldl(indptr, indices), dense, data, 50)
+    assert_inertia_and_solution(Qdldl(indptr, indices), dense, data)
 
 
 def test_solver_keeps_its_pattern_for_new_values():
@@ -243,7 +233,7 @@ def test_solver_keeps_its_pattern_for_new_values():
     solver.factor(data)
     for shift in (20.0, 0.3, -20.0, 5.0):
         shifted = dense + shift * np.eye(len(dense))
-        assert_inertia_and_solution(solver, shifted, compressed(shifted)[2], 50)
+        assert_inertia_and_solution(solver, shifted, compressed(shifted)[2])
 
 
 @pytest.mark.parametrize(
@@ -276,7 +266,7 @@ def test_solver_recovers_after_a_singular_system():
     solver = Qdldl(indptr, indices)
     with pytest.raises(SingularError):
         solver.factor(np.zeros_like(data))
-    assert_inertia_and_solution(solver, dense, data, 50)
+    assert_inertia_and_solution(solver, dense, data)
     with pytest.raises(SingularError):
         solver.factor(np.zeros_like(data))
-    assert_inertia_and_solution(solver, dense, data, 50)
+    assert_inertia_and_solution(solver, dense, data)

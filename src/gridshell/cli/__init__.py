@@ -1,5 +1,7 @@
 """The command line. Only click is imported here, so that --help and --version answer at once."""
 
+import os
+import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from importlib import import_module
@@ -82,6 +84,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         click.echo("gridshell: interrupted", err=True)
         return 130
     return code if isinstance(code, int) else 0
+
+
+def entry() -> None:
+    """The console script: `main`, then an end without Python's teardown, which costs a fifth of a short run."""
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _fail(message: str, code: int) -> int:

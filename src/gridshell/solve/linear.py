@@ -52,6 +52,8 @@ class Qdldl:
         pivots = np.asarray(self._solver.factors()[1])
         if not np.isfinite(pivots).all():
             raise SingularError("the factorisation is not finite")
+        if not pivots.all():  # QDLDL's update does not say so, and leaves the pivots after it as they were
+            raise SingularError("a pivot of the factorisation is zero")
         return int(np.count_nonzero(pivots < 0))
 
     def solve(self, right: Floats) -> Floats:

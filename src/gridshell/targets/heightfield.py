@@ -107,9 +107,10 @@ class HeightField(Target):
         else:
             label = f"the height field of {_qualified_name(self.function)}"
             heights = Heights(self.function, self.size, exact=_takes_jets(self.function, self.size))
-        samples = sample(heights, self.domain)
-        require_smooth(heights, self.domain, samples, label)
-        return replace(heights, trusted=trusted_region(heights, self.domain, samples, label))
+        with np.errstate(all="ignore"):
+            samples = sample(heights, self.domain)
+            require_smooth(heights, self.domain, samples, label)
+            return replace(heights, trusted=trusted_region(heights, self.domain, samples, label))
 
 
 def _takes_jets(function: Callable[[Any, Any], Any], size: float) -> bool:

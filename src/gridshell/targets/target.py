@@ -103,18 +103,19 @@ class Target(ABC):
 
     def closest(self, x: Floats) -> Floats:
         """Closest points (n, 3) of the continued surface [m]; a local minimum beyond a centre of curvature."""
-        y = self.retract(x)
-        settled = np.zeros(len(x), dtype=bool)
-        for _ in range(12):
-            step, convex = self._newton_to_closest(x, y, 0.0)
-            length = np.linalg.norm(step, axis=1)
-            y = y + step * np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
-            settled = convex & (length <= 1e-13 * self.size)
-            if settled.all():
-                return y
-        left = np.flatnonzero(~settled)
-        y[left] = self._descend_to_closest(x[left])
-        return y
+        with np.errstate(all="ignore"):  # NaN, far out where the surface has no continuation
+            y = self.retract(x)
+            settled = np.zeros(len(x), dtype=bool)
+            for _ in range(12):
+                step, convex = self._newton_to_closest(x, y, 0.0)
+                length = np.linalg.norm(step, axis=1)
+                y = y + step * np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
+                settled = convex & (length <= 1e-13 * self.size)
+                if settled.all():
+                    return y
+            left = np.flatnonzero(~settled)
+            y[left] = self._descend_to_closest(x[left])
+            return y
 
     def _newton_to_closest(self, x: Floats, y: Floats, damping: float | Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """One step (n, 3) of Newton on y + F'(y) t = x, F(y) = 0; and whether the distance is convex at y."""
@@ -167,7 +168,7 @@ class Target(ABC):
         across, from_surface = self.plan.distance(x[low, :2])[0], distance[low]
         ended[low] |= np.where(from_surface < 0, across > from_surface, across < from_surface)
         if ended.any():
-            distance[ended], n[ended], hessian[ended] = self._wall(x[ended], distance[ended] > 0)
+            distance[ended], n[ended], hessian[ended] = self._wall(x[ended], ~(distance[ended] <= 0))
         return Gap(distance, n, hessian)
 
     def _wall(self, x: Floats, over: NDArray[np.bool_]) -> Gap:
