@@ -13,7 +13,9 @@ def main() -> int:
         missed += not row.reached
     whole, bare, solve = startup_ratio(fresh=True)
     note = f"whole process {whole:.2f} s, bare imports {bare:.2f} s, solve {solve:.2f} s (medians of one group of runs)"
-    row = Row("pip install ., hemisphere twice", "(whole - solve) / bare imports", (whole - solve) / bare, 3.0, note=note)
+    row = Row(
+        "pip install ., hemisphere twice", "(whole - solve) / bare imports", (whole - solve) / bare, 3.0, note=note
+    )
     print(row)
     missed += not row.reached
     print(f"{missed} figures missed" if missed else "every figure reached")

@@ -61,7 +61,7 @@ def cut_lines(target: Target, s: Floats, lines: Floats, inside: Mask) -> list[Cu
     -------
     m cuts; None for a line without inside nodes.
     """
-    found, windows = list[tuple[int, int, int, int]](), list[tuple[int, int]]()
+    found, windows = list[tuple[int, int, int, int]](), list[tuple[int, int, int]]()
     for k, mask in enumerate(inside):
         steps = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
         first, last = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1) - 1
@@ -69,7 +69,7 @@ def cut_lines(target: Target, s: Floats, lines: Floats, inside: Mask) -> list[Cu
             continue
         longest = int(np.argmax(s[last] - s[first]))
         found.append((k, int(first[longest]), int(last[longest]), len(first)))
-        windows += [(k, int(first[longest]) - 1), (k, int(last[longest]))]
+        windows += [(k, int(first[longest]) - 1, -1), (k, int(last[longest]), 1)]
     ends = _roots(target, s, lines, windows)
     cuts: list[Cut | None] = [None] * len(lines)
     for (k, _, _, pieces), (start, end) in zip(found, ends.reshape(-1, 2), strict=True):
@@ -77,21 +77,23 @@ def cut_lines(target: Target, s: Floats, lines: Floats, inside: Mask) -> list[Cu
     return cuts
 
 
-def _roots(target: Target, s: Floats, lines: Floats, windows: list[tuple[int, int]]) -> Floats:
-    """Where each line crosses the end, between nodes i and i + 1 of window (line, i): a cubic through four nodes."""
+def _roots(target: Target, s: Floats, lines: Floats, windows: list[tuple[int, int, int]]) -> Floats:
+    """Where each line crosses the end, by a cubic through four nodes.
+
+    Each window (line, i, side) lies between nodes i and i + 1, its outer node being i + 1 for side 1, i for side -1.
+    """
     if not windows:
         return np.empty(0)
-    row, i = np.array(windows).T
+    row, i, side = np.array(windows).T
     first = np.clip(i - 1, 0, len(s) - 4)
     for shift in (-1, 1):  # next to the net's limit, four nodes further in
         lost = ~np.isfinite(lines[row[:, None], first[:, None] + np.arange(4), 0]).all(axis=1)
         first = np.where(lost, np.clip(i - 1 + shift, 0, len(s) - 4), first)
     nodes = first[:, None] + np.arange(4)
     points, knots = lines[row[:, None], nodes], s[nodes]
-    low, high = s[i], s[i + 1]
-    rising = target.margin(lagrange(knots, points, low)) < 0
+    outer, inner = s[i + (side > 0)], s[i + (side < 0)]
     for _ in range(52):
-        middle = 0.5 * (low + high)
-        outside = (target.margin(lagrange(knots, points, middle)) < 0) == rising
-        low, high = np.where(outside, middle, low), np.where(outside, high, middle)
-    return 0.5 * (low + high)
+        middle = 0.5 * (outer + inner)
+        inside = target.margin(lagrange(knots, points, middle)) > 0
+        outer, inner = np.where(inside, outer, middle), np.where(inside, middle, inner)
+    return np.asarray(0.5 * (outer + inner))

@@ -29,8 +29,10 @@ def check_folder(folder: str | os.PathLike[str]) -> Path:
     if path.exists():
         _check_replaceable(path)
     parent = _existing_parent(path)
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise OutputError(f"cannot write {path}: no permission to write in {parent}; choose another folder")
+    try:  # asking for permission is not enough: to root everything is permitted, even in /proc
+        os.rmdir(tempfile.mkdtemp(prefix=_prefix(path), dir=parent))
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror} in {parent}; choose another folder") from error
     return path
 
 

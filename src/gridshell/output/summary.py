@@ -41,4 +41,4 @@ def _mm(metres: float) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+    return f"{100 * share:.2g} %" if share >= 1e-9 else "0 %"
