@@ -18,7 +18,7 @@ from tests.acceptance.rows import (
 )
 
 
-def reached(rows: Iterator[Row]) -> None:
+def check_reached(rows: Iterator[Row]) -> None:
     table = list(rows)
     missed = [str(row) for row in table if not row.reached]
     assert table
@@ -27,24 +27,24 @@ def reached(rows: Iterator[Row]) -> None:
 
 @pytest.mark.parametrize("case", [*PAPER, *AUTO], ids=lambda case: case.name)
 def test_footprint_is_the_exact_net(case: AcceptanceCase) -> None:
-    reached(net_rows(case))
+    check_reached(net_rows(case))
 
 
 @pytest.mark.parametrize("case", AUTO, ids=lambda case: case.name)
 def test_drape_alone_gives_nearly_the_same_ends(case: AcceptanceCase) -> None:
-    reached(own_end_rows(case))
+    check_reached(own_end_rows(case))
 
 
 @pytest.mark.parametrize("case", [*PAPER, *AUTO, *FURTHER], ids=lambda case: case.name)
 def test_bound_drape_is_in_equilibrium(case: AcceptanceCase) -> None:
-    reached(drape_rows(case))
+    check_reached(drape_rows(case))
 
 
 @pytest.mark.parametrize("case", [*PAPER, *AUTO, *FURTHER], ids=lambda case: case.name)
 def test_popped_up_shell_agrees_with_its_target(case: AcceptanceCase) -> None:
-    reached(pop_up_rows(case))
+    check_reached(pop_up_rows(case))
 
 
 @pytest.mark.parametrize("rows", [flat_rows, refused_rows, gravity_rows, scale_rows])
 def test_the_other_rows(rows: Callable[[], Iterator[Row]]) -> None:
-    reached(rows())
+    check_reached(rows())

@@ -1,6 +1,6 @@
 """Two orthogonal families of parallel rods: what the user asks for, before it meets a target."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Literal
 
@@ -87,6 +87,10 @@ class GridLayout:
     def middle(self, family: Family) -> float:
         """Material coordinate [m] of the middle of the rods of a family: the layout moves with its offset."""
         return self.offset[0 if family == "u" else 1]
+
+    def parameters(self) -> dict[str, object]:
+        """The layout in SI, as it stands in a case file."""
+        return asdict(self)
 
     def flat_grid(self, counts: tuple[int, int], length: float) -> FlatGrid:
         """The whole rectangular grid before trimming, with `counts` and `length` [m] standing in for "auto"."""

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from gridshell.formfinding import Agreement, Footprint, FoundForm, Popped, PoppedTable
 from gridshell.formfinding.bound import shape_of_net
-from gridshell.layout import GridLayout
-from gridshell.rods.section import Rod, Tube
+from gridshell.rods.section import Rod
 from gridshell.solve.report import SolveReport
 
 States = dict[str, NDArray[Any]]
@@ -38,7 +37,7 @@ def form_result(form: FoundForm) -> dict[str, Any]:
     return {
         **_head(form.target.name, form.status, form.warnings),
         "target": {**form.target.parameters(), "reference_size": form.target.size},
-        "layout": _layout(form.layout),
+        "layout": form.layout.parameters(),
         "rod": _rod(form.rod),
         **({"net": shape_of_net(draped.net)} if draped.net is not None else {}),
         **_grid(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
@@ -120,28 +119,9 @@ def _grid(footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tu
     }
 
 
-def _layout(layout: GridLayout) -> dict[str, Any]:
-    return {
-        "rods": layout.rods if layout.rods == "auto" else list(layout.rods),
-        "spacing": list(layout.spacing),
-        "length": layout.length,
-        "edge": layout.edge,
-        "rotate": layout.rotate,
-        "offset": list(layout.offset),
-    }
-
-
 def _rod(rod: Rod) -> dict[str, Any]:
-    section: dict[str, Any] = {"kind": "circle", "radius": rod.section.radius}
-    if isinstance(rod.section, Tube):
-        section = {"kind": "tube", "radius": rod.section.radius, "thickness": rod.section.thickness}
     return {
-        "section": section,
-        "material": {
-            "youngs_modulus": rod.material.youngs_modulus,
-            "poisson_ratio": rod.material.poisson_ratio,
-            "density": rod.material.density,
-        },
+        **rod.parameters(),
         "EA": rod.stretch_stiffness,
         "EI": rod.bend_stiffness,
         "GJ": rod.twist_stiffness,

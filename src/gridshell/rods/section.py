@@ -1,6 +1,6 @@
 """Cross-sections and material of a rod, and the stiffnesses that follow."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from math import inf, isfinite, pi
 
@@ -29,6 +29,10 @@ class Circle:
     def second_moment(self) -> float:
         """Second moment of area about any diameter [m4]."""
         return pi * self.radius**4 / 4
+
+    def parameters(self) -> dict[str, object]:
+        """The section's kind and numbers in SI, as they stand in a case file."""
+        return {"kind": "circle", "radius": self.radius}
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,10 @@ class Tube:
     def second_moment(self) -> float:
         """Second moment of area about any diameter [m4]."""
         return pi * (self.radius**4 - self.inner_radius**4) / 4
+
+    def parameters(self) -> dict[str, object]:
+        """The section's kind and numbers in SI, as they stand in a case file."""
+        return {"kind": "tube", "radius": self.radius, "thickness": self.thickness}
 
 
 Section = Circle | Tube
@@ -112,6 +120,10 @@ class Rod:
     def mass_per_length(self) -> float:
         """[kg/m]"""
         return self.material.density * self.section.area
+
+    def parameters(self) -> dict[str, dict[str, object]]:
+        """Section and material in SI, as they stand in a case file."""
+        return {"section": self.section.parameters(), "material": asdict(self.material)}
 
 
 def _positive(name: str, value: float, unit: str) -> None:
