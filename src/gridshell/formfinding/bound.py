@@ -53,6 +53,7 @@ def bound_drape(
         constraint=_bind(target, mesh, start),
         length=target.size,
         inextensible=True,
+        places=shell.places,
     )
     found = find_equilibrium(
         problem,

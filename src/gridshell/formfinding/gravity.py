@@ -166,7 +166,9 @@ def _settle(
     supports = Supports(_held(shell, layout))
     state, forces, reports = start, np.zeros(len(mesh.edges)), list[SolveReport]()
     for update in range(CONTACT_UPDATES):
-        problem = Problem((*shell.elements, contact), shell.stretch, supports, target.size, load=load)
+        problem = Problem(
+            (*shell.elements, contact), shell.stretch, supports, target.size, load=load, places=shell.places
+        )
         found = find_equilibrium(
             problem,
             state,

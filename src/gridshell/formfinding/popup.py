@@ -80,7 +80,7 @@ def _problem(shell: Shell, length: float, goals: Floats | None = None) -> Proble
     free = shell.held_ends()
     moved = np.append(shell.ends, shell.ghosts)
     supports = Supports(free) if goals is None else Supports(free, moved, goals)
-    return Problem(shell.elements, shell.stretch, supports, length)
+    return Problem(shell.elements, shell.stretch, supports, length, places=shell.places)
 
 
 def _release(

@@ -71,6 +71,14 @@ class Shell:
             elements = (IsotropicBend(bends, rod.bend_stiffness / lengths),)
         return Shell(mesh, elements, stretch, mesh.ends.ravel(), ghosts, len(mesh.edges) if carried else 0)
 
+    @property
+    def places(self) -> Floats:
+        """(N, 2) where each block lies in the flat grid [m]; a twist angle in the middle of its edge."""
+        flat = self.mesh.flat[:, :2]
+        ghosts = flat[self.ends[: len(self.ghosts)]]
+        middles = flat[self.mesh.edges].mean(axis=1) if self.angles else np.empty((0, 2))
+        return np.vstack([flat, ghosts, middles])
+
     def state(self, positions: Floats, tangents: Floats | None = None) -> Floats:
         """State blocks from node positions (n, 3) and outward end tangents (2m, 3); angles start at zero."""
         blocks = [positions]

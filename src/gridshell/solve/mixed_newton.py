@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.model import Assembly
+from gridshell.model import Assembly, Freedom
 from gridshell.rods.elements import Elements
 from gridshell.rods.stretch import Stretch
 from gridshell.solve.constraint import Constraint
 from gridshell.solve.linear import LinearSolver, Qdldl, SingularError
+from gridshell.solve.multifrontal import Multifrontal
 from gridshell.solve.report import SolveReport, Status
 
 Floats = NDArray[np.float64]
@@ -37,6 +38,7 @@ class Problem:
     constraint : supports or a surface.
     length : characteristic length of the shape [m]: steps are measured by it.
     load : (n, 3) dead forces [N], or None.
+    places : (n, 2) where the blocks lie in the flat grid, from which the order of elimination follows, or None.
     """
 
     elements: tuple[Elements, ...]
@@ -45,6 +47,7 @@ class Problem:
     length: float
     inextensible: bool = False
     load: Floats | None = None
+    places: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,6 @@ def find_equilibrium(
     descend: bool = False,
     most_iterations: int = 60,
     progress: Progress | None = None,
-    solver: Callable[[NDArray[np.int64], NDArray[np.int64]], LinearSolver] = Qdldl,
 ) -> Equilibrium:
     """Equilibrium near `state` (n, 3) [m] with axial forces near `forces` (e,) [N].
 
@@ -88,7 +90,7 @@ def find_equilibrium(
     descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
     """
     begin = time.perf_counter()
-    step = _Step(problem, state, solver)
+    step = _Step(problem, state)
     status, iteration = Status.STALLED, 0
     for iteration in range(1, most_iterations + 1):
         try:
@@ -146,12 +148,16 @@ def find_stable(
     return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))
 
 
+def _linear_solver(assembly: Assembly, free: Freedom, places: Floats | None) -> LinearSolver:
+    if places is None:
+        return Qdldl(assembly.indptr, assembly.indices)
+    return Multifrontal(assembly.indptr, assembly.indices, np.repeat(places, free.count, axis=0))
+
+
 class _Step:
     """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
 
-    def __init__(
-        self, problem: Problem, state: Floats, solver: Callable[[NDArray[np.int64], NDArray[np.int64]], LinearSolver]
-    ) -> None:
+    def __init__(self, problem: Problem, state: Floats) -> None:
         self._problem = problem
         self._elements = problem.elements
         free = problem.constraint.freedom(state)
@@ -159,7 +165,7 @@ class _Step:
         self._blocks = [*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere]
         self._assembly = Assembly.of(self._blocks, free)
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
-        self._solver = solver(self._assembly.indptr, self._assembly.indices)
+        self._solver = _linear_solver(self._assembly, free, problem.places)
         self.dofs = free.size
         self.factorizations = 0
         self.negative_modes = 0
