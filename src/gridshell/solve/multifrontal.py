@@ -6,6 +6,8 @@ what remains is the update matrix for its parent (Duff and Reid 1983). Dense wor
 order of elimination from where the unknowns lie (`ordering`), the symbolic phase once per pattern.
 """
 
+from contextlib import nullcontext
+from functools import lru_cache
 from typing import NamedTuple
 
 import numba as nb
@@ -13,6 +15,7 @@ import numpy as np
 import qdldl
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
+from threadpoolctl import ThreadpoolController
 
 from gridshell.solve.linear import SingularError
 from gridshell.solve.ordering import dissect
@@ -66,11 +69,12 @@ class Multifrontal:
     def factor(self, data: Floats) -> int:
         plan, size = self._plan, len(self._pivots)
         self._matrix = csc_matrix((data, self._indices, self._indptr), shape=(size, size))
-        ok = _numeric(
-            data, plan.first, plan.row_start, plan.rows, plan.relative, plan.child_start, plan.children,
-            plan.entry_start, plan.entry_source, plan.entry_place, plan.panel_start, plan.stack_size,
-            plan.largest_front, self._panels, self._pivots,
-        )  # fmt: skip
+        with _blas().limit(limits=1) if plan.largest_front >= LARGE else nullcontext():
+            ok = _numeric(
+                data, plan.first, plan.row_start, plan.rows, plan.relative, plan.child_start, plan.children,
+                plan.entry_start, plan.entry_source, plan.entry_place, plan.panel_start, plan.stack_size,
+                plan.largest_front, self._panels, self._pivots,
+            )  # fmt: skip
         if not ok:
             raise SingularError("a pivot of the factorisation vanishes")
         return int(np.count_nonzero(self._pivots < 0))
@@ -87,6 +91,14 @@ class Multifrontal:
         result = np.empty_like(x)
         result[plan.order] = x
         return result
+
+
+@lru_cache
+def _blas() -> ThreadpoolController:
+    """The BLAS that Numba calls. Its threads are kept to one: on fronts of a few hundred rows they only wait."""
+    import scipy.linalg  # noqa: F401  loads that BLAS, so that it is found
+
+    return ThreadpoolController().select(user_api="blas")
 
 
 def _dissected(indptr: NDArray[np.int64], indices: NDArray[np.int64], places: Floats) -> NDArray[np.intp]:
