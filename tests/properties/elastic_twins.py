@@ -6,6 +6,7 @@ Nothing here uses the library's elements: stencils are read off the rods' nodes 
 import numpy as np
 from scipy.sparse import csr_matrix
 
+STEP = 1e-7  # m, of a difference
 TINY = 1e-30  # of a complex step: its square vanishes beside 1, so that the derivative is exact
 
 
@@ -22,9 +23,9 @@ class ElasticTwin:
         bends, voronoi, edges, rest = [], [], [], []
         for k in range(len(mesh.grid.rods)):
             nodes, lengths = mesh.nodes_of(k), np.diff(mesh.stations[mesh.rod_slice(k)])
-            edges += list(zip(nodes[:-1], nodes[1:], strict=True))
+            edges += np.column_stack([nodes[:-1], nodes[1:]]).tolist()
             rest += lengths.tolist()
-            bends += list(zip(nodes[:-2], nodes[1:-1], nodes[2:], strict=True))
+            bends += np.column_stack([nodes[:-2], nodes[1:-1], nodes[2:]]).tolist()
             voronoi += ((lengths[:-1] + lengths[1:]) / 2).tolist()
         self.bends, self.voronoi = np.array(bends), np.array(voronoi)
         self.edges, self.rest = np.array(edges), np.array(rest)
@@ -65,3 +66,28 @@ class ElasticTwin:
         """(n, 3) of bending and stretch [N]; axial forces (e,) given, or those of elastic edges."""
         axial = self.stretch_stiffness * self.strains(positions) if forces is None else forces
         return self.bend_gradient(positions) + (self.pulls(positions) @ axial).reshape(positions.shape)
+
+    def stretch_energies(self, points):
+        """[HQK Eq 1a] (e,) energies of elastic edges between `points` (e, 2, 3): EA eps^2 l / 2 [J]."""
+        apart = points[:, 1] - points[:, 0]
+        strain = np.sqrt(np.sum(apart * apart, axis=1)) / self.rest - 1
+        return self.stretch_stiffness * strain**2 * self.rest / 2
+
+    def hessian(self, positions):
+        """(3n, 3n) of bending and elastic stretch [N/m], by central differences of complex steps; 1e-8 of it off."""
+        total = np.zeros((positions.size, positions.size))
+        for energies, stencils in ((self.bend_energies, self.bends), (self.stretch_energies, self.edges)):
+            count, width = stencils.shape
+            local = np.empty((count, 3 * width, 3 * width))
+            for row in range(3 * width):
+                for column in range(3 * width):
+                    moved = np.stack([positions[stencils].reshape(count, -1).astype(complex)] * 2)
+                    moved[:, :, row] += 1j * TINY
+                    moved[0, :, column] += STEP
+                    moved[1, :, column] -= STEP
+                    ahead, back = (energies(one.reshape(count, width, 3)).imag / TINY for one in moved)
+                    local[:, row, column] = (ahead - back) / (2 * STEP)
+            for stencil, matrix in zip(stencils, local, strict=True):
+                rows = (3 * stencil[:, None] + np.arange(3)).ravel()
+                total[np.ix_(rows, rows)] += (matrix + matrix.T) / 2
+        return total

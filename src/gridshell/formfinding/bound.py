@@ -64,7 +64,12 @@ def bound_drape(
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
     warnings = list(net.warnings)
-    if not found.report.converged:
+    if found.report.negative_modes:
+        warnings.append(
+            f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
+            "modes): use a smaller spacing"
+        )
+    if not found.report.stable:
         warnings += _tightest_bend(target, layout, found.state[on_target])
     if degrees(net.min_angle) < WARN_ANGLE:
         x, y, z = net.min_angle_at

@@ -203,13 +203,16 @@ def edge_count(length: float, edge: float) -> int:
 
 
 def _merge_joints(grid: FlatGrid) -> Ints:
-    """Node of each crossing: crossings at one point (three rods or more) share their node."""
-    count = len(grid.crossings)
-    if count == 0:
-        return np.empty(0, dtype=np.intp)
-    points = np.array(
-        [grid.rods[a].point(s) for (a, _), (s, _) in zip(grid.crossings.rods, grid.crossings.at, strict=True)]
-    )
-    scale = max(rod.length for rod in grid.rods)
-    _, node = np.unique(np.round(points / (1e-7 * scale)).astype(np.int64), axis=0, return_inverse=True)
-    return node.ravel().astype(np.intp)
+    """Node of each crossing: crossings at one point (three rods or more) share their node.
+
+    They are neighbours along each of their rods, no further apart than round-off takes them.
+    """
+    rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
+    order = np.lexsort((at, rods))
+    tiny = 1e-7 * max((rod.length for rod in grid.rods), default=0.0)
+    together = (np.diff(rods[order]) == 0) & (np.diff(at[order]) < tiny)
+    joint = order // 2
+    node = np.arange(len(grid.crossings))
+    for a, b in zip(joint[:-1][together], joint[1:][together], strict=True):
+        node[node == node[b]] = node[a]
+    return np.unique(node, return_inverse=True)[1].astype(np.intp)

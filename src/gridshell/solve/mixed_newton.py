@@ -70,6 +70,9 @@ STRAIN_TOLERANCE = 2e-6
 LONGEST_STEP = 0.15  # of the length
 NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
+FORCE_TOLERANCE = 1e-3  # of the largest axial force: by more they must not change in the last step, since the
+LEAST_FORCE = 1e-9  # of EA           negative modes are counted with those from before it
+SHIFT_GROWTH = 8.0
 
 
 def find_equilibrium(
@@ -95,6 +98,7 @@ def find_equilibrium(
     for iteration in range(1, most_iterations + 1):
         try:
             moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
+            settled = _settled(problem, forces, forces_next)
         except SingularError:
             status = Status.DIVERGED
             break
@@ -104,7 +108,7 @@ def find_equilibrium(
         state, forces = state_next, forces_next
         if progress is not None:
             progress(iteration, moved / problem.length)
-        if moved < STEP_TOLERANCE * problem.length and mismatch < STRAIN_TOLERANCE:
+        if moved < STEP_TOLERANCE * problem.length and mismatch < STRAIN_TOLERANCE and settled:
             status = Status.CONVERGED
             break
         step.refresh(state)
@@ -120,7 +124,7 @@ def find_equilibrium(
         max_strain=float(np.abs(problem.stretch.strains(state)).max()),
         negative_modes=step.negative_modes,
     )
-    mode = step.lowest_mode(state) if status is Status.CONVERGED and step.negative_modes else None
+    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     return Equilibrium(state, forces, gradient, report, mode)
 
 
@@ -146,6 +150,12 @@ def find_stable(
                 break
     best = tries[-1] if tries[-1].report.stable else first
     return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))
+
+
+def _settled(problem: Problem, before: Floats, after: Floats) -> bool:
+    """Whether the axial forces hardly changed."""
+    size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE / FORCE_TOLERANCE * problem.stretch.stiffness.max())
+    return float(np.abs(after - before).max(initial=0.0)) <= FORCE_TOLERANCE * size
 
 
 def _linear_solver(assembly: Assembly, free: Freedom, places: Floats | None) -> LinearSolver:
@@ -220,13 +230,10 @@ class _Step:
             np.add.at(result, blocks, product.reshape(*blocks.shape, 3))
         return result
 
-    def lowest_mode(self, state: Floats) -> Floats:
-        """(n, 3) eigenvector of the most negative eigenvalue, by inverse iteration on the shifted Hessian."""
+    def lowest_mode(self) -> Floats:
+        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated."""
         self._shift_until_definite()
-        v = np.sin(1.0 + np.arange(self._free.size) ** 2)  # no symmetry of the shell is one of this start
-        for _ in range(12):
-            v = self._solver.solve(v / np.abs(v).max())
-        mode = self._free.expand(v)
+        mode = self._free.expand(self._inverse_iteration(12)[0])
         return mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max())
 
     def _direction(self, right: Floats, descend: bool) -> Floats:
@@ -243,14 +250,34 @@ class _Step:
         return self._solver.solve(right)
 
     def _shift_until_definite(self) -> None:
-        """Factorise with a growing shift of the diagonal, beginning a little below the last that sufficed."""
+        """Factorise with the diagonal shifted by about twice the most negative eigenvalue.
+
+        A Newton step then doubles what the state has of its mode. The search begins where a wave as long as the
+        shell is soft against the bending of an edge, or below the last shift that sufficed.
+        """
         bending = self._hessians[0]
-        softest = 1e-3 * float(np.trace(bending, axis1=1, axis2=2).mean()) / bending.shape[1]
-        shift, negative = max(softest, self._shift / 16.0), 1
-        while negative and shift < 1e12 * softest:
-            shift *= 4.0
-            shifted = self._data.copy()
-            shifted[self._assembly.diagonal] += shift
-            self.factorizations += 1
-            negative = self._solver.factor(shifted)
+        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
+        softest = slender**4 * float(np.trace(bending, axis1=1, axis2=2).mean()) / bending.shape[1]
+        shift, tries = max(softest, self._shift / SHIFT_GROWTH), 0
+        while self._factor_shifted(shift) and tries < 40:
+            shift, tries = SHIFT_GROWTH * shift, tries + 1
+        lowest = self._inverse_iteration(4)[1] - shift
+        if 0.0 < -2.0 * lowest < 0.5 * shift and not self._factor_shifted(-2.0 * lowest):
+            shift = -2.0 * lowest
         self._shift = shift
+
+    def _factor_shifted(self, shift: float) -> int:
+        shifted = self._data.copy()
+        shifted[self._assembly.diagonal] += shift
+        self.factorizations += 1
+        return self._solver.factor(shifted)
+
+    def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
+        """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
+        v = np.sin(1.0 + np.arange(self._free.size) ** 2)  # no symmetry of the shell is one of this start
+        for _ in range(steps):
+            v /= np.linalg.norm(v)
+            image = self._solver.solve(v)
+            smallest = 1.0 / float(v @ image)
+            v = image
+        return v, smallest
