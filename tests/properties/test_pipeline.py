@@ -100,7 +100,6 @@ def test_families_that_meet_at_a_small_angle_are_warned_of():
     assert any(f"{angle:.1f} degrees" in text for text in form.warnings)
 
 
-@pytest.mark.xfail(strict=True, reason="a bound drape that converges to a saddle is not warned of")
 def test_a_drape_that_is_no_minimum_is_warned_of(monkeypatch):
     """Radius of curvature 8 mm under a spacing of 30 mm: without the patch 19 negative modes, 22 factorisations."""
 
