@@ -32,8 +32,14 @@ if TYPE_CHECKING:
         trim,
     )
     from gridshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+    from gridshell.model.elastic_rod import ElasticRod, RodStrains
     from gridshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
-    from gridshell.rods.section import Circle, Material, Rod, Tube
+    from gridshell.rods.section import Circle, Ellipse, GivenSection, Material, RectangularSection, Rod, Tube
+    from gridshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
+    from gridshell.solve.implicit_euler import ImplicitEuler, Motion
+    from gridshell.solve.rod_statics import RodShape, solve_rod
+    from gridshell.solve.simulate import simulate
+    from gridshell.solve.time_series import Moment, TimeSeries
     from gridshell.targets import (
         Cap,
         Disc,
@@ -53,8 +59,16 @@ _HOMES = {
         "pop_up", "trim",
     ),
     "gridshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
+    "gridshell.model.elastic_rod": ("ElasticRod", "RodStrains"),
     "gridshell.nets": ("ChebyshevNet", "chebyshev_net", "sphere_net_end", "sphere_net_rod"),
-    "gridshell.rods.section": ("Circle", "Material", "Rod", "Tube"),
+    "gridshell.rods.section": (
+        "Circle", "Ellipse", "GivenSection", "Material", "RectangularSection", "Rod", "Tube",
+    ),
+    "gridshell.solve.rod_statics": ("RodShape", "solve_rod"),
+    "gridshell.solve.forces": ("Damping", "ExplicitForce", "Gravity", "ImplicitForce", "PointLoads"),
+    "gridshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
+    "gridshell.solve.simulate": ("simulate",),
+    "gridshell.solve.time_series": ("Moment", "TimeSeries"),
     "gridshell.targets": (
         "Cap", "Disc", "Ellipsoid", "HeightField", "Hemisphere", "Paraboloid", "Rectangle", "Target",
     ),
@@ -62,11 +76,14 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Disc", "Draped", "Ellipsoid",
-    "FlatGrid", "FlatRod", "Footprint", "Form", "GridLayout", "GridMesh", "GridshellError", "HeightField",
-    "Hemisphere", "InputError", "Material", "NetLimitError", "OutputError", "Paraboloid", "Popped", "PoppedUp",
-    "Rectangle", "Rod", "Target", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape", "find_form",
-    "map_back", "mesh_grid", "pop_up", "pop_up_table", "sphere_net_end", "sphere_net_rod", "straight_rods", "trim",
+    "Agreement", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping", "Disc", "Draped",
+    "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "FlatGrid", "FlatRod", "Footprint", "Form",
+    "GivenSection", "Gravity", "GridLayout", "GridMesh", "GridshellError", "HeightField", "Hemisphere",
+    "ImplicitEuler", "ImplicitForce", "InputError", "Material", "Moment", "Motion", "NetLimitError", "OutputError",
+    "Paraboloid", "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rod", "RodShape",
+    "RodStrains", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape", "find_form",
+    "map_back", "mesh_grid", "pop_up", "pop_up_table", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod",
+    "straight_rods", "trim",
 ]  # fmt: skip
 
 

@@ -59,10 +59,14 @@ class Assembly:
     def assemble(self, hessians: Sequence[Floats], element_blocks: Sequence[Ints], freedom: Freedom) -> Floats:
         """Values of the reduced Hessian for element Hessians (m, 3k, 3k) of each set."""
         data = np.zeros(len(self.indices))
-        for hessian, blocks, slots in zip(hessians, element_blocks, self._slots, strict=True):
-            if len(blocks):
-                _scatter(hessian, blocks, slots, self._count, self._above, freedom.directions, data)
+        for k, (hessian, blocks) in enumerate(zip(hessians, element_blocks, strict=True)):
+            self.add(k, hessian, blocks, freedom, data)
         return data
+
+    def add(self, which: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
+        """Add the Hessians (m, 3k, 3k) of one of the element sets to the values `data`."""
+        if len(blocks):
+            _scatter(hessian, blocks, self._slots[which], self._count, self._above, freedom.directions, data)
 
     @property
     def diagonal(self) -> Ints:

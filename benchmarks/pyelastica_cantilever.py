@@ -1,0 +1,154 @@
+"""A cantilever let go under gravity, by gridshell and by PyElastica: seconds of work for one simulated second.
+
+`python benchmarks/pyelastica_cantilever.py [--budget SECONDS]` (pip install pyelastica). A rod of 1 m, radius 10 mm,
+1000 kg/m3, damped at 5 1/s, at 100 and 1000 nodes, E = 1 MPa and 50 GPa. Equal accuracy: at ten times in the second
+the tip is within 10 mm of the reference, which is gridshell's at two small steps, extrapolated. (The codes' own
+limits are up to 5 mm apart at 100 nodes: PyElastica clamps the first edge, half an edge inside.) Each code takes the
+largest step that reaches this, by halves: gridshell from 20 ms, PyElastica, which is explicit, from its stability
+limit. A run that would exceed the budget is stopped, and its time projected from the part done. Compilation is not
+counted.
+"""
+
+import argparse
+import time
+import warnings
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gridshell as gs
+from gridshell.model.elastic_rod import ElasticRod
+
+Floats = NDArray[np.float64]
+
+LENGTH, RADIUS, DENSITY, DAMPING, G = 1.0, 0.01, 1e3, 5.0, 9.81
+TOLERANCE = 1e-2  # of the length
+SAMPLES = 10  # in the second
+CASES = ((100, 1e6), (1000, 1e6), (100, 50e9), (1000, 50e9))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One code on one case; `seconds` is projected where the run was stopped. `said`: why there is no error."""
+
+    seconds: float
+    step: float
+    error: float | None
+    said: str = ""
+
+    def __str__(self) -> str:
+        if self.error is None and not np.isfinite(self.seconds):
+            return f"fails: {self.said}"
+        error = f"error {1e3 * self.error:.2f} mm" if self.error is not None else self.said
+        return f"{self.seconds:9.3g} s, step {self.step:.2g} s, {error}"
+
+
+def gridshell_tips(nodes: int, youngs_modulus: float, step: float) -> tuple[Floats, float]:
+    """Tip (SAMPLES, 3) and seconds."""
+    kind = gs.Rod(gs.Circle(RADIUS), gs.Material(youngs_modulus, DENSITY, 0.5))
+    rest = np.column_stack([np.linspace(0, LENGTH, nodes), np.zeros(nodes), np.zeros(nodes)])
+    rod = ElasticRod.of(rest, kind, clamped=("start",))
+    motion = gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes), gs.Damping(rate=DAMPING)))
+    per_sample = round(1 / (SAMPLES * step))
+    begin = time.perf_counter()
+    series = gs.simulate(motion, rod.state(), until=1.0, step=step, every=per_sample)
+    return series.states[1:, nodes - 1], time.perf_counter() - begin
+
+
+def by_gridshell(nodes: int, youngs_modulus: float, reference: Floats) -> Outcome:
+    outcome = Outcome(np.inf, 0.0, None)
+    for halvings in range(9):
+        step = 0.02 / 2**halvings
+        tips, seconds = gridshell_tips(nodes, youngs_modulus, step)
+        outcome = Outcome(seconds, step, _error(tips, reference))
+        if outcome.error is not None and outcome.error <= TOLERANCE * LENGTH:
+            break
+    return outcome
+
+
+def by_pyelastica(nodes: int, youngs_modulus: float, reference: Floats, budget: float) -> Outcome:
+    """From the time that a stretch wave takes along an edge, or across the section, down."""
+    edge, wave = LENGTH / (nodes - 1), sqrt(youngs_modulus / DENSITY)
+    step = min(edge, RADIUS) / wave
+    said, spent = "", time.perf_counter()
+    for _ in range(8):
+        outcome = _pyelastica_run(nodes, youngs_modulus, step, reference, budget)
+        if outcome.error is not None and outcome.error <= TOLERANCE * LENGTH:
+            return outcome
+        if outcome.error is None and np.isfinite(outcome.seconds):
+            return outcome  # stopped by the budget: half the step would take twice as long
+        said = outcome.said or f"error {1e3 * (outcome.error or np.nan):.1f} mm"
+        if time.perf_counter() - spent > 2 * budget:
+            break
+        step /= 2
+    return Outcome(np.inf, step, None, said)
+
+
+def _pyelastica_run(nodes: int, youngs_modulus: float, step: float, reference: Floats, budget: float) -> Outcome:
+    import elastica as ea
+
+    class Simulator(ea.BaseSystemCollection, ea.Constraints, ea.Forcing, ea.Damping):  # type: ignore[misc]
+        pass
+
+    simulator = Simulator()
+    rod = ea.CosseratRod.straight_rod(
+        nodes - 1, np.zeros(3), np.array([1.0, 0, 0]), np.array([0.0, 0, 1]), LENGTH, RADIUS, DENSITY,
+        youngs_modulus=youngs_modulus, shear_modulus=youngs_modulus / 3,
+    )  # fmt: skip
+    simulator.append(rod)
+    simulator.constrain(rod).using(ea.OneEndFixedBC, constrained_position_idx=(0,), constrained_director_idx=(0,))
+    simulator.add_forcing_to(rod).using(ea.GravityForces, acc_gravity=np.array([0, 0, -G]))
+    simulator.dampen(rod).using(ea.AnalyticalLinearDamper, uniform_damping_constant=DAMPING, time_step=step)
+    simulator.finalize()
+    stepper = ea.PositionVerlet()
+    per_sample = max(1, round(1 / (SAMPLES * step)))
+    h = 1 / (SAMPLES * per_sample)
+    tips, now, done, begin = [], 0.0, 0, None
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(SAMPLES):
+            for _ in range(per_sample):
+                now = stepper.step(simulator, now, h)
+                done += 1
+                if begin is None:  # the first step compiles
+                    begin = time.perf_counter()
+                if done % 1000 == 0 and time.perf_counter() - begin > budget:
+                    seconds = (time.perf_counter() - begin) / (done * h)
+                    if not np.isfinite(rod.position_collection).all():
+                        return Outcome(np.inf, h, None, f"not finite after {now:.2g} s, step {h:.2g} s")
+                    return Outcome(seconds, h, None, f"projected, stopped at {now:.2g} s by the budget of {budget:g} s")
+            if not np.isfinite(rod.position_collection).all():
+                printed = f"; it printed: {caught[0].message}" if caught else ""
+                return Outcome(np.inf, h, None, f"not finite after {now:.2g} s, step {h:.2g} s{printed}")
+            tips.append(rod.position_collection[:, -1].copy())
+    assert begin is not None
+    return Outcome(time.perf_counter() - begin, h, _error(np.array(tips), reference))
+
+
+def _error(tips: Floats, reference: Floats) -> float:
+    return float(np.linalg.norm(tips - reference, axis=1).max())
+
+
+def reference_tips(nodes: int, youngs_modulus: float) -> tuple[Floats, float]:
+    """Tip (SAMPLES, 3) extrapolated to no step, and how far the finer of its two runs is from it [m]."""
+    coarse, fine = (gridshell_tips(nodes, youngs_modulus, step)[0] for step in (2.5e-4, 1.25e-4))
+    limit = 2 * fine - coarse
+    return limit, _error(fine, limit)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--budget", type=float, default=60.0, help="seconds of work allowed to each run of PyElastica")
+    budget = parser.parse_args().budget
+    gridshell_tips(10, 1e6, 0.02)  # compiles
+    for nodes, youngs_modulus in CASES:
+        reference, off = reference_tips(nodes, youngs_modulus)
+        print(f"{nodes} nodes, E {youngs_modulus:.0e} Pa (reference within {1e3 * off:.2f} mm)")
+        print(f"    gridshell   {by_gridshell(nodes, youngs_modulus, reference)}", flush=True)
+        print(f"    PyElastica  {by_pyelastica(nodes, youngs_modulus, reference, budget)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

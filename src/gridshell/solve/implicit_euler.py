@@ -1,0 +1,352 @@
+"""One step of implicit Euler, by Newton's method in the free directions [HQK Eqs 3a-c, 4].
+
+    M dq - h M v - h^2 F(q + dq) = 0,   v <- dq / h,   matrix M / h^2 + C / h + K   (Eq 4 over h^2)
+
+Newton's method is damped by the natural monotonicity test [Deuflhard 2004, section 3.3]: a step is kept if the
+simplified step that follows, by the same factors, is shorter. All lengths of steps are measured by the mass,
+sqrt(sum m dq^2), so that metres and radians may be summed. The simplified step also corrects: where the motion
+is smooth, one factorisation a step is enough.
+
+A step whose matrix has negative pivots is refused. It would be longer than the time in which an instability
+grows, and could end on a saddle of  |dq - h v|^2_M / 2h^2 + E;  at a minimum of that function, reached over convex
+ground, kinetic and elastic energy together do not grow. Smaller steps have more of M / h^2 and pass.
+
+The source frames of the elements stay those of the step's start and are refreshed when it is accepted. The twist
+angles of a motion are hence measured from frames that travel with the rod, and mean nothing without them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Protocol, Self
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.errors import InputError
+from gridshell.model import Assembly, Freedom
+from gridshell.rods.elements import NO_HESSIANS, Elements
+from gridshell.solve.banded import narrow_or_sparse
+from gridshell.solve.constraint import NO_CURVATURE, Constraint, Supports
+from gridshell.solve.forces import Damping, Force, ImplicitForce
+from gridshell.solve.linear import LinearSolver, SingularError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Solver = Callable[[NDArray[np.int64], NDArray[np.int64]], LinearSolver]
+
+RELATIVE = 1e-9  # of the step's own motion; the simplified step that is this short has been taken too
+ROUND_OFF = 1e-13  # of the state: no step can be told from zero below this
+CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth going on with
+MOST_ITERATIONS = 20
+LEAST_SHARE = 1 / 64
+PART = 1024  # elements evaluated at a time: their Hessians (2 MB) stay in the cache, and memory stays small
+
+
+class MovingBody(Protocol):
+    """What a motion needs of a rod or a shell."""
+
+    @property
+    def elements(self) -> tuple[Elements, ...]: ...
+    @property
+    def stretch(self) -> Elements: ...
+    @property
+    def mass(self) -> Floats: ...
+    def freedom(self) -> Freedom: ...
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A body, its supports and the forces on it.
+
+    Parameters
+    ----------
+    elements : every energy, stretch included; their source frames are those of the state to start from.
+    mass : (N, 3) lumped mass of each component [kg]; of a twist angle the rotary inertia [kg m2].
+    constraint : supports or a surface; or what they are at a time [s], for a motion that is prescribed.
+    forces : external forces.
+    """
+
+    elements: tuple[Elements, ...]
+    mass: Floats
+    constraint: Constraint | Callable[[float], Constraint]
+    forces: tuple[Force, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        body: MovingBody,
+        *,
+        constraint: Freedom | Constraint | Callable[[float], Constraint] | None = None,
+        forces: tuple[Force, ...] = (),
+    ) -> Self:
+        """The motion of a rod; without a constraint it is free. A constraint that never moves may be a `Freedom`."""
+        given = body.freedom() if constraint is None else constraint
+        supports = Supports(given) if isinstance(given, Freedom) else given
+        return cls((*body.elements, body.stretch), body.mass, supports, forces)
+
+    def constraint_at(self, time: float) -> Constraint:
+        return self.constraint(time) if callable(self.constraint) else self.constraint
+
+    def elastic_energy(self, state: Floats) -> float:
+        """[J]"""
+        return sum(element.evaluate(state, np.zeros_like(state)) for element in self.elements)
+
+    def kinetic_energy(self, velocity: Floats) -> float:
+        """[J]"""
+        return 0.5 * float(np.vdot(self.mass * velocity, velocity))
+
+    def refreshed(self, state: Floats) -> Self:
+        """The same motion with its source frames at `state`."""
+        return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
+
+    def in_parts(self, most: int = PART) -> Self:
+        """The same motion with its element sets cut into sets of at most `most` elements."""
+        return replace(self, elements=tuple(part for element in self.elements for part in _parts(element, most)))
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step taken: state (N, 3), velocity (N, 3), and the forces (N, 3) [N] that the supports exert."""
+
+    state: Floats
+    velocity: Floats
+    reactions: Floats
+    iterations: int
+    factorizations: int
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A step that could not be taken, and why."""
+
+    reason: str
+    factorizations: int
+
+
+class ImplicitEuler:
+    """Takes single steps; keeps the pattern, its factors and the buffers between them, and nothing of the motion."""
+
+    def __init__(self, solver: Solver = narrow_or_sparse) -> None:
+        self._make_solver = solver
+        self._planned: tuple[object, ...] = ()
+
+    def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
+        """The step from `time` on, `step` long [s]. The elements' source frames belong to `state`."""
+        end = time + step
+        constraint = motion.constraint_at(end)
+        free = constraint.freedom(state)
+        implicit = tuple(force for force in motion.forces if isinstance(force, ImplicitForce))
+        self._plan(motion, implicit, free)
+        held, drag = np.zeros_like(state), np.zeros_like(state)
+        for force in motion.forces:
+            given = force.held(end, state, velocity, motion.mass)
+            if given is not None:
+                held += given
+            if isinstance(force, Damping):
+                drag += force.drag(motion.mass)
+        inertia = motion.mass / step**2 + drag / step
+        if not np.isfinite(held).all():
+            raise InputError(f"an external force is not finite at t = {end:.6g} s: check its parameters")
+        return _Newton(self, motion, constraint, implicit, inertia, held, state, velocity, end, step).solve()
+
+    def _plan(self, motion: Motion, implicit: tuple[ImplicitForce, ...], free: Freedom) -> None:
+        """The assembly; made anew only where the elements' blocks or the number of free directions have changed."""
+        blocks = [*(element.blocks for element in motion.elements), *(force.blocks for force in implicit)]
+        old = self._planned
+        if old and len(old) == len(blocks) + 1 and all(a is b for a, b in zip(old[1:], blocks, strict=True)):
+            count = old[0]
+            if count is free.count or np.array_equal(count, free.count):  # type: ignore[arg-type]
+                return
+        self._planned = (free.count, *blocks)
+        self.assembly = Assembly.of(blocks, free)
+        self.solver = self._make_solver(self.assembly.indptr, self.assembly.indices)
+        self.data = np.empty(len(self.assembly.indices))
+        widths = {3 * b.shape[1]: max(len(c) for c in blocks if c.shape[1] == b.shape[1]) for b in blocks}
+        self.buffers = {width: np.zeros((count, width, width)) for width, count in widths.items()}
+
+
+@dataclass
+class _Newton:
+    """Newton's iteration of one step."""
+
+    plan: ImplicitEuler
+    motion: Motion
+    constraint: Constraint
+    implicit: tuple[ImplicitForce, ...]
+    inertia: Floats  # (N, 3) diagonal M / h^2 + C / h
+    held: Floats
+    start: Floats
+    velocity: Floats
+    end: float
+    step: float
+
+    def solve(self) -> Step | Refused:
+        free = self.constraint.freedom(self.start)
+        moved = np.zeros_like(self.start)
+        inertial = _reduced(self.velocity, free.directions, free.count, free.first, free.size)
+        _add_free(self.step, inertial, free.directions, free.count, free.first, moved)
+        going = self.constraint.remaining(self.start)
+        if going is not None:
+            moved += going
+        state, moved = self._retracted(moved)
+        floor = ROUND_OFF * self._size(self.start)
+        factorizations = 0
+        for iteration in range(1, MOST_ITERATIONS + 1):
+            free = self.constraint.freedom(state)
+            residual, _ = self._residual(free, state, moved, hessian=True)
+            if not np.isfinite(residual).all():
+                return Refused("an edge turned by half a revolution, or the state is not finite", factorizations)
+            factorizations += 1
+            try:
+                negative = self.plan.solver.factor(self.plan.data)
+            except SingularError as error:
+                return Refused(str(error), factorizations)
+            if negative:
+                return Refused(f"the step's matrix has {negative} negative pivots", factorizations)
+            newton = self._expanded(free, self.plan.solver.solve(-residual))
+            length, share = self._size(newton), 1.0
+            while True:
+                state, trial = self._retracted(moved + share * newton)
+                simplified, reactions = self._simplified(state, trial)
+                left = self._size(simplified)
+                if left <= (1.0 - 0.25 * share) * length or left <= floor:
+                    break
+                share *= 0.5
+                if share < LEAST_SHARE:
+                    return Refused("Newton's iteration does not contract", factorizations)
+            moved = trial
+            while share == 1.0:
+                state, moved = self._retracted(moved + simplified)
+                if left <= RELATIVE * self._size(moved) + floor:
+                    return Step(state, moved / self.step, reactions, iteration, factorizations)
+                if not left < CONTRACTION * length:
+                    break
+                length = left
+                simplified, reactions = self._simplified(state, moved)
+                left = self._size(simplified)
+        return Refused(f"Newton's iteration has not converged in {MOST_ITERATIONS} steps", factorizations)
+
+    def _simplified(self, state: Floats, moved: Floats) -> tuple[Floats, Floats]:
+        """Newton's step from here by the factors of the last matrix, and the forces of the supports."""
+        free = self.constraint.freedom(state)
+        residual, total = self._residual(free, state, moved)
+        return self._expanded(free, self.plan.solver.solve(-residual)), total
+
+    def _residual(self, free: Freedom, state: Floats, moved: Floats, *, hessian: bool = False) -> tuple[Floats, Floats]:
+        """Out-of-balance forces in the free directions (size,) and in all (N, 3); Newton's matrix, if wanted."""
+        plan = self.plan
+        total = np.zeros_like(state)
+        if hessian:
+            plan.data[:] = 0.0
+        for which, element in enumerate(self.motion.elements):
+            hessians = NO_HESSIANS
+            if hessian:
+                hessians = plan.buffers[3 * element.blocks.shape[1]][: len(element.blocks)]
+            element.evaluate(state, total, hessians)
+            if hessian:
+                plan.assembly.add(which, hessians, element.blocks, free, plan.data)
+        for which, force in enumerate(self.implicit, start=len(self.motion.elements)):
+            given, hessians = force.at(self.end, state, moved / self.step, self.step)
+            total -= given
+            if hessian:
+                plan.assembly.add(which, hessians, force.blocks, free, plan.data)
+        reduced = np.empty(free.size)
+        _balance(
+            total, self.inertia, self.motion.mass, self.held, moved, self.velocity, self.step,
+            free.directions, free.count, free.first, reduced,
+        )  # fmt: skip
+        if hessian:
+            curvature = self.constraint.curvature(state, total)
+            _add_inertia(
+                self.inertia, curvature if len(curvature) else NO_CURVATURE,
+                free.directions, free.count, free.first, plan.assembly.indptr, plan.data,
+            )  # fmt: skip
+        return reduced, total
+
+    def _retracted(self, moved: Floats) -> tuple[Floats, Floats]:
+        """State and motion on the constraint. Where it is flat the motion keeps all its digits: v = dq / h."""
+        state = self.start + moved
+        back = self.constraint.retract(state)
+        return (state, moved) if back is state else (back, back - self.start)
+
+    def _expanded(self, free: Freedom, q: Floats) -> Floats:
+        motion = np.zeros_like(self.start)
+        _add_free(1.0, q, free.directions, free.count, free.first, motion)
+        return motion
+
+    def _size(self, motion: Floats) -> float:
+        return float(_mass_norm(self.motion.mass, motion))
+
+
+def _parts(elements: Elements, most: int) -> list[Elements]:
+    """`elements` cut up; the arrays with a row for each element are those as long as `blocks`."""
+    count = len(elements.blocks)
+    if count <= most or not is_dataclass(elements):
+        return [elements]
+    rows = {field.name: getattr(elements, field.name) for field in fields(elements)}
+    rows = {name: row for name, row in rows.items() if isinstance(row, np.ndarray) and len(row) == count}
+    return [
+        replace(elements, **{name: np.ascontiguousarray(row[k : k + most]) for name, row in rows.items()})
+        for k in range(0, count, most)
+    ]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _balance(total, inertia, mass, held, moved, velocity, step, directions, count, first, reduced):  # type: ignore[no-untyped-def]
+    """Add inertia, drag and held forces to the gradient `total` [N]; `reduced` is its part in the free directions."""
+    for i in range(len(total)):
+        for k in range(3):
+            total[i, k] += inertia[i, k] * moved[i, k] - mass[i, k] * velocity[i, k] / step - held[i, k]
+        for c in range(count[i]):
+            reduced[first[i] + c] = (
+                directions[i, c, 0] * total[i, 0]
+                + directions[i, c, 1] * total[i, 1]
+                + directions[i, c, 2] * total[i, 2]
+            )
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _add_inertia(inertia, curvature, directions, count, first, indptr, data):  # type: ignore[no-untyped-def]
+    """Add T' (diag(inertia) + curvature) T of each block; a column of the upper triangle ends with its diagonal."""
+    curved = len(curvature) > 0
+    for i in range(len(inertia)):
+        for c in range(count[i]):
+            diagonal = indptr[first[i] + c + 1] - 1
+            for r in range(c + 1):
+                value = 0.0
+                for k in range(3):
+                    value += directions[i, r, k] * inertia[i, k] * directions[i, c, k]
+                    if curved:
+                        for j in range(3):
+                            value += directions[i, r, k] * curvature[i, k, j] * directions[i, c, j]
+                data[diagonal - c + r] += value
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _reduced(field, directions, count, first, size):  # type: ignore[no-untyped-def]
+    q = np.empty(size)
+    for i in range(len(field)):
+        for c in range(count[i]):
+            total = 0.0
+            for k in range(3):
+                total += directions[i, c, k] * field[i, k]
+            q[first[i] + c] = total
+    return q
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _add_free(share, q, directions, count, first, motion):  # type: ignore[no-untyped-def]
+    for i in range(len(motion)):
+        for c in range(count[i]):
+            for k in range(3):
+                motion[i, k] += share * q[first[i] + c] * directions[i, c, k]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _mass_norm(mass, motion):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(len(motion)):
+        for k in range(3):
+            total += mass[i, k] * motion[i, k] * motion[i, k]
+    return np.sqrt(total)

@@ -1,0 +1,456 @@
+"""Equilibrium of one rod: what is held, where it goes, what pulls; followed by steps from a start to the goal.
+
+Two things set a rod apart from a shell. Its twist angles mean something only together with the source frames,
+so these stand still while one equilibrium is sought and move to it once it is found (`follow` does not carry
+them). And lengths and angles are unknowns of one system: the solver sees lengths as shares of the rod's own, so
+that neither the unit nor the size of the rod decides how far a step goes.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gridshell.errors import ConvergenceError, InputError
+from gridshell.geometry.frames import adapted, parallel_transport, signed_angle
+from gridshell.geometry.vectors import cross, dot, unit
+from gridshell.model.elastic_rod import ElasticRod, End, RodStrains
+from gridshell.model.freedom import Freedom
+from gridshell.rods.bend_twist import BendTwist
+from gridshell.rods.elements import NO_HESSIANS, Elements, Ints
+from gridshell.solve.constraint import Supports
+from gridshell.solve.mixed_newton import NUDGE, Problem, find_equilibrium
+from gridshell.solve.report import SolveReport, Status
+
+Floats = NDArray[np.float64]
+_NONE: Mapping[int, ArrayLike] = {}
+
+EASY = 6  # a step of no more iterations may be followed by a longer one
+MOST = 40
+STRETCH, STRETCHES = 8, 40  # on the way down from a saddle: iterations from one source, and how often
+SMALLEST_STEP = 1e-3
+SPIN = (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class RodShape:
+    """A rod in equilibrium.
+
+    Parameters
+    ----------
+    rod : with its source frames at `state`, so that a further solve can start here.
+    state : (N, 3) blocks.
+    axial_forces : (edges,) [N].
+    load : (N, 3) what it carries [N, at angles N m].
+    reactions : (N, 3) of the supports [N, at angles N m]; zero where nothing is held.
+    report : iterations, residual, and whether the equilibrium is stable.
+    """
+
+    rod: ElasticRod
+    state: Floats
+    axial_forces: Floats
+    load: Floats
+    reactions: Floats
+    report: SolveReport
+
+    @property
+    def positions(self) -> Floats:
+        """(n, 3) of the nodes [m]."""
+        return self.state[self.rod.nodes]
+
+    @property
+    def angles(self) -> Floats:
+        """(edges,) twist angles [rad]."""
+        return self.state[self.rod.angles, 0]
+
+    @property
+    def frames(self) -> Floats:
+        """(edges, 3, 3) rows m1, m2, t of each edge."""
+        return self.rod.material_frames(self.state)
+
+    @property
+    def strains(self) -> RodStrains:
+        return self.rod.strains(self.state)
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy [J]."""
+        return self.rod.energy(self.state)
+
+    def support(self, end: End) -> tuple[Floats, Floats]:
+        """Force (3,) [N], and moment (3,) [N m] about the end, that a clamp puts on the rod."""
+        k = self.rod.clamps.index(end)
+        node, ghost = self.rod.clamped_nodes[k], self.rod.ghosts[k]
+        lever, pull = self.state[ghost] - self.state[node], self.reactions[ghost]
+        moment = cross(lever, pull)
+        if self.rod.twists:
+            along = unit(lever) * (-1.0 if end == "start" else 1.0)
+            moment = moment + self.reactions[self.rod.ghost_angles[k], 0] * along
+        return self.reactions[node] + pull, moment
+
+
+def solve_rod(
+    rod: ElasticRod,
+    *,
+    start: ArrayLike | RodShape | None = None,
+    positions: Mapping[int, ArrayLike | None] = _NONE,
+    along: Mapping[int, Sequence[tuple[float, float, float]]] | None = None,
+    tangents: Mapping[End, ArrayLike] | None = None,
+    directors: Mapping[End, ArrayLike] | None = None,
+    turns: Mapping[End, float] | None = None,
+    spinning: Sequence[End] = (),
+    angles: Mapping[int, float] | None = None,
+    forces: Mapping[int, ArrayLike] | ArrayLike = _NONE,
+    moments: Mapping[int | End, float] | None = None,
+    gravity: ArrayLike | None = None,
+    steps: int = 1,
+    stable: bool = True,
+) -> RodShape:
+    """Equilibrium of a rod, followed from `start` while supports and loads go to the goals given here.
+
+    Parameters
+    ----------
+    start : a state (N, 3), or a shape found before (then `rod` is shape.rod); by default the rest shape. What held
+        it is let go bit by bit, unless it is given again: the loads and supports of a shape; of a state, natural
+        strains go from what they are there to the rod's own, and forces that hold what is left fade.
+    positions : node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
+    along : node -> orthonormal directions along which alone it is free.
+    tangents : clamped end -> tangent (3,) along the rod there. Clamps that are not named stay as they are.
+    directors : clamped end -> first material director m1 (3,) there; its part across the tangent is used.
+    turns : clamped end -> how far it turns about its tangent [rad], on top of that; more than once around if so given.
+    spinning : clamped ends that hold position and direction but let the rod spin.
+    angles : edge -> twist angle that it is held at [rad].
+    forces : node -> dead force (3,) [N]; or (n, 3), one for each node.
+    moments : edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
+        the twist angle, counted from frames carried from the last step's shape.
+    gravity : acceleration (3,) [m/s2].
+    steps : equal steps to begin with; they halve where the solver fails and grow back.
+    stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path goes on
+        over saddles, and the report counts the negative modes at its end.
+
+    A rod that nothing keeps from spinning about itself is held at its first edge's angle.
+
+    Raises
+    ------
+    InputError : a support or a load that this rod does not have.
+    ConvergenceError : the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
+    """
+    if steps < 1:
+        raise InputError(f"a path takes at least 1 step, not {steps}")
+    came = start if isinstance(start, RodShape) else None
+    state = came.state if came else np.array(rod.state() if start is None else start, dtype=float)
+    if came and came.rod is not rod:
+        raise InputError("twist angles belong to their frames: go on from a shape with its own rod, shape.rod")
+    if state.shape != (rod.block_count, 3):
+        raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
+    wanted = _Wanted(positions, along or {}, tangents or {}, directors or {}, turns or {}, spinning, angles or {})
+    path = _Path.of(rod, state, wanted)
+    load = _load(rod, forces, moments or {}, gravity, spinning)
+    if path.holds_spin and load[rod.angles.start :, 0].any():
+        raise InputError("nothing keeps this rod from spinning under its moments: hold an angle, or clamp an end")
+    axial = came.axial_forces if came else rod.stretch.stiffness * rod.stretch.strains(state)
+    held = () if came else tuple(_stress_free(element, state) for element in rod.elements)
+    before = _gradient(held or rod.elements, rod, state, axial)  # this load makes the start an equilibrium
+    t, step = 0.0, 1.0 / steps
+    reports = list[SolveReport]()
+    while t < 1.0:
+        there = min(1.0, t + step)
+        if 1.0 - there < 1e-9:
+            there = 1.0
+        pulls = (1 - there) * before + there * load
+        found = _next(rod, partial(_released, held, there), path.at(there), pulls, state, axial, slide=stable)
+        reports.append(found.report)
+        if found.report.converged:
+            t, state, axial, rod = there, found.state, found.forces, found.rod
+            if found.report.iterations <= EASY:
+                step *= 1.6
+        else:
+            step = 0.4 * min(step, there - t)
+            if step < SMALLEST_STEP:
+                report = replace(found.report, status=Status.STALLED).after(*reports[:-1])
+                raise ConvergenceError(
+                    f"the rod's equilibrium was lost {100 * t:.1f} % of the way from the start to the goal: "
+                    "give more steps, a finer mesh, or a start nearer to the goal; or hold what is free to move",
+                    report,
+                )
+    report = reports[-1].after(*reports[:-1])
+    if stable and not report.stable:
+        raise ConvergenceError(
+            f"the rod's equilibrium is not stable: {report.negative_modes} negative modes. Start from a shape bent "
+            "to the side that it is to take; or pass stable=False to have it as it is",
+            report,
+        )
+    return _shape(rod, state, axial, load, path.free, report)
+
+
+def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Freedom, report: SolveReport) -> RodShape:
+    gradient = _gradient(rod.elements, rod, state, axial) - load
+    reactions = gradient - free.expand(free.reduce(gradient))
+    residual = float(np.abs(gradient[rod.nodes] - reactions[rod.nodes]).max())
+    return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """The supports as `solve_rod` was given them."""
+
+    positions: Mapping[int, ArrayLike | None]
+    along: Mapping[int, Sequence[tuple[float, float, float]]]
+    tangents: Mapping[End, ArrayLike]
+    directors: Mapping[End, ArrayLike]
+    turns: Mapping[End, float]
+    spinning: Sequence[End]
+    angles: Mapping[int, float]
+
+    def check(self, rod: ElasticRod) -> None:
+        for end in (*self.tangents, *self.directors, *self.turns, *self.spinning):
+            if end not in rod.clamps:
+                raise InputError(f'the rod is not clamped at "{end}": build it with clamped=("{end}",)')
+        for end in self.spinning:
+            if end in self.directors or end in self.turns:
+                raise InputError(f'the clamp at "{end}" cannot both spin and be turned')
+        if (self.directors or self.turns or self.spinning or self.angles) and not rod.twists:
+            raise InputError("this rod carries no twist angles: build it with twist=True")
+
+
+@dataclass(frozen=True)
+class _Path:
+    """Where the prescribed blocks are at t from 0 to 1; a clamp's tangent turns along the great circle."""
+
+    free: Freedom
+    moved: Ints
+    first: Floats
+    last: Floats
+    clamps: tuple["_TurningClamp", ...]
+    holds_spin: bool
+
+    @staticmethod
+    def of(rod: ElasticRod, state: Floats, wanted: _Wanted) -> "_Path":
+        wanted.check(rod)
+        goals = dict[int, Floats]()
+        for k, node in enumerate(rod.clamped_nodes):
+            goals[int(node)] = state[node]
+            if rod.twists and rod.clamps[k] not in wanted.spinning:
+                goals[int(rod.ghost_angles[k])] = state[rod.ghost_angles[k]]
+        for node, goal in wanted.positions.items():
+            block = _index(node, rod.node_count, "node")
+            goals[block] = state[block] if goal is None else np.asarray(goal, dtype=float)
+        for edge, angle in wanted.angles.items():
+            goals[rod.node_count + _index(edge, rod.edge_count, "edge")] = np.array([angle, 0.0, 0.0])
+        clamps = tuple(_TurningClamp.of(rod, state, k, goals, wanted) for k in range(len(rod.clamps)))
+        holds_spin = rod.twists and rod.free_spin and not any(block >= rod.node_count for block in goals)
+        if holds_spin:
+            goals[rod.angles.start] = state[rod.angles.start]
+        moved = np.array(list(goals), dtype=np.intp)
+        free = rod.freedom()
+        for node, directions in wanted.along.items():
+            free = free.with_directions(np.array([_index(node, rod.node_count, "node")]), *directions)
+        spins = [int(rod.ghost_angles[rod.clamps.index(end)]) for end in wanted.spinning]
+        free = free.with_directions(np.array(spins, dtype=np.intp), SPIN).with_directions(moved)
+        last = np.array([goals[block] for block in goals]).reshape(-1, 3)
+        return _Path(free, moved, state[moved], last, clamps, holds_spin)
+
+    def at(self, t: float) -> Supports:
+        moved = np.concatenate([self.moved, np.array([c.ghost for c in self.clamps], dtype=np.intp)])
+        goals = (1 - t) * self.first + t * self.last
+        ghosts = [clamp.at(t) for clamp in self.clamps]
+        return Supports(self.free, moved, np.vstack([goals, *ghosts]))
+
+
+@dataclass(frozen=True)
+class _TurningClamp:
+    """A clamp whose end goes straight from `start` to `goal` [m] while its tangent turns by `angle` [rad] to `side`."""
+
+    ghost: int
+    start: Floats
+    goal: Floats
+    reach: float
+    tangent: Floats
+    side: Floats
+    angle: float
+
+    @staticmethod
+    def of(rod: ElasticRod, state: Floats, k: int, goals: dict[int, Floats], wanted: _Wanted) -> "_TurningClamp":
+        """The k-th clamp; puts the angle that its ghost edge is to reach into `goals`."""
+        end, node, ghost = rod.clamps[k], int(rod.clamped_nodes[k]), int(rod.ghosts[k])
+        outward = -1.0 if end == "start" else 1.0
+        arm = outward * (state[ghost] - state[node])
+        reach, now = float(np.linalg.norm(arm)), unit(arm)
+        then = unit(np.asarray(wanted.tangents.get(end, now), dtype=float))
+        angle = float(np.arctan2(np.linalg.norm(cross(now, then)), dot(now, then)))
+        if angle > np.pi - 1e-6:
+            raise InputError(f'the clamp at "{end}" turns back on itself: give its way in two solves')
+        side = unit(then - dot(now, then) * now) if angle > 1e-12 else np.zeros(3)
+        if end in wanted.directors or end in wanted.turns:
+            block = int(rod.ghost_angles[k])
+            theta = float(state[block, 0]) + wanted.turns.get(end, 0.0)
+            if end in wanted.directors:
+                d1 = rod.reference_directors(state)[rod.edge_count + k]
+                m1 = np.cos(state[block, 0]) * d1 + np.sin(state[block, 0]) * cross(now, d1)
+                carried = parallel_transport(m1, now, then)
+                theta += float(
+                    signed_angle(carried, adapted(np.asarray(wanted.directors[end], dtype=float), then), then)
+                )
+            goals[block] = np.array([theta, 0.0, 0.0])
+        return _TurningClamp(ghost, state[node], goals[node], outward * reach, now, side, angle)
+
+    def at(self, t: float) -> Floats:
+        """(3,) place of the ghost."""
+        turned = np.cos(t * self.angle) * self.tangent + np.sin(t * self.angle) * self.side
+        return (1 - t) * self.start + t * self.goal + self.reach * turned
+
+
+@dataclass(frozen=True)
+class _FromOneSource:
+    """Elements whose source frames stay where they are."""
+
+    elements: Elements
+    blocks: Ints = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "blocks", self.elements.blocks)
+
+    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        return self.elements.evaluate(state, gradient, hessians)
+
+    def refreshed(self, state: Floats) -> Self:
+        return self
+
+
+@dataclass(frozen=True)
+class _Found:
+    """An equilibrium: the rod with its sources at the state (N, 3), and axial forces (edges,) [N]."""
+
+    rod: ElasticRod
+    state: Floats
+    forces: Floats
+    report: SolveReport
+    mode: Floats | None
+
+
+Release = Callable[[tuple[Elements, ...]], tuple[Elements, ...]]
+
+
+def _next(
+    rod: ElasticRod, release: Release, supports: Supports, load: Floats, state: Floats, axial: Floats, *, slide: bool
+) -> _Found:
+    """The equilibrium next to `state`; if `slide`, from a saddle on along its mode, to either side in turn.
+
+    As `find_stable`, but for sources that keep up with the rod on its way down: in the frames of one source an
+    edge can turn by less than half a revolution.
+    """
+    first = _solve(rod, release, supports, load, state, axial)
+    reports = [first.report]
+    best = first
+    for side in (1.0, -1.0) if slide and first.mode is not None else ():
+        assert first.mode is not None
+        found = replace(first, state=first.state + side * NUDGE * first.mode)
+        for _ in range(STRETCHES):
+            found = _solve(found.rod, release, supports, load, found.state, found.forces, descend=True)
+            reports.append(found.report)
+            if found.report.status is not Status.STALLED:
+                break
+        if found.report.stable:
+            best = found
+            break
+    return replace(best, report=best.report.after(*(report for report in reports if report is not best.report)))
+
+
+def _solve(
+    rod: ElasticRod,
+    release: Release,
+    supports: Supports,
+    load: Floats,
+    state: Floats,
+    axial: Floats,
+    *,
+    descend: bool = False,
+) -> _Found:
+    """One Newton solve from one source, lengths being measured by the rod's own; energies stay in joule."""
+    unit_length = float(rod.stretch.rest_lengths.sum())
+    scale = np.ones((rod.block_count, 1))
+    scale[rod.nodes] = scale[rod.ghosts] = unit_length
+    problem = Problem(
+        tuple(_FromOneSource(element) for element in release(rod.elements)),
+        replace(
+            rod.stretch,
+            rest_lengths=rod.stretch.rest_lengths / unit_length,
+            stiffness=rod.stretch.stiffness * unit_length,
+        ),
+        replace(supports, goals=supports.goals / scale[supports.moved]),
+        1.0,
+        load=load * scale,
+    )
+    found = find_equilibrium(
+        problem, state / scale, axial * unit_length, descend=descend, most_iterations=STRETCH if descend else MOST
+    )
+    end = found.state * scale
+    mode = None if found.mode is None else found.mode * scale
+    lost = found.report.status is Status.DIVERGED
+    return _Found(rod if lost else rod.refreshed(end), end, found.forces / unit_length, found.report, mode)
+
+
+def _stress_free(element: Elements, state: Floats) -> Elements:
+    """The element without stress at `state`, if it has natural strains to choose."""
+    return element.relaxed(state) if isinstance(element, BendTwist) else element
+
+
+def _released(held: tuple[Elements, ...], t: float, own: tuple[Elements, ...]) -> tuple[Elements, ...]:
+    """Elements whose natural strains have gone the share t from those of `held`, if any, to their own."""
+    result = list(own)
+    for k, first in enumerate(held):
+        last = own[k]
+        if isinstance(first, BendTwist) and isinstance(last, BendTwist) and t < 1:
+            result[k] = replace(
+                last,
+                natural_curvature=(1 - t) * first.natural_curvature + t * last.natural_curvature,
+                natural_twist=(1 - t) * first.natural_twist + t * last.natural_twist,
+            )
+    return tuple(result)
+
+
+def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, axial: Floats) -> Floats:
+    """(N, 3) of the energy, the edges carrying the axial forces (edges,) [N]."""
+    gradient = np.zeros_like(state)
+    for element in elements:
+        element.evaluate(state, gradient)
+    rod.stretch.add_axial(state, axial, gradient)
+    return gradient
+
+
+def _load(
+    rod: ElasticRod,
+    forces: Mapping[int, ArrayLike] | ArrayLike,
+    moments: Mapping[int | End, float],
+    gravity: ArrayLike | None,
+    spinning: Sequence[End],
+) -> Floats:
+    """(N, 3) dead load [N, at angles N m]."""
+    load = np.zeros((rod.block_count, 3)) if gravity is None else rod.weight(gravity)
+    if isinstance(forces, Mapping):
+        for node, force in forces.items():
+            load[_index(node, rod.node_count, "node")] += np.asarray(force, dtype=float)
+    else:
+        given = np.asarray(forces, dtype=float)
+        if given.shape != rod.rest.shape:
+            raise InputError(f"forces on all nodes have the shape {rod.rest.shape}, not {given.shape}")
+        load[rod.nodes] += given
+    if moments and not rod.twists:
+        raise InputError("this rod carries no twist angles: build it with twist=True")
+    for place, moment in moments.items():
+        if isinstance(place, str):
+            if place not in spinning:
+                raise InputError(f'the moment at "{place}" needs a clamp there that spins: spinning=("{place}",)')
+            load[rod.ghost_angles[rod.clamps.index(place)], 0] += moment
+        else:
+            load[rod.node_count + _index(place, rod.edge_count, "edge"), 0] += moment
+    return load
+
+
+def _index(given: int, count: int, what: str) -> int:
+    if not -count <= given < count:
+        raise InputError(f"the rod has no {what} {given}: they run from 0 to {count - 1}")
+    return given % count
