@@ -211,6 +211,7 @@ ON_SPHERES = {
     "an odd offset": SphereCase(7e-7, {"offset": (0.007, 0.011)}),
     "an odd offset, 9x12": SphereCase(6e-7, {"offset": (0.007, -0.011), "rods": (9, 12)}),
     "unequal spacings": SphereCase(7e-8, {"spacing": (0.02, 0.05)}),
+    "very unequal spacings": SphereCase(7e-7, {"spacing": (0.012, 0.12)}),
     "unequal spacings, 7x8": SphereCase(6e-7, {"spacing": (0.05, 0.02), "rods": (7, 8), "offset": (0.0, 0.003)}),
     "turned": SphereCase(8e-8, {"rotate": 0.4}),
 }
@@ -422,6 +423,80 @@ def test_rod_ends_on_a_flat_disc_are_chords_even_where_a_node_lies_on_the_rim(sp
         np.testing.assert_allclose(offsets, lattice[np.abs(lattice) < R - 1e-9], rtol=0, atol=1e-15)
         chords = np.sqrt(R**2 - offsets[:, None] ** 2) * [-1, 1]
         np.testing.assert_allclose(ends, chords, rtol=0, atol=1e-15)  # 6e-17 measured
+
+
+# Rods that leave the target and come back
+
+DOME = 0.3  # radius of a sphere over a rectangle: rods past its long sides are outside in their middle
+
+
+def pieces_on_dome(family: str, offset: float, half: tuple[float, float]) -> Floats:
+    """Start and end (k, 2) of every piece of a rod whose plan lies in the rectangle with these half-widths."""
+    path = sphere_net_rod(DOME, offset, 0.3).sol
+    sides = np.array(half if family == "u" else half[::-1])
+
+    def margin(s: float | Floats) -> Floats:
+        return np.min(sides - DOME * np.abs(path(np.abs(s) / DOME)[:2].T), axis=-1)
+
+    s = np.linspace(-0.3, 0.3, 1201)
+    changes = np.flatnonzero(np.diff(np.sign(margin(s))))
+    return np.array([brentq(margin, s[k], s[k + 1], xtol=1e-14) for k in changes]).reshape(-1, 2)
+
+
+@pytest.mark.parametrize(("spacing", "offset"), [
+    (0.02, (0.001, 0.005)), (0.022, (0.001, 0.005)), (0.022, (0.0, 0.001)), (0.051, (0.0, 0.001)), (0.03, (0.0, 0.0)),
+])  # fmt: skip
+def test_of_a_rod_in_two_pieces_one_is_kept_and_said(spacing, offset):
+    """The two marches may differ in which piece is the longest: ends were extrapolated from one to the other, to
+    places 40 mm and more off the target."""
+    target = HeightField(formula=f"sqrt({DOME}^2 - x^2 - y^2)", domain=Rectangle((0.4, 0.2)))
+    net = chebyshev_net(target, grid(spacing=spacing, offset=offset))
+    split = []
+    for rod in net.rods:
+        pieces = pieces_on_dome(rod.family, rod.offset, (0.2, 0.1))
+        missed = np.abs(pieces - [rod.start, rod.end]).max(axis=1).min()
+        if len(pieces) > 1:
+            split.append(f"rod {rod.name} meets the target in 2 pieces; only the longest is kept")
+            assert missed < 1.5e-4  # 7e-5 measured: one march alone, and rods meet the edge at flat angles
+            assert rod.length == pytest.approx(np.diff(pieces, axis=1).max(), abs=3e-4)
+        else:
+            assert missed < 5e-9  # 1.2e-9 measured
+    assert net.warnings == tuple(split)
+    assert bool(split) == (spacing != 0.03)
+
+
+def lines_at(heights: Floats, s: Floats) -> Floats:
+    """(m, n, 3) lines over the x axis, their heights (m, n) being all that a target with a base plane looks at."""
+    return np.stack([np.broadcast_to(s, heights.shape), 0 * heights, heights], axis=-1)
+
+
+def test_lines_are_cut_where_they_cross_the_base_and_the_longest_piece_is_given():
+    s = np.linspace(-1.0, 1.0, 41)
+    heights = np.stack([
+        (s + 0.83) * (s - 0.76) * (s - 2), -1 + 0 * s,
+        -(s + 0.81) * (s + 0.42) * (s - 0.11) * (s - 0.93), -(s + 0.81) * (s + 0.02) * (s - 0.11) * (s - 0.73),
+    ])  # fmt: skip
+    two, none, late, early = cut_lines(HEMISPHERE, s, lines_at(heights, s), heights > 0)
+    # a cubic is its own interpolant; a quartic is missed by h^4 / 24 of its fourth derivative over its slope
+    assert two == (pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13), 1)
+    assert none is None
+    assert late == (pytest.approx(0.11, abs=1e-5), pytest.approx(0.93, abs=1e-5), 2)
+    assert early == (pytest.approx(-0.81, abs=1e-5), pytest.approx(-0.02, abs=1e-5), 2)
+    mirrored = cut_lines(HEMISPHERE, s, lines_at(heights[:, ::-1], s), heights[:, ::-1] > 0)
+    assert mirrored[2] == (pytest.approx(-0.93, abs=1e-5), pytest.approx(-0.11, abs=1e-5), 2)
+
+
+@pytest.mark.parametrize("beyond", [1, 2, 3])
+def test_a_line_that_stops_just_past_the_base_is_cut_from_within(beyond):
+    """Next to the net's limit nodes are missing: of those outside only the first `beyond` are left."""
+    s = np.linspace(-1.0, 1.0, 41)
+    heights = (s + 0.83) * (s - 0.76) * (s - 2)
+    inside = heights > 0
+    first, last = np.flatnonzero(inside)[[0, -1]]
+    line = lines_at(heights[None], s)
+    line[0, : first - beyond] = line[0, last + 1 + beyond :] = np.nan
+    (cut,) = cut_lines(HEMISPHERE, s, line, inside[None])
+    assert cut == (pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13), 1)
 
 
 # Order

@@ -102,6 +102,7 @@ def test_rod_with_ends_brought_together_is_eulers_elastica(clamped, shortening):
     for edges in (20, 40, 80):
         shell, found = brought_together(edges, shortening, clamped=clamped)
         assert found.report.stable
+        assert found.report.iterations < 50  # 24; some 300 if a step's first iteration did not predict its end
         sizes.append(1 / edges)
         rises.append(rise(shell, found) / exact.rise - 1)
         support = found.gradient[shell.ends] + (found.gradient[shell.ghosts] if clamped else 0)
@@ -320,6 +321,22 @@ def test_a_solve_that_knows_the_place_but_not_the_forces_tells_that_it_is_unstab
     assert found.report.converged
     np.testing.assert_allclose(found.forces, -1.5 * EULER, rtol=1e-9)
     assert found.report.negative_modes == 1
+
+
+@pytest.mark.parametrize("descend", [False, True])
+def test_near_a_saddle_newton_finds_it_unless_told_to_descend(descend):
+    _, straight = squeezed_column(20, 1.5, stiffness=1e4 * EI)
+
+    def find_from_a_small_wave(problem, state, forces):
+        wave = 1e-3 * np.sin(pi * (shell.mesh.flat[:, :1] + 0.5)) * [0, 0, 1]
+        return find_equilibrium(problem, state + wave, forces, descend=descend)
+
+    shell = straight_rod(20)
+    _, found = squeezed_column(20, 1.5, find_from_a_small_wave, stiffness=1e4 * EI)
+    assert found.report.converged
+    assert found.report.stable == descend
+    if not descend:
+        np.testing.assert_allclose(found.state, straight.state, rtol=0, atol=1e-9)
 
 
 def test_the_work_of_all_tries_is_counted():

@@ -315,13 +315,17 @@ def test_heading_of_a_right_angle_swaps_the_families():
         np.testing.assert_allclose(swapped, lengths, rtol=0, atol=SAME * 0.2)  # the ellipsoid's mirrors help
 
 
-def test_spacings_along_x_and_y_keep_to_their_families():
+@pytest.mark.parametrize("counts", [{}, {"rods": (9, 7)}, {"rods": (8, 6)}], ids=["auto", "odd", "even"])
+def test_spacings_along_x_and_y_keep_to_their_families(counts):
     """Spacing [u, v]: the rods along x lie su apart; exchanging the two turns the grid on a hemisphere."""
-    wide = gs.drape(layout_of(spacing=(0.04, 0.06)), ROD, gs.Hemisphere(0.2))
+    wide = gs.drape(layout_of(spacing=(0.04, 0.06), **counts), ROD, gs.Hemisphere(0.2))
     offsets = {family: [rod.offset for rod in wide.rods if rod.family == family] for family in "uv"}
-    np.testing.assert_allclose(np.diff(offsets["u"]), 0.04)
-    np.testing.assert_allclose(np.diff(offsets["v"]), 0.06)
-    high = gs.drape(layout_of(spacing=(0.06, 0.04)), ROD, gs.Hemisphere(0.2))
+    for family, side, spacing in (("u", 0, 0.04), ("v", 1, 0.06)):
+        np.testing.assert_allclose(np.diff(offsets[family]), spacing)
+        np.testing.assert_allclose(np.sum(offsets[family]), 0.0, rtol=0, atol=1e-12)
+        assert not counts or len(offsets[family]) == counts["rods"][side]
+    swapped = {name: pair[::-1] for name, pair in counts.items()}
+    high = gs.drape(layout_of(spacing=(0.06, 0.04), **swapped), ROD, gs.Hemisphere(0.2))
     assert mismatch(turned(wide.positions, pi / 2), high.positions) < SAME * 0.2
 
 

@@ -226,6 +226,7 @@ def _extrapolate(
                 cut_lines(target, net.v, net.points[row], inside[row]),
             )
         )
+    step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
     error = 0.0
     families = list[list[Cut | None]]()
     for coarse, fine in zip(cuts[0], cuts[1], strict=True):
@@ -235,6 +236,9 @@ def _extrapolate(
                 family.append(exact)
                 continue
             change = np.array([exact.start - rough.start, exact.end - rough.end]) / 3
+            if 3 * np.abs(change).max() > step:  # each march has cut another piece of the line
+                family.append(exact)
+                continue
             error = max(error, float(np.abs(change).max()))
             family.append(Cut(exact.start + change[0], exact.end + change[1], exact.pieces))
         families.append(family)
