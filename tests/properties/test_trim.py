@@ -37,6 +37,9 @@ def bound(target: Target, **given: Any) -> Draped:
 
 DRAPES: dict[str, tuple[Target, dict[str, Any]]] = {
     "hemisphere": (Hemisphere(R), {}),
+    # a joint 0.136 spacings from an end, not made; one at 0.156, made
+    "hemisphere at 34 mm": (Hemisphere(R), {"spacing": 0.034}),
+    "hemisphere at 46 mm": (Hemisphere(R), {"spacing": 0.046}),
     "hemisphere, 17x17": (Hemisphere(R), {"rods": (17, 17)}),
     "hemisphere, 25x16": (Hemisphere(R), {"rods": (25, 16), "offset": (0.004, 0.0)}),
     "paraboloid": (Paraboloid(R, 0.12), {}),
@@ -149,6 +152,8 @@ def test_every_rod_left_has_three_joints_and_the_others_are_named(name):
     expected = {
         "hemisphere": set(),
         "hemisphere, 17x17": set(),
+        "hemisphere at 34 mm": set(),
+        "hemisphere at 46 mm": set(),
         "hemisphere, 25x16": {("U01", NEVER), ("U02", NEVER), ("U24", NEVER), ("U25", NEVER)},
         # 15 mm on either side of the middle rod alone: one joint
         "paraboloid": {(rod, SWINGS) for rod in ("U01", "U17", "V01", "V17")},
@@ -296,15 +301,16 @@ def clothoid(s: Floats) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize(("curve", "ratio"), [(circle, 8.0), (clothoid, 4.0)])
 def test_end_tangents_are_of_second_order(curve, ratio):
-    """Of third order on a circle, as its chords have the direction of their middles; edges are uneven here."""
-    places, errors = [-0.3, -0.27, -0.2, -0.1, 0.0, 0.1, 0.3, 0.4, 0.45, 0.5], []
-    for refine in (2, 4, 8):
-        stations = np.interp(np.linspace(0, 9, 9 * refine + 1), np.arange(10), places)
+    """Of third order on a circle, as its chords have the direction of their middles; every other edge is longer."""
+    errors = []
+    for count in (10, 20, 40):
+        edges = np.append(np.tile([1.0, 2.0], count), 1.0)
+        stations = -0.3 + 0.8 * np.append(0.0, np.cumsum(edges)) / edges.sum()
         mesh = lone_rod(stations)
         positions, tangents = curve(stations)
         found = end_tangents(mesh, positions[np.argsort(mesh.nodes_of(0))])
         errors.append(np.linalg.norm(found - tangents[[0, -1]] * [[-1], [1]], axis=1).max())
-    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], ratio, rtol=0.03)  # 8.00 and 4.03 measured
+    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], ratio, rtol=0.06)  # 7.61, 7.80; 3.90, 3.95
 
 
 def test_end_tangents_of_a_straight_or_undivided_rod_are_its_direction():

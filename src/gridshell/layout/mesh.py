@@ -118,6 +118,9 @@ class GridMesh:
         return result
 
 
+CROWDED = 1e-3  # of the usual edge: a node that near to a rod's end is left out; at 2e-3 all goes well
+
+
 def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
     """Divide a flat grid: every span between joints and every tail into the fewest equal edges of at most `edge` [m].
 
@@ -159,7 +162,8 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
 def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
     """The part of a mesh that belongs to `rods`: rods of its grid, cut at nodes; and its nodes (n,) in `mesh`.
 
-    Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own.
+    Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own, unless
+    it would crowd the end, where it would make an edge far shorter and stiffer than the others.
     """
     parent = {rod.name: index for index, rod in enumerate(mesh.grid.rods)}
     joint_of = {
@@ -181,10 +185,14 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
         starts.append(len(nodes))
         s = mesh.stations[mesh.rod_slice(place)]
         tiny = 1e-9 * rod.length
-        for k in np.flatnonzero((s >= rod.start - tiny) & (s <= rod.end + tiny)):
+        inside = np.flatnonzero((s >= rod.start - tiny) & (s <= rod.end + tiny))
+        crowded = CROWDED * float(np.median(np.diff(s)))
+        for k in inside:
             node = int(mesh.nodes_of(place)[k])
             if node in joined:
                 nodes.append(shared[node])
+            elif k not in inside[[0, -1]] and np.abs(s[k] - s[inside[[0, -1]]]).min() < crowded:
+                continue
             else:
                 nodes.append(len(source))
                 source.append(node)
