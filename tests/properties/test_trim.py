@@ -152,7 +152,8 @@ def test_every_rod_left_has_three_joints_and_the_others_are_named(name):
     expected = {
         "hemisphere": set(),
         "hemisphere, 17x17": set(),
-        "hemisphere at 34 mm": set(),
+        # 1.35 spacings long on either side, but its joints at 1 are 0.108 spacings from the end of the other rod
+        "hemisphere at 34 mm": {(rod, SWINGS) for rod in ("U01", "U19", "V01", "V19")},
         "hemisphere at 46 mm": set(),
         "hemisphere, 25x16": {("U01", NEVER), ("U02", NEVER), ("U24", NEVER), ("U25", NEVER)},
         # 15 mm on either side of the middle rod alone: one joint
