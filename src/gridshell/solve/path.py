@@ -35,7 +35,7 @@ def follow(
 
     Returns
     -------
-    The equilibrium at t = 1, or at the last t reached with the status of the step that failed. Iterations,
+    The equilibrium at t = 1, or at the last t reached, with the status STALLED. Iterations,
     factorizations and seconds of the report are those of the whole path, failed steps included.
     """
     t, step = 0.0, first_step
