@@ -136,6 +136,8 @@ def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> Fla
         raise InputError(f"rod {int(np.argwhere(~np.isfinite(points))[0, 0]) + 1} has an end that is not finite")
     digits = len(str(len(points)))
     labels = list(names) if names is not None else [f"R{k + 1:0{max(digits, 2)}d}" for k in range(len(points))]
+    if len(set(labels)) != len(points):
+        raise InputError(f"{len(points)} rods need as many different names, not {len(set(labels))}")
     apart = points[:, 1] - points[:, 0]
     length = np.linalg.norm(apart, axis=1)
     if not (length > 0).all():

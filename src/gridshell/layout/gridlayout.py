@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from math import isfinite
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -51,7 +52,10 @@ class GridLayout:
         ------
         InputError : a count below 2, a spacing, length or edge that is not positive, an edge above the spacing.
         """
-        pair = (spacing, spacing) if isinstance(spacing, int | float) else (spacing[0], spacing[1])
+        pair = spacing if isinstance(spacing, tuple | list) else (spacing, spacing)
+        for name, two in (("spacing", pair), ("offset", offset)):
+            if not isinstance(two, tuple | list) or len(two) != 2 or not all(isinstance(one, Real) for one in two):
+                raise InputError(f"layout {name} must be two lengths in m, not {two!r}")
         for name, value in (("spacing", pair[0]), ("spacing", pair[1]), ("edge", edge), ("length", length)):
             if value != "auto" and not (isfinite(value) and value > 0):
                 raise InputError(f"layout {name} must be positive, not {value} m")
