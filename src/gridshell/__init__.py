@@ -16,7 +16,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gridshell.errors import ConvergenceError, GridshellError, InputError, NetLimitError, OutputError
+    from gridshell.errors import (
+        ConvergenceError,
+        GridshellError,
+        InputError,
+        NetLimitError,
+        OutputError,
+        StabilityError,
+    )
     from gridshell.form import Form, PoppedUp, find_form, pop_up_table
     from gridshell.formfinding import (
         Agreement,
@@ -31,8 +38,19 @@ if TYPE_CHECKING:
         pop_up,
         trim,
     )
+    from gridshell.joints import (
+        Ball,
+        ExplicitPenalty,
+        ImplicitPenalty,
+        Linker,
+        Pin,
+        Rigid,
+        SharedDofs,
+        Spring,
+    )
     from gridshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
     from gridshell.model.elastic_rod import ElasticRod, RodStrains
+    from gridshell.model.shell import Shell
     from gridshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
     from gridshell.rods.section import Circle, Ellipse, GivenSection, Material, RectangularSection, Rod, Tube
     from gridshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
@@ -52,14 +70,20 @@ if TYPE_CHECKING:
     )
 
 _HOMES = {
-    "gridshell.errors": ("ConvergenceError", "GridshellError", "InputError", "NetLimitError", "OutputError"),
+    "gridshell.errors": (
+        "ConvergenceError", "GridshellError", "InputError", "NetLimitError", "OutputError", "StabilityError",
+    ),
     "gridshell.form": ("Form", "PoppedUp", "find_form", "pop_up_table"),
     "gridshell.formfinding": (
         "Agreement", "Boundary", "Draped", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
         "pop_up", "trim",
     ),
+    "gridshell.joints": (
+        "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
+    ),
     "gridshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
     "gridshell.model.elastic_rod": ("ElasticRod", "RodStrains"),
+    "gridshell.model.shell": ("Shell",),
     "gridshell.nets": ("ChebyshevNet", "chebyshev_net", "sphere_net_end", "sphere_net_rod"),
     "gridshell.rods.section": (
         "Circle", "Ellipse", "GivenSection", "Material", "RectangularSection", "Rod", "Tube",
@@ -76,14 +100,15 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping", "Disc", "Draped",
-    "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "FlatGrid", "FlatRod", "Footprint", "Form",
-    "GivenSection", "Gravity", "GridLayout", "GridMesh", "GridshellError", "HeightField", "Hemisphere",
-    "ImplicitEuler", "ImplicitForce", "InputError", "Material", "Moment", "Motion", "NetLimitError", "OutputError",
-    "Paraboloid", "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rod", "RodShape",
-    "RodStrains", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape", "find_form",
-    "map_back", "mesh_grid", "pop_up", "pop_up_table", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod",
-    "straight_rods", "trim",
+    "Agreement", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping", "Disc",
+    "Draped", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "FlatGrid", "FlatRod",
+    "Footprint", "Form", "GivenSection", "Gravity", "GridLayout", "GridMesh", "GridshellError", "HeightField",
+    "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Linker", "Material",
+    "Moment", "Motion", "NetLimitError", "OutputError", "Paraboloid", "Pin", "PointLoads", "Popped", "PoppedUp",
+    "Rectangle", "RectangularSection", "Rigid", "Rod", "RodShape", "RodStrains", "SharedDofs", "Shell",
+    "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net",
+    "drape", "find_form", "map_back", "mesh_grid", "pop_up", "pop_up_table", "simulate", "solve_rod",
+    "sphere_net_end", "sphere_net_rod", "straight_rods", "trim",
 ]  # fmt: skip
 
 

@@ -15,6 +15,10 @@ class NetLimitError(GridshellError):
     """No inextensible net exists on this target for this anchor and heading: a crossing angle reaches 0."""
 
 
+class StabilityError(GridshellError):
+    """A time step is beyond the limit of an explicit scheme, whose motion would blow up."""
+
+
 class OutputError(GridshellError, OSError):
     """A result cannot be written or read."""
 

@@ -1,5 +1,18 @@
 """What a crossing does, and how the rods that meet there share their degrees of freedom."""
 
-from gridshell.joints.joint import Ball, Joint
+from gridshell.joints.coupling import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs, Ties
+from gridshell.joints.joint import Ball, Joint, Linker, Pin, Rigid, Spring
 
-__all__ = ["Ball", "Joint"]
+__all__ = [
+    "Ball",
+    "Coupling",
+    "ExplicitPenalty",
+    "ImplicitPenalty",
+    "Joint",
+    "Linker",
+    "Pin",
+    "Rigid",
+    "SharedDofs",
+    "Spring",
+    "Ties",
+]

@@ -164,6 +164,11 @@ class ElasticRod:
         held = np.array(list(clamps.values())).reshape(-1, 3)
         return ElasticRod(nodes, closed, elements, stretch, mass, bend_lengths, tuple(clamps), held, free_spin)
 
+    @property
+    def explicit(self) -> tuple[Elements, ...]:
+        """None: every energy of one rod is implicit."""
+        return ()
+
     # Blocks
 
     @property

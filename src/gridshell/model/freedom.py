@@ -65,3 +65,8 @@ class Freedom:
         """Components (size,) of a gradient (n, 3) in the free directions."""
         block, k = self._slots
         return np.asarray(np.einsum("ij,ij->i", gradient[block], self.directions[block, k]))
+
+    def reduce_diagonal(self, diagonal: Floats) -> Floats:
+        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses."""
+        block, k = self._slots
+        return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))

@@ -49,6 +49,8 @@ class MovingBody(Protocol):
     @property
     def elements(self) -> tuple[Elements, ...]: ...
     @property
+    def explicit(self) -> tuple[Elements, ...]: ...
+    @property
     def stretch(self) -> Elements: ...
     @property
     def mass(self) -> Floats: ...
@@ -65,12 +67,14 @@ class Motion:
     mass : (N, 3) lumped mass of each component [kg]; of a twist angle the rotary inertia [kg m2].
     constraint : supports or a surface; or what they are at a time [s], for a motion that is prescribed.
     forces : external forces.
+    explicit : energies whose forces are frozen at the start of a step (`ExplicitPenalty`); not among the elements.
     """
 
     elements: tuple[Elements, ...]
     mass: Floats
     constraint: Constraint | Callable[[float], Constraint]
     forces: tuple[Force, ...] = ()
+    explicit: tuple[Elements, ...] = ()
 
     @classmethod
     def of(
@@ -80,17 +84,21 @@ class Motion:
         constraint: Freedom | Constraint | Callable[[float], Constraint] | None = None,
         forces: tuple[Force, ...] = (),
     ) -> Self:
-        """The motion of a rod; without a constraint it is free. A constraint that never moves may be a `Freedom`."""
+        """The motion of a rod or a shell; without a constraint it is free.
+
+        A constraint that never moves may be given as a `Freedom`.
+        """
         given = body.freedom() if constraint is None else constraint
         supports = Supports(given) if isinstance(given, Freedom) else given
-        return cls((*body.elements, body.stretch), body.mass, supports, forces)
+        implicit = [one for one in body.elements if all(one is not other for other in body.explicit)]
+        return cls((*implicit, body.stretch), body.mass, supports, forces, body.explicit)
 
     def constraint_at(self, time: float) -> Constraint:
         return self.constraint(time) if callable(self.constraint) else self.constraint
 
     def elastic_energy(self, state: Floats) -> float:
         """[J]"""
-        return sum(element.evaluate(state, np.zeros_like(state)) for element in self.elements)
+        return sum(element.evaluate(state, np.zeros_like(state)) for element in (*self.elements, *self.explicit))
 
     def kinetic_energy(self, velocity: Floats) -> float:
         """[J]"""
@@ -98,7 +106,10 @@ class Motion:
 
     def refreshed(self, state: Floats) -> Self:
         """The same motion with its source frames at `state`."""
-        return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
+        elements, explicit = (
+            tuple(element.refreshed(state) for element in some) for some in (self.elements, self.explicit)
+        )
+        return replace(self, elements=elements, explicit=explicit)
 
     def in_parts(self, most: int = PART) -> Self:
         """The same motion with its element sets cut into sets of at most `most` elements."""
@@ -139,6 +150,9 @@ class ImplicitEuler:
         implicit = tuple(force for force in motion.forces if isinstance(force, ImplicitForce))
         self._plan(motion, implicit, free)
         held, drag = np.zeros_like(state), np.zeros_like(state)
+        for element in motion.explicit:
+            element.evaluate(state, held)
+        np.negative(held, out=held)
         for force in motion.forces:
             given = force.held(end, state, velocity, motion.mass)
             if given is not None:
@@ -283,6 +297,8 @@ def _parts(elements: Elements, most: int) -> list[Elements]:
     """`elements` cut up; the arrays with a row for each element are those as long as `blocks`."""
     count = len(elements.blocks)
     if count <= most or not is_dataclass(elements):
+        return [elements]
+    if any(is_dataclass(getattr(elements, field.name)) for field in fields(elements)):  # rows of its own inside
         return [elements]
     rows = {field.name: getattr(elements, field.name) for field in fields(elements)}
     rows = {name: row for name, row in rows.items() if isinstance(row, np.ndarray) and len(row) == count}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gridshell.errors import ConvergenceError, InputError
 from gridshell.solve.banded import narrow_or_sparse
 from gridshell.solve.implicit_euler import ImplicitEuler, Motion, Refused, Solver
+from gridshell.solve.step_limit import refuse_unstable
 from gridshell.solve.time_series import End, Moment, MotionReport, Recorder, TimeSeries
 
 Floats = NDArray[np.float64]
@@ -56,12 +57,14 @@ def simulate(
     Raises
     ------
     ConvergenceError : a step fails at its smallest; the record up to there is the error's `report`.
+    StabilityError : the step is beyond the limit of the motion's explicit ties.
     InputError : a value that is not finite comes in, from the caller or from a force.
     """
     velocity = np.zeros_like(state) if velocity is None else velocity
     _check(motion, state, velocity, until - start, step, every)
     begun = clock.perf_counter()
     count = max(1, ceil((until - start) / step - 1e-9))
+    refuse_unstable(motion, state, (until - start) / count)
     grid = _Grid(start, (until - start) / count)
     stepper = ImplicitEuler(solver)
     recorder = Recorder(1 + count // every, state.shape, stream)

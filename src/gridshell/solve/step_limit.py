@@ -1,0 +1,70 @@
+"""The longest stable time step of a motion with explicit ties.
+
+Implicit Euler with the forces of some springs K_e frozen at the start of the step, the others K_i implicit, is for
+small motions  M (x+ - 2x + x-) + h^2 K_i x+ + h^2 K_e x = 0.  A mode x -> z x of it with the mass m, and k_i, k_e along
+it, has (m + h^2 k_i) z^2 + (h^2 k_e - 2m) z + m = 0. The product of the roots is below 1, so that a root leaves the
+unit circle only at z = -1, where  h^2 (k_e - k_i) = 4m.  The limit is hence exact:
+
+    h = 2 / sqrt(max eigenvalue of M^-1 (K_e - K_i)),
+
+and there is none where the implicit springs are stiffer than the explicit ones. Damping only raises it. With the
+rods' stiffness left out it gives the bounds sqrt(2m/C1) of two masses m tied by C1, and sqrt(2I/C2) of two rotary
+inertias I tied by C2.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, diags
+from scipy.sparse.linalg import eigsh
+
+from gridshell.errors import StabilityError
+from gridshell.model import Assembly, Freedom
+from gridshell.rods.elements import Elements
+from gridshell.solve.implicit_euler import Motion
+
+Floats = NDArray[np.float64]
+
+DENSE = 200  # unknowns up to which all eigenvalues are cheaper than Lanczos' method
+
+
+def step_limit(motion: Motion, state: Floats, time: float = 0.0) -> float:
+    """Longest stable step [s] at a state (N, 3); infinite where nothing is explicit.
+
+    Free blocks must have mass.
+    """
+    if not motion.explicit:
+        return np.inf
+    free = motion.constraint_at(time).freedom(state)
+    mass = free.reduce_diagonal(motion.mass)
+    difference = _stiffness(motion.explicit, state, free) - _stiffness(motion.elements, state, free)
+    scale = diags(1.0 / np.sqrt(mass))
+    scaled = csc_matrix(scale @ difference @ scale)
+    if free.size <= DENSE:
+        largest = float(np.linalg.eigvalsh(scaled.toarray())[-1])
+    else:
+        start = np.sin(1.0 + np.arange(free.size) ** 2)  # the same at every run
+        largest = float(eigsh(scaled, k=1, which="LA", v0=start, tol=1e-6, return_eigenvectors=False)[0])
+    return 2.0 / float(np.sqrt(largest)) if largest > 0 else np.inf
+
+
+def refuse_unstable(motion: Motion, state: Floats, step: float) -> None:
+    """Raise StabilityError if `step` [s] is beyond the limit at `state`."""
+    limit = step_limit(motion, state)
+    if step > limit:
+        raise StabilityError(
+            f"explicit ties are unstable at a time step of {step:.4g} s (limit {limit:.4g} s): "
+            "use a smaller step, softer ties, or coupling=SharedDofs()"
+        )
+
+
+def _stiffness(elements: tuple[Elements, ...], state: Floats, free: Freedom) -> csc_matrix:
+    """Hessian in the free directions, whole."""
+    scrap = np.zeros_like(state)
+    blocks = [one.blocks for one in elements]
+    hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in blocks]
+    for one, values in zip(elements, hessians, strict=True):
+        one.evaluate(state, scrap, values)
+    assembly = Assembly.of(blocks, free)
+    data = assembly.assemble(hessians, blocks, free)
+    upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(free.size, free.size))
+    return csc_matrix(upper + upper.T - diags(upper.diagonal()))
