@@ -10,15 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gridshell.case.of import case_text
+from gridshell.checks import check
 from gridshell.errors import InputError
-from gridshell.formfinding import FoundForm, PoppedTable, find_stages, pop_up_stages
+from gridshell.fabrication import fabricate
+from gridshell.formfinding import Boundary, FoundForm, PoppedTable, find_stages, pop_up_stages
 from gridshell.formfinding.drape import Method
 from gridshell.formfinding.popup import Ends
 from gridshell.formfinding.progress import Progress, silent
+from gridshell.joints import Joint
 from gridshell.layout import FlatGrid, GridLayout
 from gridshell.output import Archive, write
-from gridshell.output.result import form_result, form_states, table_result, table_states
+from gridshell.output.result import States, form_result, form_states, table_result, table_states
 from gridshell.output.summary import summary_text
+from gridshell.output.takeaway import Takeaway
+from gridshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
 from gridshell.rods.section import Rod
 from gridshell.targets import Target
 
@@ -29,47 +34,73 @@ class Form(FoundForm):
     """A form that was found: its stages, and its files."""
 
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
+        """The content of result.json before anything was checked."""
         return form_result(self)
 
     def summary(self) -> str:
         """One screen of text."""
         return summary_text(self.result())
 
-    def archive(self, case_toml: str | None = None) -> Archive:
-        """Everything that is kept; `case_toml` is the input it came from, by default one made from the objects."""
+    def archive(
+        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+    ) -> Archive:
+        """Everything that is kept, checked and made ready to be built.
+
+        case_toml : the input it came from, by default one made from the objects.
+        """
+        takeaway = takeaway or Takeaway()
         if case_toml is None:
             draped = self.draped
             case_toml = case_text(
-                self.target, self.layout, self.rod,
+                self.target, self.layout, self.rod, joint=self.joint,
                 method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
+                takeaway=takeaway,
             )  # fmt: skip
-        return Archive(self.result(), form_states(self), case_toml)
+        return _archive(self, self.trimmed.boundary, form_states(self), case_toml, takeaway, progress)
 
-    def save(self, folder: str | PathLike[str], *, case_toml: str | None = None) -> Path:
+    def save(
+        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+    ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
         Raises
         ------
         OutputError : the folder cannot be written, or holds something else.
         """
-        return write(self.archive(case_toml), folder)
+        return write(self.archive(case_toml, takeaway=takeaway), folder)
 
 
 class PoppedUp(PoppedTable):
     """A table of rods that was popped up, and its files."""
 
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
+        """The content of result.json before anything was checked."""
         return table_result(self, "popup")
 
     def summary(self) -> str:
         """One screen of text."""
         return summary_text(self.result())
 
-    def save(self, folder: str | PathLike[str]) -> Path:
+    def archive(self, *, takeaway: Takeaway | None = None, progress: Progress = silent) -> Archive:
+        """Everything that is kept, checked and made ready to be built."""
+        return _archive(self, self.boundary, table_states(self), "", takeaway or Takeaway(), progress)
+
+    def save(self, folder: str | PathLike[str], *, takeaway: Takeaway | None = None) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return write(Archive(self.result(), table_states(self)), folder)
+        return write(self.archive(takeaway=takeaway), folder)
+
+
+def _archive(
+    job: Form | PoppedUp, boundary: Boundary, states: States, case_toml: str, takeaway: Takeaway, progress: Progress
+) -> Archive:
+    """A job's result and states with its checks and its fabrication."""
+    mesh = job.footprint.mesh
+    checks = check(job.popped, boundary, job.rod, stages=takeaway.stages, progress=progress)
+    final = next((job.popped[ends].positions for ends in PREFERRED if ends in checks.bending), None)
+    made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
+    result = workshop_result(job.result(), mesh, checks, made, takeaway.strength)
+    result["drawings"] = takeaway.drawings.parameters()
+    return Archive(result, states | workshop_states(checks), case_toml)
 
 
 def find_form(
@@ -80,6 +111,7 @@ def find_form(
     method: Method = "bound",
     anchor: tuple[float, float] | None = None,
     gravity: float = 9.81,
+    joint: Joint | None = None,
     ends: Sequence[Ends] = ("pinned", "clamped"),
     progress: Progress = silent,
 ) -> Form:
@@ -91,6 +123,7 @@ def find_form(
     layout : the flat grid asked for.
     rod : section and material of every rod.
     method, anchor, gravity : of the drape, see `drape`.
+    joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
     ends : end conditions of the pop-up.
     progress : called as progress(stage, detail, residual) at every iteration.
 
@@ -103,8 +136,9 @@ def find_form(
     InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
     """
     found = find_stages(
-        target, layout, rod, method=method, anchor=anchor, gravity=gravity, ends=ends, progress=progress
-    )
+        target, layout, rod,
+        method=method, anchor=anchor, gravity=gravity, joint=joint, ends=ends, progress=progress,
+    )  # fmt: skip
     return Form(**{field.name: getattr(found, field.name) for field in fields(found)})
 
 

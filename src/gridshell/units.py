@@ -10,7 +10,7 @@ from typing import Literal
 
 from gridshell.errors import InputError
 
-Kind = Literal["length", "angle", "stress", "density", "acceleration", "number"]
+Kind = Literal["length", "angle", "stress", "density", "acceleration", "rotational stiffness", "number"]
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,9 @@ _KINDS: dict[Kind, _Units] = {
     ),
     "acceleration": _Units(
         "an acceleration", '"9.81 m/s2"', _factors("1 m/s2", "0.01 cm/s2", "0.001 mm/s2", "0.3048 ft/s2")
+    ),
+    "rotational stiffness": _Units(
+        "a rotational stiffness", '"0.5 N m/rad"', _factors("1 Nm/rad Nm", "1000 kNm/rad kNm", "0.001 Nmm/rad Nmm")
     ),
     "number": _Units("a plain number", "0.5", {}),
 }

@@ -36,7 +36,7 @@ JOINTS = {
     "two linkers": gs.Linker(),
     "four linkers of their own rod": gs.Linker(rod=gs.Rod(gs.GivenSection(EA=1, EI1=0.4, EI2=0.9, GJ=0.3)), corners=4),
     "eccentric pin": gs.Pin(eccentricity=0.2),
-    "eccentric ball": gs.Ball(eccentricity=0.2),
+    "eccentric spring": gs.Spring(0.3, 0.2, 0.2, eccentricity=0.2),
 }
 COUPLINGS = {
     "shared": SharedDofs(),

@@ -8,7 +8,11 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from gridshell.case.schema import Case, Table
 
-BY_KIND: dict[str, str] = {"target": Case().target.kind, "rod.section": Case().rod.section.kind}
+BY_KIND: dict[str, str] = {
+    "target": Case().target.kind,
+    "rod.section": Case().rod.section.kind,
+    "joint": Case().joint.kind,
+}
 """Tables whose `kind` decides which keys they have, and the kind that they are by default."""
 
 

@@ -27,7 +27,11 @@ BUILT_IN: dict[str, Raw] = {
 }
 """The cases that need no file, each named like its target's kind; the schema's defaults give the rest."""
 
-SURFACE_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".3dm", ".step", ".stp")
+BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf"), "mesh") | {".3dm": "nurbs"}
+BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
+"""Kinds of targets by the file that holds them: the file alone is a case."""
+
+FILE_KEYS = ("file", "boundary")
 
 
 def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Case:
@@ -35,7 +39,7 @@ def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object]
 
     Parameters
     ----------
-    name_or_path : one of `BUILT_IN`, or the path of a TOML file.
+    name_or_path : one of `BUILT_IN`, or the path of a TOML file, or of a surface (`BY_SUFFIX`).
     overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
         keeps those keys of its table that it has too.
 
@@ -88,19 +92,31 @@ def _read(name_or_path: str | PathLike[str]) -> Raw:
     name, path = str(name_or_path), Path(name_or_path)
     if name in BUILT_IN:
         return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
-    if path.suffix.lower() in SURFACE_FILES:
-        raise InputError(f"{name}: not yet: targets from files; give a case or a formula")
+    if kind := BY_SUFFIX.get(path.suffix.lower()):
+        return {"target": {"kind": kind, "file": name}, "layout": {"spacing": "auto", "edge": "auto"}}
+    if path.suffix.lower() in (".step", ".stp"):
+        raise InputError(f"{name}: STEP files are not read: save the surface as 3DM or as a mesh (OBJ, STL, PLY)")
     if path.is_dir():
         raise InputError(f"{name} is a folder: give a case file, such as {path / 'case.toml'}")
     if not path.exists():
         near = get_close_matches(name, BUILT_IN, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"give a case file, or one of {', '.join(BUILT_IN)}"
+        hint = f"did you mean {near[0]}?" if near else f"give a case file, a surface, or one of {', '.join(BUILT_IN)}"
         raise InputError(f"there is no case and no file named {shown(name)}: {hint}")
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return _beside(path, tomllib.loads(path.read_bytes().decode("utf-8-sig")))
     except OSError as reason:
         raise InputError(f"{name} cannot be read: {reason.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(f"{name} is not text in UTF-8: save it as UTF-8") from None
     except tomllib.TOMLDecodeError as reason:
         raise InputError(f"{name} is not valid TOML: {reason}") from None
+
+
+def _beside(path: Path, raw: Raw) -> Raw:
+    """Files that a case names lie in its own folder, unless they are given from the root."""
+    target = raw.get("target")
+    if isinstance(target, dict):
+        for key in FILE_KEYS:
+            if isinstance(target.get(key), str):
+                target[key] = str(path.parent / target[key])
+    return raw

@@ -3,22 +3,43 @@
 from typing import Any
 
 from gridshell.case.schema import Case
+from gridshell.joints import Joint, joint_parameters
 from gridshell.layout import GridLayout
+from gridshell.output.takeaway import Takeaway
 from gridshell.rods.section import Rod
 from gridshell.targets import Target
 
 
 def case_text(
-    target: Target, layout: GridLayout, rod: Rod, *, method: str, anchor: tuple[float, float] | None, gravity: float
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    joint: Joint,
+    method: str,
+    anchor: tuple[float, float] | None,
+    gravity: float,
+    takeaway: Takeaway | None = None,
 ) -> str:
     """A case file that gives these objects again; of a target that is a Python function, a note that says so."""
     shape = target.parameters()
     if "function" in shape:
         return f"# the target was the Python function {shape['function']}: no case file can give it again\n"
+    if "vertices" in shape:
+        return (
+            f"# the target was a mesh of {shape['vertices']} vertices made in Python: no case file can give it again\n"
+        )
     drape: dict[str, Any] = {"method": method, "gravity": gravity}
     if anchor is not None:
         drape["anchor"] = anchor
     case = Case.model_validate(
-        {"target": shape, "layout": layout.parameters(), "rod": rod.parameters(), "drape": drape}
+        {
+            "target": shape,
+            "layout": layout.parameters(),
+            "rod": rod.parameters(),
+            "joint": joint_parameters(joint),
+            "drape": drape,
+            **(takeaway or Takeaway()).parameters(),
+        }
     )
     return case.to_toml()

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 from pydantic import ValidationError
@@ -11,12 +13,9 @@ from gridshell.case.keys import BY_KIND, CaseKey, case_keys, case_tables
 from gridshell.units import shown
 
 NOT_YET = {
-    "target.kind": ("mesh", "nurbs"),
     "rod.section.kind": ("rectangle", "ellipse", "given"),
-    "joint.kind": ("pin", "linker", "rigid"),
     "drape.method": ("paper",),
 }
-NOT_YET_KEYS = ("target.file", "target.unit")
 
 
 def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
@@ -45,13 +44,11 @@ def unknown_key(path: str, value: object, raw: Mapping[str, Any]) -> str:
     keys = case_keys()
     table, _, name = path.rpartition(".")
     if path in keys:
-        own = raw["rod"]["section"]["kind"] if table == "rod.section" else raw["target"]["kind"]
+        own = reduce(getitem, table.split("."), raw)["kind"]
         return (
             f'{path} = {shown(value)}: a {table.rpartition(".")[2]} of kind "{own}" has no {name}: '
             f"leave it out, or set {table}.kind to {_either(keys[path].kinds)}"
         )
-    if path in NOT_YET_KEYS:
-        return f"{path} = {shown(value)}: not yet: targets from files; use a formula or another target kind"
     if near := _nearest(path, keys):
         return f"unknown key {path}: did you mean {near}?"
     if table in case_tables():

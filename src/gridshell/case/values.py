@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BeforeValidator
 
@@ -10,6 +10,7 @@ from gridshell.units import Kind, read_quantity, wanted
 
 Auto = Literal["auto"]
 Reader = Callable[[object], float]
+T = TypeVar("T")
 
 
 def quantity(kind: Kind) -> Reader:
@@ -26,8 +27,8 @@ def positive(kind: Kind) -> Reader:
     return read
 
 
-def or_auto(reader: Reader) -> Callable[[object], float | str]:
-    def read(value: object) -> float | str:
+def or_auto(reader: Callable[[object], T]) -> Callable[[object], T | str]:
+    def read(value: object) -> T | str:
         if is_auto(value):
             return "auto"
         try:
@@ -62,6 +63,28 @@ def _named(which: str, reader: Reader, item: object) -> float:
         raise ValueError(f"{which} value: {reason}") from None
 
 
+def triple(kind: Kind) -> Callable[[object], tuple[float, ...]]:
+    """[a, b, c] or "a, b, c"."""
+
+    def read(value: object) -> tuple[float, ...]:
+        items = value.split(",") if isinstance(value, str) else value
+        if not isinstance(items, list | tuple) or len(items) != 3:
+            raise ValueError(f"needs three values, along or about x, y and z; each is {wanted(kind)}")
+        return tuple(_named(which, quantity(kind), item) for which, item in zip(_ORDER, items, strict=True))
+
+    return read
+
+
+_ORDER = ("first", "second", "third")
+
+
+def unit(value: object) -> float:
+    """A unit of length: "mm", or its length "25.4 mm"."""
+    if isinstance(value, str) and value.strip().isalpha():
+        return positive("length")(f"1 {value.strip()}")
+    return positive("length")(value)
+
+
 def counts(value: object) -> tuple[int, int] | str:
     """Numbers of rods: [17, 17], "17x17", "17,17" or "auto"."""
     if is_auto(value):
@@ -72,6 +95,44 @@ def counts(value: object) -> tuple[int, int] | str:
     if isinstance(items, list | tuple) and len(items) == 2 and all(type(n) is int and n >= 2 for n in items):
         return items[0], items[1]
     raise ValueError('give two counts of at least 2, such as [17, 17] or "17x17", or "auto"')
+
+
+def stiffness(value: object) -> float | str:
+    """Of a joint [N m/rad], 0 or more, or "rigid"."""
+    if isinstance(value, str) and value.strip() == "rigid":
+        return "rigid"
+    try:
+        number = read_quantity(value, "rotational stiffness")
+    except ValueError as reason:
+        raise ValueError(f'{reason}, or "rigid"') from None
+    if number < 0:
+        raise ValueError(f'must not be negative; give {wanted("rotational stiffness")}, or "rigid"')
+    return number
+
+
+def corners(value: object) -> int:
+    """Of a crossing: 2 or 4."""
+    if value in (2, 4) or (isinstance(value, str) and value.strip() in ("2", "4")):
+        return int(value)  # type: ignore[call-overload,no-any-return]
+    raise ValueError("give 2, opposite corners as in the paper, or 4")
+
+
+def not_negative(kind: Kind) -> Reader:
+    def read(value: object) -> float:
+        number = read_quantity(value, kind)
+        if number < 0:
+            raise ValueError(f"must not be negative; give {wanted(kind)}")
+        return number
+
+    return read
+
+
+def whole(value: object) -> int:
+    """A whole number, not negative."""
+    number = int(value) if isinstance(value, str) and value.strip().isdecimal() else value
+    if type(number) is not int or number < 0:
+        raise ValueError("give a whole number of at least 0, such as 8")
+    return number
 
 
 def is_auto(value: object) -> bool:
@@ -89,10 +150,23 @@ Length = Annotated[float, BeforeValidator(positive("length"))]
 LengthOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(positive("length")))]
 Coordinate = Annotated[float, BeforeValidator(quantity("length"))]
 Lengths = Annotated[tuple[float, float], BeforeValidator(pair(positive("length"), one_for_both=True))]
+LengthsOrAuto = Annotated[
+    tuple[float, float] | Auto, BeforeValidator(or_auto(pair(positive("length"), one_for_both=True)))
+]
 Size = Annotated[tuple[float, float], BeforeValidator(pair(positive("length")))]
 Point = Annotated[tuple[float, float], BeforeValidator(pair(quantity("length")))]
+Whole = Annotated[int, BeforeValidator(whole)]
 Counts = Annotated[tuple[int, int] | Auto, BeforeValidator(counts)]
+Point3 = Annotated[tuple[float, float, float], BeforeValidator(triple("length"))]
+Angles = Annotated[tuple[float, float, float], BeforeValidator(triple("angle"))]
+Factor = Annotated[float, BeforeValidator(positive("number"))]
+Unit = Annotated[float, BeforeValidator(unit)]
+Stiffness = Annotated[float | Literal["rigid"], BeforeValidator(stiffness)]
+Corners = Annotated[Literal[2, 4], BeforeValidator(corners)]
+Distance = Annotated[float, BeforeValidator(not_negative("length"))]
 Angle = Annotated[float, BeforeValidator(quantity("angle"))]
+AngleOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(quantity("angle")))]
+PointOrAuto = Annotated[tuple[float, float] | Auto, BeforeValidator(or_auto(pair(quantity("length"))))]
 Stress = Annotated[float, BeforeValidator(positive("stress"))]
 Density = Annotated[float, BeforeValidator(positive("density"))]
 Acceleration = Annotated[float, BeforeValidator(positive("acceleration"))]

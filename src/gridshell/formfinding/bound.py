@@ -39,10 +39,9 @@ def bound_drape(
     """Drape `layout` over `target` by its net; see `drape`."""
     progress("net", "marching", 0.0)
     net = chebyshev_net(target, layout, anchor=anchor)
-    footprint = {(line.family, line.offset): line for line in net.rods}
     grid = with_apron(net, CLEARANCE * layout.edge)
-    cuts = [footprint.get((line.family, line.offset)) for line in grid.rods]
-    mesh = mesh_grid(grid, layout.edge, marks=[(cut.start, cut.end) if cut else () for cut in cuts])
+    cuts = [[piece for piece in net.rods if line.contains(piece)] for line in grid.rods]
+    mesh = mesh_grid(grid, layout.edge, marks=[[s for cut in on for s in (cut.start, cut.end)] for on in cuts])
     start = np.empty((mesh.node_count, 3))
     for k, line in enumerate(grid.rods):
         start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
@@ -63,7 +62,7 @@ def bound_drape(
     )
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
-    warnings = list(net.warnings)
+    warnings = [*target.warnings, *net.warnings]
     if found.report.negative_modes:
         warnings.append(
             f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
@@ -119,11 +118,11 @@ def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
     return BoundToTarget(target, count, guides)
 
 
-def _nodes_on_target(mesh: GridMesh, cuts: list[FlatRod | None]) -> NDArray[np.intp]:
+def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> NDArray[np.intp]:
     """Nodes between the ends of some rod: all but the apron's."""
     chosen = []
-    for k, cut in enumerate(cuts):
-        if cut is not None:
+    for k, pieces in enumerate(cuts):
+        for cut in pieces:
             s = mesh.stations[mesh.rod_slice(k)]
             tiny = 1e-9 * cut.length
             chosen.append(mesh.nodes_of(k)[(s >= cut.start - tiny) & (s <= cut.end + tiny)])
@@ -143,14 +142,12 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
     ]
 
 
-def _own_ends(target: Target, mesh: GridMesh, cuts: list[FlatRod | None], positions: Floats) -> Floats:
+def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
     """Distance [m] along each rod between its end and where this state crosses the target's end."""
     result = []
-    for k, cut in enumerate(cuts):
-        if cut is None or cut.virtual:
-            continue
+    for k, pieces in enumerate(cuts):
         s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
-        for end in (cut.start, cut.end):
+        for end in (end for cut in pieces if not cut.virtual for end in (cut.start, cut.end)):
             first = int(np.clip(np.argmin(np.abs(s - end)) - 1, 0, max(len(s) - 3, 0)))
             window = slice(first, first + 3)
             margin = target.margin(positions[nodes[window]])

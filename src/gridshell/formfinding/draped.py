@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.geometry.vectors import cross, dot
+from gridshell.geometry.vectors import cross, dot, unit
 from gridshell.layout import FlatRod, GridLayout, GridMesh
 from gridshell.nets import ChebyshevNet
 from gridshell.rods.section import Rod
@@ -74,6 +74,26 @@ def smallest_joint_angle(
     k = int(np.argmin(angle))
     x, y, z = positions[mesh.joint_nodes[k]].tolist()
     return float(angle[k]), (x, y, z)
+
+
+def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
+    """(c, 3) unit normals at the joints, across both rods, on the side that was up in the flat grid."""
+    tangents, flat = joint_tangents(mesh, positions), joint_tangents(mesh, mesh.flat)
+    up = np.sign(cross(flat[:, 0], flat[:, 1])[:, 2:])
+    return unit(up * cross(tangents[:, 0], tangents[:, 1]))
+
+
+def node_normals(mesh: GridMesh, positions: Floats) -> Floats:
+    """(n, 3) normals at all nodes, those of the joints interpolated along the rods."""
+    at_joints, total = joint_normals(mesh, positions), np.zeros((mesh.node_count, 3))
+    for rod in range(len(mesh.grid.rods)):
+        here = mesh.rod_slice(rod)
+        on, side = np.nonzero(mesh.grid.crossings.rods == rod)
+        order = np.argsort(mesh.grid.crossings.at[on, side])
+        at, normals = mesh.grid.crossings.at[on, side][order], at_joints[on[order]]
+        for k in range(3):
+            np.add.at(total[:, k], mesh.rod_nodes[here], np.interp(mesh.stations[here], at, normals[:, k]))
+    return unit(total)
 
 
 def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from gridshell.contact.unilateral import UnilateralContact
 from gridshell.errors import InputError
-from gridshell.formfinding.draped import Draped, smallest_joint_angle
+from gridshell.formfinding.draped import Draped, node_normals, smallest_joint_angle
 from gridshell.formfinding.progress import Progress, silent
+from gridshell.joints import Joint
 from gridshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from gridshell.model import Freedom, Shell
 from gridshell.nets import chebyshev_net
@@ -42,6 +43,7 @@ def gravity_drape(
     *,
     anchor: tuple[float, float] | None = None,
     gravity: float = 9.81,
+    joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Let `layout` fall on `target`; see `drape`."""
@@ -59,9 +61,10 @@ def gravity_drape(
         coarse, mesh = mesh, mesh_grid(grid, edge, marks=_middle_marks(grid, layout))
         start = _over(mesh, layout, top) if coarse is None or state is None else coarse.prolong(state, mesh)
         name = f"level {len(levels) + 1}"
-        found, contact = _settle(target, layout, rod, mesh, start, top, gravity, len(levels) == 0, name, progress)
+        shell = Shell.of(mesh, rod, joint=joint)
+        found, contact = _settle(target, layout, rod, shell, start, top, gravity, len(levels) == 0, name, progress)
         levels.append(found.report)
-        state = found.state
+        state = shell.positions(found.state)
         if not found.report.converged:
             break
     assert mesh is not None
@@ -146,7 +149,7 @@ def _settle(
     target: Target,
     layout: GridLayout,
     rod: Rod,
-    mesh: GridMesh,
+    shell: Shell,
     start: Floats,
     top: Floats,
     gravity: float,
@@ -155,16 +158,17 @@ def _settle(
     progress: Progress,
 ) -> tuple[Equilibrium, UnilateralContact]:
     """Equilibrium on one mesh: Newton's method for given contact multipliers, which are then updated."""
-    shell = Shell.of(mesh, rod)
+    mesh = shell.mesh
+    nodes = np.arange(shell.node_count)
+    load = np.zeros((len(shell.like), 3))
+    load[nodes, 2] = -gravity * shell.mass[nodes, 2]
     weight = rod.mass_per_length * gravity
-    load = np.zeros((mesh.node_count, 3))
-    load[:, 2] = -weight * mesh.tributary_lengths()
     longest = max(line.length for line in mesh.grid.rods)
-    nodes = np.arange(mesh.node_count)
     stiffness = np.full(len(nodes), weight * longest / (5e-3 * target.size))
     contact = UnilateralContact(target, nodes[:, None], stiffness, np.zeros(len(nodes)))
     supports = Supports(_held(shell, layout))
-    state, forces, reports = start, np.zeros(len(mesh.edges)), list[SolveReport]()
+    normals = node_normals(mesh, start) if shell.angles else None
+    state, forces, reports = shell.state(start, normals=normals), np.zeros(len(mesh.edges)), list[SolveReport]()
     for update in range(CONTACT_UPDATES):
         problem = Problem(
             (*shell.elements, contact), shell.stretch, supports, target.size, load=load, places=shell.places
@@ -179,14 +183,14 @@ def _settle(
         )
         state, forces = found.state, found.forces
         reports.append(found.report)
-        depth = -float(target.contact(state).distance.min())
+        depth = -float(target.contact(state[nodes]).distance.min())
         if not found.report.converged or depth < DEPTH * target.size:
             break
         contact = contact.updated(state)
     status = found.report.status
     if found.report.converged and depth >= DEPTH * target.size:
         status = Status.STALLED
-    if _slid_off(mesh, state, layout, top, target):
+    if _slid_off(mesh, shell.positions(state), layout, top, target):
         status = Status.SLID_OFF
     report = replace(found.report.after(*reports[:-1]), status=status)
     return replace(found, report=report), contact

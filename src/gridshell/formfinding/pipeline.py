@@ -22,6 +22,7 @@ from gridshell.formfinding.trim import (
     trim,
     untrimmed,
 )
+from gridshell.joints import Ball, Joint
 from gridshell.layout import FlatGrid, GridLayout, mesh_grid
 from gridshell.rods.section import Rod
 from gridshell.targets import Target
@@ -43,6 +44,7 @@ class FoundForm:
     target: Target
     layout: GridLayout
     rod: Rod
+    joint: Joint
     draped: Draped
     trimmed: Trimmed
     footprint: Footprint
@@ -90,18 +92,22 @@ def find_stages(
     method: Method = "bound",
     anchor: tuple[float, float] | None = None,
     gravity: float = 9.81,
+    joint: Joint | None = None,
     ends: Sequence[Ends] = ("pinned", "clamped"),
     progress: Progress = silent,
 ) -> FoundForm:
     """Drape, trim, map back, pop up and compare; see `gridshell.find_form`."""
-    draped = drape(layout, rod, target, method=method, anchor=anchor, gravity=gravity, progress=progress)
+    joint = joint or Ball()
+    draped = drape(layout, rod, target, method=method, anchor=anchor, gravity=gravity, joint=joint, progress=progress)
     trimmed = trim(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
     footprint = map_back(trimmed)
     popped: dict[Ends, Popped] = {}
     if draped.converged:
-        popped = {end: pop_up(footprint, trimmed.boundary, rod, ends=end, progress=progress) for end in ends}
+        popped = {
+            end: pop_up(footprint, trimmed.boundary, rod, ends=end, joint=joint, progress=progress) for end in ends
+        }
     compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
-    return FoundForm(target, layout, rod, draped, trimmed, footprint, popped, compared)
+    return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared)
 
 
 def pop_up_stages(

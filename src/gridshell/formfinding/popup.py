@@ -4,6 +4,7 @@ No target, no load and no contact: only rods, joints and the ends. Pinned ends h
 hold the direction of the draped rods as well. The end condition decides the shape (numerics.md, section 4a).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,34 +12,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError
+from gridshell.formfinding.draped import node_normals
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.formfinding.trim import Boundary, Footprint
 from gridshell.geometry.vectors import dot, unit
+from gridshell.joints import Ball, Joint
 from gridshell.model import Shell
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Equilibrium, Problem, find_stable
 from gridshell.solve.path import follow
+from gridshell.solve.relax import relax
 from gridshell.solve.report import SolveReport
 
 Floats = NDArray[np.float64]
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
 
+UP = np.array([0.0, 0.0, 1.0])
 FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
 CLAMP_STEP = 0.25
-RELEASE_STEP = 0.1
 
 
 @dataclass(frozen=True)
 class Popped:
-    """The popped-up shell: `positions` (n, 3) [m] of the footprint's nodes, how it was reached, and figures."""
+    """The popped-up shell, how it was reached, and figures.
+
+    Parameters
+    ----------
+    positions : (n, 3) of the footprint's nodes [m].
+    shell : the mechanical model; state : (N, 3) its state in equilibrium, its source frames being there.
+    forces : (e,) axial forces of the edges [N].
+    """
 
     ends: Ends
     start: Start
     footprint: Footprint
     positions: Floats
     report: SolveReport
+    shell: Shell
+    state: Floats
+    forces: Floats
 
 
 def pop_up(
@@ -48,6 +62,7 @@ def pop_up(
     *,
     ends: Ends = "clamped",
     start: Start = "draped",
+    joint: Joint | Sequence[Joint] | None = None,
     progress: Progress = silent,
 ) -> Popped:
     """Move the rod ends of `footprint` to `boundary` and find the equilibrium of the free grid.
@@ -58,73 +73,117 @@ def pop_up(
     start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
         flat grid, which leaves its plane to the side that the boundary's directions point away from (without
         directions to that of +z), then turns the clamps.
+    joint : what the rods do to each other where they cross: one for all, or one for each crossing; ball joints
+        without. Eccentric rods end half their distance above or below the boundary.
 
     Raises
     ------
-    InputError : `start` is "draped" and the boundary has no draped state.
+    InputError : `start` is "draped" and the boundary has no draped state; the joints do not fit the grid.
     """
-    span = 0.5 * float(np.ptp(boundary.points, axis=0).max())
+    job = _PopUp(footprint, boundary, rod, joint or Ball(), progress)
     if start == "draped":
-        if boundary.draped is None:
-            raise InputError('this boundary has no draped state to start from: use start="flat"')
-        found = _release(footprint, boundary, rod, ends, span, progress)
+        shell, found = job.release(ends)
     else:
-        found = _rise(footprint, boundary, rod, span, progress)
+        shell, found = job.rise()
         if ends == "clamped" and found.report.converged:
-            found = _turn_clamps(footprint, boundary, rod, found, span, progress)
-    return Popped(ends, start, footprint, found.state[: footprint.mesh.node_count], found.report)
+            shell, found = job.turn_clamps(shell, found)
+    shell = shell.with_elements(found.elements)
+    return Popped(ends, start, footprint, shell.positions(found.state), found.report, shell, found.state, found.forces)
 
 
-def _problem(shell: Shell, length: float, goals: Floats | None = None) -> Problem:
-    """Ends (and ghosts) held, or on their way to `goals`."""
-    free = shell.held_ends()
-    moved = np.append(shell.ends, shell.ghosts)
-    supports = Supports(free) if goals is None else Supports(free, moved, goals)
-    return Problem(shell.elements, shell.stretch, supports, length, places=shell.places)
+@dataclass(frozen=True)
+class _PopUp:
+    footprint: Footprint
+    boundary: Boundary
+    rod: Rod
+    joint: Joint | Sequence[Joint]
+    progress: Progress
 
+    def shell(self, ends: Ends) -> Shell:
+        return Shell.of(self.footprint.mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
 
-def _release(
-    footprint: Footprint, boundary: Boundary, rod: Rod, ends: Ends, length: float, progress: Progress
-) -> Equilibrium:
-    """Let go of the draped state: the target's forces vanish, the ends stay. At once, or slowly if that fails."""
-    assert boundary.draped is not None
-    shell = Shell.of(footprint.mesh, rod, clamped=ends == "clamped")
-    state, forces = shell.state(boundary.draped, boundary.tangents), np.zeros(len(footprint.mesh.edges))
-    at_once = find_stable(
-        _problem(shell, length),
-        state,
-        forces,
-        progress=lambda k, step: progress("pop-up", f"{ends}, iteration {k}", step),
-    )
-    if at_once.report.converged:
-        return at_once
-    holding = np.zeros_like(state)
-    for element in (*shell.elements, shell.stretch):
-        element.evaluate(state, holding)
-    slowly = follow(
-        lambda t: replace(_problem(shell, length), load=(1 - t) * holding),
-        state,
-        forces,
-        first_step=RELEASE_STEP,
-        progress=lambda t, k, step: progress("pop-up", f"{ends}, {100 * t:.0f} % released, iteration {k}", step),
-    )
-    return replace(slowly, report=slowly.report.after(at_once.report))
+    @property
+    def length(self) -> float:
+        """Characteristic length: half the boundary's width [m]."""
+        return 0.5 * float(np.ptp(self.boundary.points, axis=0).max())
 
+    def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
+        """Ends (and ghosts) held, or on their way to `goals`."""
+        free = shell.held_ends()
+        moved = np.append(shell.ends, shell.ghosts)
+        supports = Supports(free) if goals is None else Supports(free, moved, goals)
+        return Problem(shell.elements, shell.stretch, supports, self.length, places=shell.places)
 
-def _rise(footprint: Footprint, boundary: Boundary, rod: Rod, length: float, progress: Progress) -> Equilibrium:
-    """Pinned, from the flat grid: the ends go straight to the boundary while the grid rises."""
-    mesh = footprint.mesh
-    shell = Shell.of(mesh, rod)
-    flat = _aligned(mesh.flat, mesh.flat[shell.ends], boundary.points)
-    first = flat[shell.ends]
+    def upright(self, shell: Shell, positions: Floats, tangents: Floats | None = None) -> Floats:
+        """The state at these node positions (n, 3), the rods' first directors along the normals of the surface."""
+        normals = node_normals(self.footprint.mesh, positions) if shell.angles else None
+        return shell.state(positions, tangents, normals)
 
-    return follow(
-        lambda t: _problem(shell, length, (1 - t) * first + t * boundary.points),
-        shell.state(_arched(footprint, flat, first, boundary)),
-        np.zeros(len(mesh.edges)),
-        first_step=FIRST_RISE,
-        progress=lambda t, k, step: progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
-    )
+    def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
+        """Let go of the draped state: the ends stay, the target's forces vanish. At once, or down the energy."""
+        if self.boundary.draped is None:
+            raise InputError('this boundary has no draped state to start from: use start="flat"')
+        shell = self.shell(ends)
+        state = self.upright(shell, self.boundary.draped, self.boundary.tangents)
+        forces = np.zeros(len(self.footprint.mesh.edges))
+        at_once = find_stable(
+            self.problem(shell),
+            state,
+            forces,
+            progress=lambda k, step: self.progress("pop-up", f"{ends}, iteration {k}", step),
+        )
+        if at_once.report.stable:
+            return shell, at_once
+        slid = relax(
+            self.problem(shell),
+            state,
+            progress=lambda k, step: self.progress("pop-up", f"{ends}, sliding down, step {k}", step),
+        )
+        return shell, replace(slid, report=slid.report.after(at_once.report))
+
+    def rise(self) -> tuple[Shell, Equilibrium]:
+        """Pinned, from the flat grid: the ends go straight to the boundary while the grid rises."""
+        mesh, boundary = self.footprint.mesh, self.boundary
+        shell = self.shell("pinned")
+        flat = _aligned(mesh.flat, mesh.flat[mesh.ends.ravel()], boundary.points)
+        first, up = flat[mesh.ends.ravel()], UP
+        if boundary.draped is not None:
+            up = node_normals(mesh, boundary.draped)[mesh.ends.ravel()]
+        last = boundary.points + shell.lift[shell.ends] * up
+        found = follow(
+            lambda t: self.problem(shell, (1 - t) * (first + shell.lift[shell.ends] * UP) + t * last),
+            self.upright(shell, _arched(self.footprint, flat, first, boundary)),
+            np.zeros(len(mesh.edges)),
+            first_step=FIRST_RISE,
+            progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
+        )
+        return shell, found
+
+    def turn_clamps(self, free: Shell, pinned: Equilibrium) -> tuple[Shell, Equilibrium]:
+        """From the pinned state, turn the end directions to those of the boundary."""
+        mesh, outward = self.footprint.mesh, self.boundary.tangents
+        shell, positions = self.shell("clamped"), free.positions(pinned.state)
+        inner = np.column_stack([mesh.rod_nodes[mesh.rod_start + 1], mesh.rod_nodes[mesh.rod_stop - 2]]).ravel()
+        now = unit(positions[mesh.ends.ravel()] - positions[inner])
+        angle = np.arccos(np.clip(dot(now, outward), -1, 1))[:, None]
+        sine = np.maximum(np.sin(angle), 1e-12)
+        start = self.upright(shell, positions, now)
+
+        def goals(t: float) -> Floats:
+            turned = np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * outward) / sine, now)
+            there = shell.state(positions, unit(turned))[shell.ghosts] - positions[mesh.ends.ravel()]
+            return np.vstack([start[shell.ends], start[shell.ends] + there])
+
+        found = follow(
+            lambda t: self.problem(shell, goals(t)),
+            start,
+            pinned.forces,
+            first_step=CLAMP_STEP,
+            progress=lambda t, k, step: self.progress(
+                "pop-up", f"turning clamps, {100 * t:.0f} %, iteration {k}", step
+            ),
+        )
+        return shell, replace(found, report=found.report.after(pinned.report))
 
 
 def _aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
@@ -159,30 +218,3 @@ def _arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundar
         raised[nodes] += chord
         weight[nodes] += 1
     return raised / weight[:, None]
-
-
-def _turn_clamps(
-    footprint: Footprint, boundary: Boundary, rod: Rod, pinned: Equilibrium, length: float, progress: Progress
-) -> Equilibrium:
-    """From the pinned state, turn the end directions to those of the boundary."""
-    shell = Shell.of(footprint.mesh, rod, clamped=True)
-    positions = pinned.state[: footprint.mesh.node_count]
-    inner = shell.elements[0].blocks[-len(shell.ghosts) :, 0]
-    now = unit(positions[shell.ends] - positions[inner])
-    angle = np.arccos(np.clip(dot(now, boundary.tangents), -1, 1))[:, None]
-    sine = np.maximum(np.sin(angle), 1e-12)
-
-    def goals(t: float) -> Floats:
-        turned = np.where(
-            angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * boundary.tangents) / sine, now
-        )
-        return np.vstack([boundary.points, shell.state(positions, unit(turned))[shell.ghosts]])
-
-    found = follow(
-        lambda t: _problem(shell, length, goals(t)),
-        shell.state(positions, now),
-        pinned.forces,
-        first_step=CLAMP_STEP,
-        progress=lambda t, k, step: progress("pop-up", f"turning clamps, {100 * t:.0f} %, iteration {k}", step),
-    )
-    return replace(found, report=found.report.after(pinned.report))

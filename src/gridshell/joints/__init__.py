@@ -1,7 +1,7 @@
 """What a crossing does, and how the rods that meet there share their degrees of freedom."""
 
 from gridshell.joints.coupling import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs, Ties
-from gridshell.joints.joint import Ball, Joint, Linker, Pin, Rigid, Spring
+from gridshell.joints.joint import Ball, Joint, Linker, Pin, Rigid, Spring, joint_parameters
 
 __all__ = [
     "Ball",
@@ -15,4 +15,5 @@ __all__ = [
     "SharedDofs",
     "Spring",
     "Ties",
+    "joint_parameters",
 ]

@@ -6,7 +6,7 @@ twist). A ball joint has none, a pin (the scissor joint of X-shells) is free abo
 two, a rigid joint is rigid in all. The paper's linker rods are the exception: bends from edge to edge (`Linker`).
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import inf, isfinite, pi
 from typing import Literal, Protocol
 
@@ -33,21 +33,17 @@ class Joint(Protocol):
         ...
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Ball:
-    """Holds the rods' centre lines together and leaves every rotation free [Baek et al., cited in HQK section 1]."""
+    """Holds the rods' centre lines together and leaves every rotation free [Baek et al., cited in HQK section 1].
 
-    eccentricity: float = 0.0
+    It has no eccentricity: rods a distance apart would roll over each other.
+    """
+
     name = "ball"
-    shear = out_of_plane = twist = 0.0
+    shear = out_of_plane = twist = eccentricity = 0.0
     rest_angle = None
-
-    def __post_init__(self) -> None:
-        _check_eccentricity(self.eccentricity)
-
-    @property
-    def turns_frames(self) -> bool:
-        return self.eccentricity != 0.0
+    turns_frames = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,6 +136,15 @@ class Linker:
     def __post_init__(self) -> None:
         if self.corners not in (2, 4):
             raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {self.corners}")
+
+
+def joint_parameters(joint: Joint) -> dict[str, object]:
+    """The joint's kind and numbers, as they stand in a case file; SI."""
+    given = {"kind": joint.name, **asdict(joint)}  # type: ignore[call-overload]
+    linker = given.pop("rod", None)
+    if linker is not None:
+        given["rod"] = joint.rod.parameters()  # type: ignore[attr-defined]
+    return {name: "rigid" if value == inf else value for name, value in given.items() if value is not None}
 
 
 Elastic = Ball | Pin | Rigid | Spring

@@ -2,13 +2,21 @@
 
 A joint acts on the section of each rod at the joint's node, which lies between two edges: its tangent T and its
 normal N (the mean of the material directors m1) are the means of the edges', weighted so that the nearer edge counts
-more. Of rod A and rod B the three strains are angles for small tilts and any shear,
+more. Of rod A and rod B the strains are angles, for small tilts and any shear:
 
-    shear  s = angle from TA to TB about NA + NB, less the rest angle,
-    tilts  a = NB.(NA x TA)  and  b = NB.TA,   how far B's normal leans from A's, about A's tangent and across it,
+    shear  s = angle from TA to TB about NA + NB, less the rest angle r,
+    tilt   NA x NB, by A's axes -TA, NA x TA:  eA = NB.(NA x TA) + i NB.TA,
+           and by B's axes -TB, NB x TB:       eB = NB.(NA x TB) - i NA.TB.
 
-and E = 1/2 (s, a, b).K (s, a, b) with a stiffness K [N m]. `stiffness_between` says which K makes a joint of given
-stiffnesses second order in the edge length and independent of the mesh.
+The tilt that counts is the mean of both, e = (eA exp(is/2) + eB exp(-is/2 - ir))/2, by axes that go half of the shear
+with either rod (the axes turn against the complex plane). Its energy with that of the shear is
+
+    E = 1/2 k s^2 + 1/2 e.K(s) e,   K(s) = (1/K + dC)^-1,   dC = DA (exp(is) - 1) + DB (exp(-is) - 1).
+
+k and K at rest, from `elastic`, make a joint second order in the edge length and independent of the mesh. K holds the
+compliance of half an edge of either rod, which is not the same along the rod (twist) and across it (bend) and turns
+with its rod; DA and DB are the deviators of both at rest, complex as they turn by double angles. A joint of A and B is
+thus one of B and A, and as stiff when it is sheared as if it had been built so.
 
 Why not elements from edge to edge, as the paper's linkers are: those also stiffen each rod along itself at the joint,
 by an amount that depends on the mesh. Frames, spin and sources are those of `rods.bend_twist`.
@@ -20,6 +28,7 @@ from typing import Self
 
 import numba as nb
 import numpy as np
+from numpy.typing import NDArray
 
 from gridshell.geometry.frames import adapted, parallel_transport
 from gridshell.geometry.vectors import cross, dot
@@ -37,7 +46,8 @@ class RelativeRotation:
     legs : (l, 4) for each edge of a joint the columns of `blocks` of its first node, its second node and its twist
         angle, and its rod: 0 for A, 1 for B. Edges run as they do in their rod.
     weights : (m, l) share of each edge in its rod's section; those of a rod add up to 1.
-    stiffness : (m, 3, 3) of shear and the two tilts [N m].
+    stiffness : (m, 3, 3) of shear and the two tilts at rest, the shear apart from the tilts [N m].
+    deviators : (m, 2) complex, D_A and D_B by the axes of the tilts at rest [1/N m].
     rest_angle : (m,) angle from TA to TB at rest [rad].
     source_tangents, source_directors : (m, l, 3) t and d1 of each edge in its source frame.
     """
@@ -46,6 +56,7 @@ class RelativeRotation:
     legs: Ints
     weights: Floats
     stiffness: Floats
+    deviators: NDArray[np.complex128]
     rest_angle: Floats
     source_tangents: Floats
     source_directors: Floats
@@ -60,6 +71,7 @@ class RelativeRotation:
         *,
         weights: Floats,
         stiffness: Floats,
+        deviators: NDArray[np.complex128],
         rest_angle: Floats,
     ) -> Self:
         """Joints whose source frames are those of `state`.
@@ -68,14 +80,14 @@ class RelativeRotation:
         """
         tangents = edge_tangents(state, blocks, legs)
         given = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, legs[:, 2]]]
-        return cls(
-            np.ascontiguousarray(blocks), legs, weights, stiffness, rest_angle, tangents, adapted(given, tangents)
-        )
+        directors = adapted(given, tangents)
+        rows = np.ascontiguousarray(blocks)
+        return cls(rows, legs, weights, stiffness, deviators, rest_angle, tangents, directors)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         return float(
             _relative_rotation(
-                state, self.blocks, self.legs, self.weights, self.stiffness, self.rest_angle,
+                state, self.blocks, self.legs, self.weights, self.stiffness, self.deviators, self.rest_angle,
                 self.source_tangents, self.source_directors, gradient, hessians,
             )
         )  # fmt: skip
@@ -100,26 +112,38 @@ class RelativeRotation:
         return result
 
     def strains(self, state: Floats) -> Floats:
-        """(m, 3) shear and tilts [rad]."""
+        """(m, 3) shear, and tilt about minus A's tangent and across it [rad]."""
+        full = self._strains(state)
+        of_a, of_b = full[:, 1] + 1j * full[:, 2], full[:, 3] + 1j * full[:, 4]
+        tilt = 0.5 * (of_a + of_b * np.exp(-1j * (full[:, 0] + self.rest_angle)))
+        return np.column_stack([full[:, 0], tilt.real, tilt.imag])
+
+    def moments(self, state: Floats) -> Floats:
+        """(m, 3) moments that the joint carries, conjugate to the strains [N m]: about its normal, and two in plane."""
+        forces, scrap = self._strains(state), np.empty((5, 5))
+        parts = (forces, self.rest_angle, self.stiffness, self.deviators)
+        for strain, rest_angle, stiffness, deviators in zip(*parts, strict=True):
+            _respond(strain.copy(), rest_angle, stiffness, deviators, strain, scrap)
+        return forces[:, :3] * [1.0, 2.0, 2.0]  # B's half of the tilt moment is the same, by B's axes
+
+    def _strains(self, state: Floats) -> Floats:
+        """(m, 5) shear, and the tilts eA and eB [rad]."""
         (ta, na), (tb, nb_) = self.sections(state).transpose(1, 2, 0, 3)
         normal = na + nb_
         shear = np.arctan2(dot(normal, cross(ta, tb)), np.linalg.norm(normal, axis=1) * dot(ta, tb)) - self.rest_angle
         shear -= 2 * pi * np.round(shear / (2 * pi))
-        return np.column_stack([shear, dot(nb_, cross(na, ta)), dot(nb_, ta)])
-
-    def moments(self, state: Floats) -> Floats:
-        """(m, 3) moments that the joint carries, conjugate to the strains [N m]: about its normal, and two in plane."""
-        return np.asarray(np.einsum("mij,mj->mi", self.stiffness, self.strains(state)))
+        lean = cross(nb_, na)
+        return np.column_stack([shear, dot(lean, ta), dot(nb_, ta), dot(lean, tb), -dot(na, tb)])
 
 
 @nb.njit(cache=True, error_model="numpy")
 def _relative_rotation(  # type: ignore[no-untyped-def]
-    x, blocks, legs, weights, stiffness, rest_angle, tangents, directors, gradient, hessians
+    x, blocks, legs, weights, stiffness, deviators, rest_angle, tangents, directors, gradient, hessians
 ):
     """Energies [J]. y = (TA, NA, TB, NB), 12 components, are sums over the edges; an edge's unknowns are (e, theta)."""
     wanted = hessians.shape[0] > 0
     count = legs.shape[0]
-    y, strain, force, slope = np.empty(12), np.empty(3), np.empty(3), np.empty((3, 12))
+    y, strain, force, slope, tangent = np.empty(12), np.empty(5), np.empty(5), np.empty((5, 12)), np.empty((5, 5))
     by_y, by_up, by_flat, curve = np.empty(12), np.empty(12), np.empty(12), np.empty((12, 12))
     t, m1, m2 = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     w, half, length = np.empty((count, 3)), np.empty((count, 3)), np.empty(count)
@@ -135,13 +159,11 @@ def _relative_rotation(  # type: ignore[no-untyped-def]
                 y[6 * legs[s, 3] + k] += weights[m, s] * t[s, k]
                 y[6 * legs[s, 3] + 3 + k] += weights[m, s] * m1[s, k]
         _strains(y, rest_angle[m], strain, slope, by_up, by_flat)
-        for i in range(3):
-            force[i] = 0.0
-            for j in range(3):
-                force[i] += stiffness[m, i, j] * strain[j]
-            energy += 0.5 * force[i] * strain[i]
+        energy += _respond(strain, rest_angle[m], stiffness[m], deviators[m], force, tangent)
         for r in range(12):
-            by_y[r] = force[0] * slope[0, r] + force[1] * slope[1, r] + force[2] * slope[2, r]
+            by_y[r] = 0.0
+            for k in range(5):
+                by_y[r] += force[k] * slope[k, r]
         for s in range(count):
             first, second, angle = blocks[m, legs[s, 0]], blocks[m, legs[s, 1]], blocks[m, legs[s, 2]]
             for c in range(4):
@@ -155,7 +177,7 @@ def _relative_rotation(  # type: ignore[no-untyped-def]
         if not wanted:
             continue
         hessians[m] = 0.0
-        _curvatures(y, force, stiffness[m], slope, by_up, by_flat, curve)
+        _curvatures(y, force, tangent, slope, by_up, by_flat, curve)
         for s in range(count):
             a = 6 * legs[s, 3]
             for q in range(count):
@@ -180,6 +202,50 @@ def _relative_rotation(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, error_model="numpy")
+def _respond(strain, rest_angle, stiffness, deviators, force, tangent):  # type: ignore[no-untyped-def]
+    """Energy of a joint at the strains (s, eA, eB) (5,); its derivatives by them, `force` (5,) and `tangent` (5, 5).
+
+    A symmetric 2 x 2 matrix is its mean p and its deviator z, e -> p e + z e*. K at rest being (p0, z0) with the
+    determinant d, and dC being (0, w), (1/K + dC)^-1 is (p0, z0 - d w) over 1 + 2 Re z0 w* - d |w|^2.
+    """
+    s = strain[0]
+    p0, z0 = (
+        0.5 * (stiffness[1, 1] + stiffness[2, 2]),
+        complex(0.5 * (stiffness[1, 1] - stiffness[2, 2]), stiffness[1, 2]),
+    )
+    d = p0 * p0 - abs(z0) ** 2
+    ahead = complex(np.cos(s), np.sin(s))
+    of_a, of_b = deviators[0] * ahead, deviators[1] * ahead.conjugate()
+    w, w1, w2 = of_a + of_b - deviators[0] - deviators[1], 1j * (of_a - of_b), -of_a - of_b
+    n = z0 - d * w
+    over = 1.0 + 2 * (z0 * w.conjugate()).real - d * abs(w) ** 2
+    over1, over2 = 2 * (n * w1.conjugate()).real, 2 * (n * w2.conjugate()).real - 2 * d * abs(w1) ** 2
+    u = 1.0 / over
+    u1, u2 = -over1 * u**2, 2 * over1**2 * u**3 - over2 * u**2
+    p, p1, p2 = p0 * u, p0 * u1, p0 * u2
+    z, z1, z2 = n * u, n * u1 - d * w1 * u, n * u2 - 2 * d * w1 * u1 - d * w2 * u
+
+    half = 0.5 * complex(np.cos(0.5 * s), np.sin(0.5 * s))
+    other = half.conjugate() * complex(np.cos(rest_angle), -np.sin(rest_angle))
+    part_a, part_b = complex(strain[1], strain[2]) * half, complex(strain[3], strain[4]) * other
+    e, by_s = part_a + part_b, 0.5j * (part_a - part_b)
+    f, f1, turned = p * e + z * e.conjugate(), p1 * e + z1 * e.conjugate(), p * by_s + z * by_s.conjugate()
+    by_tilt, more = (half, 1j * half, other, 1j * other), f1 + turned
+    force[0] = stiffness[0, 0] * s + 0.5 * (f1.conjugate() * e).real + (f.conjugate() * by_s).real
+    tangent[0, 0] = stiffness[0, 0] + 0.5 * (p2 * abs(e) ** 2 + (z2 * (e * e).conjugate()).real)
+    tangent[0, 0] += 2 * (f1.conjugate() * by_s).real + (turned.conjugate() * by_s).real
+    tangent[0, 0] -= 0.25 * (f.conjugate() * e).real
+    for i in range(4):
+        v, way = by_tilt[i], 0.5j if i < 2 else -0.5j
+        force[1 + i] = (f.conjugate() * v).real
+        tangent[0, 1 + i] = tangent[1 + i, 0] = (more.conjugate() * v).real + (f.conjugate() * way * v).real
+        stiff = (p * v + z * v.conjugate()).conjugate()
+        for j in range(4):
+            tangent[1 + i, 1 + j] = (stiff * by_tilt[j]).real
+    return 0.5 * (stiffness[0, 0] * s * s + (f.conjugate() * e).real)
+
+
+@nb.njit(cache=True, error_model="numpy")
 def _shear_parts(y, by_up, by_flat):  # type: ignore[no-untyped-def]
     """Of the shear's tangent up / flat, n.(TA x TB) over |n| TA.TB with n = NA + NB: up, TA.TB, |n|, n, and slopes."""
     normal = (y[3] + y[9], y[4] + y[10], y[5] + y[11])
@@ -200,7 +266,7 @@ def _shear_parts(y, by_up, by_flat):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, error_model="numpy")
 def _strains(y, rest_angle, strain, slope, by_up, by_flat):  # type: ignore[no-untyped-def]
-    """The three strains and their derivatives (3, 12) by y."""
+    """The strains (s, eA, eB) and their derivatives (5, 12) by y."""
     up, along, size, _ = _shear_parts(y, by_up, by_flat)
     flat = size * along
     square = up * up + flat * flat
@@ -208,21 +274,25 @@ def _strains(y, rest_angle, strain, slope, by_up, by_flat):  # type: ignore[no-u
     strain[0] = shear - 2.0 * np.pi * np.floor(shear / (2.0 * np.pi) + 0.5)
     for k in range(12):
         slope[0, k] = (flat * by_up[k] - up * by_flat[k]) / square
-    strain[1] = strain[2] = 0.0
+    strain[1:] = 0.0
+    slope[1:] = 0.0
     for k in range(3):
         k1, k2 = (k + 1) % 3, (k + 2) % 3
-        slope[1, k] = y[9 + k1] * y[3 + k2] - y[9 + k2] * y[3 + k1]
-        slope[1, 3 + k] = y[k1] * y[9 + k2] - y[k2] * y[9 + k1]
-        slope[1, 9 + k] = y[3 + k1] * y[k2] - y[3 + k2] * y[k1]
+        lean = y[9 + k1] * y[3 + k2] - y[9 + k2] * y[3 + k1]
+        for row, t in ((1, 0), (3, 6)):  # NB.(NA x T)
+            slope[row, t + k] = lean
+            slope[row, 3 + k] = y[t + k1] * y[9 + k2] - y[t + k2] * y[9 + k1]
+            slope[row, 9 + k] = y[3 + k1] * y[t + k2] - y[3 + k2] * y[t + k1]
+            strain[row] += lean * y[t + k]
         slope[2, k], slope[2, 9 + k] = y[9 + k], y[k]
-        slope[1, 6 + k] = slope[2, 3 + k] = slope[2, 6 + k] = 0.0
-        strain[1] += y[9 + k] * slope[1, 9 + k]
+        slope[4, 6 + k], slope[4, 3 + k] = -y[3 + k], -y[6 + k]
         strain[2] += y[9 + k] * y[k]
+        strain[4] -= y[3 + k] * y[6 + k]
 
 
 @nb.njit(cache=True, error_model="numpy")
 def _curvatures(y, force, stiffness, slope, by_up, by_flat, curve):  # type: ignore[no-untyped-def]
-    """(12, 12) second derivatives of the energy by y."""
+    """(12, 12) second derivatives of the energy by y; `stiffness` (5, 5) are those by the strains."""
     up, along, size, normal = _shear_parts(y, by_up, by_flat)
     flat = size * along
     square = up * up + flat * flat
@@ -231,8 +301,8 @@ def _curvatures(y, force, stiffness, slope, by_up, by_flat, curve):  # type: ign
         for j in range(12):
             curve[i, j] = twice * (by_flat[i] * by_flat[j] - by_up[i] * by_up[j])
             curve[i, j] += mixed * (by_up[i] * by_flat[j] + by_flat[i] * by_up[j])
-            for r in range(3):
-                for s in range(3):
+            for r in range(5):
+                for s in range(5):
                     curve[i, j] += stiffness[r, s] * slope[r, i] * slope[s, j]
     of_up, of_flat = force[0] * flat / square, -force[0] * up / square
     _add_triple(of_up, 0, 6, normal, curve)
@@ -251,12 +321,15 @@ def _curvatures(y, force, stiffness, slope, by_up, by_flat, curve):  # type: ign
                     curve[n + j, t + i] += of_flat * y[other + i] * normal[j] / size
                 curve[n + i, 3 + j] += direct
                 curve[n + i, 9 + j] += direct
-    _add_triple(force[1], 9, 3, y[0:3], curve)
-    _add_triple(force[1], 3, 0, y[9:12], curve)
-    _add_triple(force[1], 0, 9, y[3:6], curve)
+    for row, t in ((1, 0), (3, 6)):
+        _add_triple(force[row], 9, 3, y[t : t + 3], curve)
+        _add_triple(force[row], 3, t, y[9:12], curve)
+        _add_triple(force[row], t, 9, y[3:6], curve)
     for i in range(3):
         curve[i, 9 + i] += force[2]
         curve[9 + i, i] += force[2]
+        curve[3 + i, 6 + i] -= force[4]
+        curve[6 + i, 3 + i] -= force[4]
 
 
 @nb.njit(cache=True, error_model="numpy")

@@ -8,7 +8,7 @@ edge and the last edge lies half an edge of rod, so that direction and material 
 end: second order, where holding the last edge itself would act half an edge inside (first order).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,21 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csc_matrix, diags
 
 from gridshell.errors import InputError
-from gridshell.geometry.frames import adapted, directors_along, parallel_transport, signed_angle
-from gridshell.geometry.vectors import cross, dot, unit
+from gridshell.geometry.given import direction, finite, vector
+from gridshell.geometry.vectors import cross, unit
 from gridshell.model.assembly import Assembly
 from gridshell.model.freedom import Freedom
+from gridshell.model.rod_line import Clamps, End, RodLine, Rods
 from gridshell.rods.bend_twist import BendTwist
 from gridshell.rods.elements import Elements
 from gridshell.rods.isotropic_bend import IsotropicBend
-from gridshell.rods.section import Rod
+from gridshell.rods.round_bend_twist import RoundBendTwist
 from gridshell.rods.stretch import Stretch
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-End = Literal["start", "end"]
-Rods = Rod | Sequence[Rod] | Callable[[float], Rod]
-Clamps = Sequence[End] | Mapping[End, ArrayLike]
 
 _SPIN = (1.0, 0.0, 0.0)  # the one component of an angle block that means anything
 
@@ -62,9 +60,8 @@ class ElasticRod:
     ----------
     rest : (n, 3) rest positions of the nodes [m].
     closed : a ring; its last edge leads back to the first node.
-    elements : bending and twist: `BendTwist`; where the rod is isotropic and naturally straight `IsotropicBend`,
-        and beside it a `BendTwist` without bending stiffness for the twist, if any. (Material curvatures are
-        averaged over frames that differ by the twist of a node, which softens strongly twisted meshes; ERRATA E2.)
+    elements : bending and twist: `BendTwist`; where the rod is isotropic and naturally straight `RoundBendTwist`, or
+        `IsotropicBend` where it carries no twist angles.
     stretch : the edges.
     mass : (N, 3) lumped mass of each block's components: of a node [kg]; of a twist angle the rotary inertia
         [kg m2] in component 0, else 0. Ghosts have none.
@@ -112,57 +109,41 @@ class ElasticRod:
         clamped : ends that are clamped, ("start", "end"), or the tangent along the rod at each as it is at rest,
             {"start": (1, 0, 0)}; by default that of the two edges next to the end, to second order.
         """
-        nodes = _checked(rest)
-        tangents, lengths, edges = _edges(nodes, closed)
-        rods = _one_per_edge(rod, lengths)
-        stiffness = np.array([(*one.bend_stiffnesses, one.twist_stiffness) for one in rods])
-        stretch = Stretch.elastic(edges, lengths, np.array([one.stretch_stiffness for one in rods]))
-        directors = _directors(tangents, director)
-        clamps = _clamps(clamped, tangents, lengths, closed)
-
-        n, angles, count = len(nodes), len(edges) if twist else 0, len(clamps)
-        ghosts = n + angles + np.arange(count)
-        state = np.zeros((n + angles + count * (2 if twist else 1), 3))
-        state[:n] = nodes
-        frames = np.zeros_like(state)
-        if twist:
-            frames[n : n + angles] = directors
-        blocks, bend_lengths, of_bends, like = _bends(n, edges, lengths, stiffness, closed)
-        for k, (end, tangent) in enumerate(clamps.items()):
-            edge, inner = (0, 1) if end == "start" else (n - 2, n - 2)
-            last, outward = (0, -1) if end == "start" else (n - 1, 1)
-            state[ghosts[k]] = nodes[last] + outward * lengths[edge] * tangent
-            ghost_angle = n + angles + count + k
-            row = [ghosts[k], ghost_angle, last, n + edge, inner]
-            blocks = np.vstack([blocks, row if end == "start" else row[::-1]])
-            bend_lengths = np.append(bend_lengths, 0.5 * lengths[edge])
-            of_bends = np.vstack([of_bends, stiffness[edge] / (0.5 * lengths[edge])])
-            like = np.append(like, 0 if end == "start" else n - 3)
-            if twist:
-                frames[ghost_angle] = _end_director(directors, tangents, lengths, tangent, end)
-
+        line = RodLine.of(rest, closed=closed, clamped=clamped)
+        rods = line.rods(rod)
+        bends = _Bends.of(line, np.array([(*one.bend_stiffnesses, one.twist_stiffness) for one in rods]), twist)
         straight = isinstance(natural, str) and natural == "straight"
-        rate = np.broadcast_to(np.asarray(natural_twist, dtype=float), (int(like.max()) + 1,))[like]
-        free_spin = straight and bool((stiffness[:, 0] == stiffness[:, 1]).all())
-        elements: tuple[Elements, ...] = ()
-        if free_spin:
-            elements = (IsotropicBend(np.ascontiguousarray(blocks[:, ::2]), of_bends[:, 0].copy()),)
-            of_bends[:, :2] = 0.0
+        count = int(bends.like.max()) + 1
+        rate = finite("natural_twist", natural_twist, count)[bends.like]
+        free_spin = straight and bool((bends.stiffness[:, 0] == bends.stiffness[:, 1]).all())
+        elements: Elements
         if twist:
-            bends = BendTwist.starting_at(
-                blocks, state, frames, bend_stiffness=of_bends[:, :2], twist_stiffness=of_bends[:, 2]
+            state, frames = bends.rest_state(line, line.directors(director))
+            found = (RoundBendTwist if free_spin else BendTwist).starting_at(
+                bends.blocks,
+                state,
+                frames,
+                bend_stiffness=bends.stiffness[:, :2],
+                twist_stiffness=bends.stiffness[:, 2],
             )
             if isinstance(natural, str) and natural == "rest":
-                bends = bends.relaxed(state)
+                found = found.relaxed(state)
             elif not straight:
-                curvature = np.broadcast_to(np.asarray(natural, dtype=float), (int(like.max()) + 1, 2))[like]
-                bends = replace(bends, natural_curvature=curvature * bend_lengths[:, None])
-            elements += (replace(bends, natural_twist=bends.natural_twist + rate * bend_lengths),)
+                if isinstance(natural, str):
+                    raise InputError(f'natural is "straight", "rest" or curvatures [1/m], not {natural!r}')
+                curvature = finite("natural curvatures", natural, count, 2)[bends.like]
+                found = replace(found, natural_curvature=curvature * bends.lengths[:, None])
+            elements = replace(found, natural_twist=found.natural_twist + rate * bends.lengths)
         elif closed or not free_spin or rate.any():
             raise InputError("only an open, isotropic, naturally straight and untwisted rod goes without twist angles")
-        mass = _lumped(len(state), n, edges, lengths, rods, twist)
-        held = np.array(list(clamps.values())).reshape(-1, 3)
-        return ElasticRod(nodes, closed, elements, stretch, mass, bend_lengths, tuple(clamps), held, free_spin)
+        else:
+            elements = IsotropicBend(np.ascontiguousarray(bends.blocks[:, ::2]), bends.stiffness[:, 0].copy())
+        stretch = Stretch.elastic(line.edges, line.lengths, np.array([one.stretch_stiffness for one in rods]))
+        mass = line.mass(bends.size, rods, bends.angles)
+        held = np.array(list(line.clamps.values())).reshape(-1, 3)
+        return ElasticRod(
+            line.nodes, closed, (elements,), stretch, mass, bends.lengths, tuple(line.clamps), held, free_spin
+        )
 
     @property
     def explicit(self) -> tuple[Elements, ...]:
@@ -184,9 +165,21 @@ class ElasticRod:
         return len(self.mass)
 
     @property
+    def length(self) -> float:
+        """At rest [m]."""
+        return float(self.stretch.rest_lengths.sum())
+
+    @property
+    def bend_energy(self) -> float:
+        """EI/L [J], of the softer direction, the mean along the rod: what a bend by about a radian stores."""
+        bends = self.elements[0]
+        stiffness = bends.stiffness if isinstance(bends, IsotropicBend) else self._bend_twist.bend_stiffness.min(axis=1)
+        return float((stiffness * self.bend_lengths).mean() / self.length)
+
+    @property
     def twists(self) -> bool:
         """Whether the rod carries twist angles."""
-        return isinstance(self.elements[-1], BendTwist)
+        return isinstance(self.elements[0], BendTwist)
 
     @property
     def nodes(self) -> slice:
@@ -230,13 +223,14 @@ class ElasticRod:
         tangents : of the clamps, along the rod; by default those at rest. Their twist angles are 0.
         """
         state = np.zeros((self.block_count, 3))
-        state[self.nodes] = self.rest if positions is None else positions
+        nodes = self.rest if positions is None else positions
+        state[self.nodes] = finite("the positions of this rod's nodes", nodes, self.node_count, 3)
         if angles is not None:
             if not self.twists:
                 raise InputError("this rod carries no twist angles: build it with twist=True")
-            state[self.angles, 0] = angles
+            state[self.angles, 0] = finite("the twist angles of this rod", angles, self.edge_count)
         for k, end in enumerate(self.clamps):
-            tangent = unit(np.asarray((tangents or {}).get(end, self.clamp_tangents[k]), dtype=float))
+            tangent = direction(f'the tangent at the "{end}"', (tangents or {}).get(end, self.clamp_tangents[k]))
             state[self.ghosts[k]] = self.ghost_position(end, state[self.clamped_nodes[k]], tangent)
         return state
 
@@ -266,10 +260,15 @@ class ElasticRod:
         return np.stack([m1, cross(t, m1), t], axis=1)
 
     def strains(self, state: Floats) -> RodStrains:
-        """Of a rod without twist angles the curvatures are towards directors carried along it without twist."""
-        bends = self._bend_twist.strains(state) if self.twists else self._untwisted_strains(state)
-        bends = bends / self.bend_lengths[:, None]
-        return RodStrains(self.stretch.strains(state), bends[:, :2], bends[:, 2])
+        """A rod without twist angles has no directors: its curvatures are their size, and 0."""
+        bends = self.elements[0]
+        if isinstance(bends, IsotropicBend):
+            curvature = bends.curvatures(state)
+            strains = np.column_stack([curvature, 0 * curvature, 0 * curvature])
+        else:
+            strains = self._bend_twist.strains(state)
+        strains = strains / self.bend_lengths[:, None]
+        return RodStrains(self.stretch.strains(state), strains[:, :2], strains[:, 2])
 
     def energy(self, state: Floats) -> float:
         """[J]"""
@@ -299,119 +298,61 @@ class ElasticRod:
     def weight(self, gravity: ArrayLike) -> Floats:
         """(N, 3) forces of gravity [N] for its acceleration (3,) [m/s2]."""
         load = np.zeros_like(self.mass)
-        load[self.nodes] = self.mass[self.nodes] * np.asarray(gravity, dtype=float)
+        load[self.nodes] = self.mass[self.nodes] * vector("gravity", gravity)
         return load
-
-    def _untwisted_strains(self, state: Floats) -> Floats:
-        """(b, 3) integrated curvatures and no twist, of an open rod without twist angles."""
-        ghosts = dict(zip(self.clamps, self.ghosts, strict=True))
-        inner = np.arange(self.node_count)
-        chain = [ghosts[end] for end in self.clamps if end == "start"], inner, [ghosts[e] for e in ghosts if e == "end"]
-        tangents = unit(np.diff(state[np.concatenate(chain).astype(np.intp)], axis=0))
-        d1 = _directors(tangents, None)
-        before, after = tangents[:-1], tangents[1:]
-        both = 1.0 + dot(before, after)
-        bends = [(dot(after, d[:-1]) - dot(before, d[1:])) / both for d in (d1, cross(tangents, d1))]
-        table = np.column_stack([*bends, 0.0 * both])
-        first = 1 if "start" in ghosts else 0
-        at_clamps = [0 if end == "start" else len(table) - 1 for end in self.clamps]
-        return np.vstack([table[first : first + self.node_count - 2], table[at_clamps]])
 
     @property
     def _bend_twist(self) -> BendTwist:
-        bends = self.elements[-1]
+        bends = self.elements[0]
         if not isinstance(bends, BendTwist):
             raise InputError("this rod carries no frames: build it with twist=True")
         return bends
 
 
-def _checked(rest: ArrayLike) -> Floats:
-    nodes = np.array(rest, dtype=float)
-    if nodes.ndim != 2 or nodes.shape[1] != 3 or len(nodes) < 3 or not np.isfinite(nodes).all():
-        raise InputError(f"a rod needs the finite positions of 3 nodes or more, (n, 3), not an array {nodes.shape}")
-    return nodes
+@dataclass(frozen=True)
+class _Bends:
+    """Where a rod bends: at its inner nodes in turn, then at its clamps.
 
-
-def _edges(nodes: Floats, closed: bool) -> tuple[Floats, Floats, Ints]:
-    """Unit tangents (edges, 3), lengths (edges,) [m] and nodes (edges, 2)."""
-    starts = np.arange(len(nodes) if closed else len(nodes) - 1)
-    edges = np.column_stack([starts, (starts + 1) % len(nodes)])
-    apart = nodes[edges[:, 1]] - nodes[edges[:, 0]]
-    lengths = np.linalg.norm(apart, axis=1)
-    if not lengths.all():
-        raise InputError(f"edge {int(np.argmin(lengths))} of the rod has no length: its nodes must lie apart")
-    return apart / lengths[:, None], lengths, edges
-
-
-def _one_per_edge(rod: Rods, lengths: Floats) -> list[Rod]:
-    if isinstance(rod, Rod):
-        return [rod] * len(lengths)
-    if callable(rod):
-        return [rod(float(s)) for s in np.cumsum(lengths) - 0.5 * lengths]
-    rods = list(rod)
-    if len(rods) != len(lengths):
-        raise InputError(f"a rod of {len(lengths)} edges takes as many rods, one for each edge, not {len(rods)}")
-    return rods
-
-
-def _directors(tangents: Floats, director: ArrayLike | None) -> Floats:
-    """(edges, 3) first directors."""
-    if director is None:
-        director = (0.0, 0.0, 1.0) if abs(tangents[0, 2]) < 0.9 else (1.0, 0.0, 0.0)
-    given = np.asarray(director, dtype=float)
-    if given.shape == (3,):
-        return directors_along(tangents, given)
-    if given.shape != tangents.shape:
-        raise InputError(f"directors are (3,), or one for each edge {tangents.shape}, not {given.shape}")
-    return adapted(given, tangents)
-
-
-def _clamps(clamped: Clamps, tangents: Floats, lengths: Floats, closed: bool) -> dict[End, Floats]:
-    """Tangent at each clamp."""
-    wanted: dict[End, ArrayLike | None]
-    wanted = dict(clamped) if isinstance(clamped, Mapping) else dict.fromkeys(clamped)
-    if wanted and closed:
-        raise InputError("a closed ring has no ends to clamp")
-    result: dict[End, Floats] = {}
-    for end, tangent in wanted.items():
-        if end not in ("start", "end"):
-            raise InputError(f'a rod is clamped at its "start" or "end", not {end!r}')
-        if tangent is None:
-            (t0, t1), (l0, l1) = (x[:2] if end == "start" else x[-1:-3:-1] for x in (tangents, lengths))
-            tangent = t0 + (t0 - t1) * l0 / (l0 + l1)
-        result[end] = unit(np.asarray(tangent, dtype=float))
-    return result
-
-
-def _bends(n: int, edges: Ints, lengths: Floats, stiffness: Floats, closed: bool) -> tuple[Ints, Floats, Floats, Ints]:
-    """Of the bends at inner nodes: blocks (b, 5), rest lengths (b,) [m], stiffnesses (b, 3) [N m], and their places.
-
-    Half an edge lies on either side: the compliances of the two add up.
+    size : blocks of the rod; angles : those of the edges' twist angles.
+    blocks : (b, 5) as of `BendTwist`; without twist angles the numbers of angles mean nothing.
+    lengths : (b,) rest length of rod that each stands for [m]; stiffness : (b, 3) EI1, EI2, GJ over that [N m].
+    like : (b,) the inner node whose natural strains it shares, counted from the first.
     """
-    middles = np.arange(n) if closed else np.arange(1, n - 1)
-    before, after = (middles - 1) % n, middles
-    blocks = np.column_stack([edges[before, 0], n + before, middles, n + after, edges[after, 1]])
-    compliance = 0.5 * lengths[:, None] / stiffness
-    of_bends = 1.0 / (compliance[before] + compliance[after])
-    return blocks, 0.5 * (lengths[before] + lengths[after]), of_bends, np.arange(len(middles))
 
+    size: int
+    angles: slice
+    blocks: Ints
+    lengths: Floats
+    stiffness: Floats
+    like: Ints
 
-def _end_director(directors: Floats, tangents: Floats, lengths: Floats, tangent: Floats, end: End) -> Floats:
-    """(3,) director at a clamp: that of the last edge, carried there with the twist that the two last edges show."""
-    order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
-    (d0, d1), (t0, t1), (l0, l1) = directors[order], tangents[order], lengths[order]
-    twist = signed_angle(parallel_transport(d1, t1, t0), d0, t0)  # from the inner edge to the last
-    turn = twist * l0 / (l0 + l1)
-    carried = parallel_transport(d0, t0, tangent)
-    return np.asarray(np.cos(turn) * carried + np.sin(turn) * cross(tangent, carried))
+    @staticmethod
+    def of(line: RodLine, stiffness: Floats, twist: bool) -> "_Bends":
+        """stiffness : (edges, 3) EI1, EI2, GJ [N m2]; of the half edges at either side of a node compliances add up."""
+        n, (middles, edges) = len(line.nodes), line.bends()
+        angles = slice(n, n + (len(line.edges) if twist else 0))
+        blocks = np.column_stack(
+            [line.edges[edges[:, 0], 0], n + edges[:, 0], middles, n + edges[:, 1], line.edges[edges[:, 1], 1]]
+        )
+        compliance = 0.5 * line.lengths[:, None] / stiffness
+        of_bends = 1.0 / (compliance[edges[:, 0]] + compliance[edges[:, 1]])
+        lengths, like = 0.5 * line.lengths[edges].sum(axis=1), np.arange(len(middles))
+        for k, end in enumerate(line.clamps):
+            ghost, (edge, last, inner) = angles.stop + k, (0, 0, 1) if end == "start" else (n - 2, n - 1, n - 2)
+            row = [ghost, ghost + len(line.clamps), last, n + edge, inner]
+            blocks = np.vstack([blocks, row if end == "start" else row[::-1]])
+            lengths = np.append(lengths, 0.5 * line.lengths[edge])
+            of_bends = np.vstack([of_bends, stiffness[edge] / lengths[-1]])
+            like = np.append(like, 0 if end == "start" else n - 3)
+        size = angles.stop + len(line.clamps) * (2 if twist else 1)
+        return _Bends(size, angles, blocks, lengths, of_bends, like)
 
-
-def _lumped(size: int, n: int, edges: Ints, lengths: Floats, rods: list[Rod], twist: bool) -> Floats:
-    """(size, 3) mass [kg]: half of each edge's at either node; rotary inertia [kg m2] of its angle."""
-    mass = np.zeros((size, 3))
-    half = 0.5 * lengths * [rod.mass_per_length for rod in rods]
-    for side in range(2):
-        np.add.at(mass, edges[:, side], half[:, None])
-    if twist:
-        mass[n : n + len(edges), 0] = lengths * [rod.rotary_inertia for rod in rods]
-    return mass
+    def rest_state(self, line: RodLine, directors: Floats) -> tuple[Floats, Floats]:
+        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges."""
+        state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
+        state[: len(line.nodes)], frames[self.angles] = line.nodes, directors
+        for k, end in enumerate(line.clamps):
+            ghost = self.angles.stop + k
+            state[ghost] = line.ghost(end)
+            frames[ghost + len(line.clamps)] = line.end_director(directors, end)
+        return state, frames

@@ -164,6 +164,11 @@ class Shell:
         turning = np.flatnonzero(self.like >= self.mesh.node_count + len(self.ghosts))
         return free.with_directions(turning, SPIN).with_directions(self.spinning)
 
+    def with_elements(self, elements: tuple[Elements, ...]) -> "Shell":
+        """The same shell with its elements' source frames elsewhere."""
+        count = len(self.within)
+        return replace(self, within=elements[:count], between=elements[count:])
+
     def held_ends(self) -> Freedom:
         """As `freedom`, with every rod end held in place."""
         return self.freedom().with_directions(self.ends)
@@ -235,7 +240,8 @@ class _Builder:
         mass = shared[self.like] / copies[self.like][:, None]
         within, between = (*bends, *linkers), (*self._elastic(), *self._ties(), *linker_ties)
         return Shell(
-            mesh, self.coupling, parts.node_count, within, between, stretch, parts.ends.ravel(), self.ghosts, self.angles, spinning, self.like, mass, self._lift(),
+            mesh, self.coupling, parts.node_count, within, between, stretch,
+            parts.ends.ravel(), self.ghosts, self.angles, spinning, self.like, mass, self._lift(),
         )  # fmt: skip
 
     def _bends(self) -> tuple[Elements, ...]:

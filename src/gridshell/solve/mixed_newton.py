@@ -54,14 +54,15 @@ class Problem:
 class Equilibrium:
     """A state (n, 3), its axial forces (e,) [N], its gradient (n, 3) [N] without constraint forces, and figures.
 
-    Where the state is not stable, `mode` (n, 3) is the direction of the most negative curvature, its largest
-    displacement being 1.
+    The twist angles of the state belong to the source frames of `elements`, which are at the state. Where it is not
+    stable, `mode` (n, 3) is the direction of the most negative curvature, its largest displacement being 1.
     """
 
     state: Floats
     forces: Floats
     gradient: Floats
     report: SolveReport
+    elements: tuple[Elements, ...]
     mode: Floats | None = None
 
 
@@ -125,7 +126,8 @@ def find_equilibrium(
         negative_modes=step.negative_modes,
     )
     mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
-    return Equilibrium(state, forces, gradient, report, mode)
+    step.refresh(state)
+    return Equilibrium(state, forces, gradient, report, step.elements, mode)
 
 
 def find_stable(
@@ -143,7 +145,12 @@ def find_stable(
             start = first.state + side * NUDGE * problem.length * first.mode
             tries.append(
                 find_equilibrium(
-                    problem, start, first.forces, descend=True, most_iterations=2 * most_iterations, progress=progress
+                    replace(problem, elements=first.elements),
+                    start,
+                    first.forces,
+                    descend=True,
+                    most_iterations=2 * most_iterations,
+                    progress=progress,
                 )
             )
             if tries[-1].report.stable:
@@ -158,10 +165,13 @@ def _settled(problem: Problem, before: Floats, after: Floats) -> bool:
     return float(np.abs(after - before).max(initial=0.0)) <= FORCE_TOLERANCE * size
 
 
-def _linear_solver(assembly: Assembly, free: Freedom, places: Floats | None) -> LinearSolver:
+def linear_solver(
+    indptr: NDArray[np.int64], indices: NDArray[np.int64], free: Freedom, places: Floats | None
+) -> LinearSolver:
+    """The solver for a pattern: ordered by the `places` (n, 2) of the blocks in the flat grid, if they are known."""
     if places is None:
-        return Qdldl(assembly.indptr, assembly.indices)
-    return Multifrontal(assembly.indptr, assembly.indices, np.repeat(places, free.count, axis=0))
+        return Qdldl(indptr, indices)
+    return Multifrontal(indptr, indices, np.repeat(places, free.count, axis=0))
 
 
 class _Step:
@@ -169,25 +179,25 @@ class _Step:
 
     def __init__(self, problem: Problem, state: Floats) -> None:
         self._problem = problem
-        self._elements = problem.elements
+        self.elements = problem.elements
         free = problem.constraint.freedom(state)
         everywhere = np.arange(len(state))[:, None]
         self._blocks = [*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere]
         self._assembly = Assembly.of(self._blocks, free)
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
-        self._solver = _linear_solver(self._assembly, free, problem.places)
+        self._solver = linear_solver(self._assembly.indptr, self._assembly.indices, free, problem.places)
         self.dofs = free.size
         self.factorizations = 0
         self.negative_modes = 0
         self._shift = 0.0
 
     def refresh(self, state: Floats) -> None:
-        self._elements = tuple(element.refreshed(state) for element in self._elements)
+        self.elements = tuple(element.refreshed(state) for element in self.elements)
 
     def gradient(self, state: Floats, forces: Floats) -> Floats:
         """Gradient (n, 3) of energy and load with the given axial forces [N]."""
         gradient = np.zeros_like(state) if self._problem.load is None else -self._problem.load
-        for element in self._elements:
+        for element in self.elements:
             element.evaluate(state, gradient)
         self._problem.stretch.add_axial(state, forces, gradient)
         return gradient
@@ -199,7 +209,7 @@ class _Step:
         stretch = problem.stretch.with_forces(forces, multipliers=base)
         self._free = free = problem.constraint.freedom(state)
         gradient = np.zeros_like(state) if problem.load is None else -problem.load
-        for element, hessians in zip(self._elements, self._hessians, strict=False):
+        for element, hessians in zip(self.elements, self._hessians, strict=False):
             element.evaluate(state, gradient, hessians)
         by_force = gradient.copy()
         stretch.add_axial(state, forces, by_force)

@@ -29,7 +29,8 @@ def follow(
 
     Parameters
     ----------
-    problem_at : the problem at t, its constraint saying where the prescribed blocks are then. The first
+    problem_at : the problem at t, its constraint saying where the prescribed blocks are then; its energies are the
+        same at all t, and their source frames are carried along the path. The first
         iteration of each step carries them there with the tangent stiffness: it is the tangent predictor.
     state, forces : equilibrium, or a guess of it, at t = 0.
 
@@ -48,7 +49,10 @@ def follow(
             if progress is not None:
                 progress(there, iteration, residual)
 
-        found = find_stable(problem_at(there), state, forces, most_iterations=MOST, progress=told)
+        problem = problem_at(there)
+        if last is not None:
+            problem = replace(problem, elements=last.elements)
+        found = find_stable(problem, state, forces, most_iterations=MOST, progress=told)
         reports.append(found.report)
         if found.report.converged:
             t, state, forces, last = there, found.state, found.forces, found

@@ -1,0 +1,20 @@
+"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat."""
+
+from gridshell.checks.bending import Bending, bending, curvatures, fibre_distance, fibre_strain
+from gridshell.checks.check import Checks, check
+from gridshell.checks.deployment import Deployment, deploy
+from gridshell.checks.reactions import Reactions, reactions
+
+__all__ = [
+    "Bending",
+    "Checks",
+    "Deployment",
+    "Reactions",
+    "bending",
+    "check",
+    "curvatures",
+    "deploy",
+    "fibre_distance",
+    "fibre_strain",
+    "reactions",
+]

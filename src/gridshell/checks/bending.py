@@ -1,0 +1,119 @@
+"""Bending check: curvature and stress along each rod, sigma = E y kappa + |N| / A.
+
+The curvature is the one whose moment EI kappa is in equilibrium: kappa = 2 tan(phi/2) over the Voronoi length
+[HQK Eq 1b]. A pinned end has none; a clamped end has that between its last edge and its clamp.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.errors import InputError
+from gridshell.geometry.vectors import cross, dot, unit
+from gridshell.layout import GridMesh
+from gridshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bending:
+    """Curvature and stress at every node of every rod: arrays (k,) in the order of the mesh's `rod_nodes`.
+
+    Parameters
+    ----------
+    curvature : [1/m].
+    axial_strain : [-], mean of the edges on both sides.
+    stress : of the outermost fibre, bending and axial [Pa]; None where the section's fibres are not known.
+    """
+
+    curvature: Floats
+    axial_strain: Floats
+    stress: Floats | None
+    strain: Floats | None
+
+
+def bending(mesh: GridMesh, positions: Floats, rod: Rod, *, clamps: Floats | None = None) -> Bending:
+    """Bending of the rods of `mesh` with nodes at `positions` (n, 3) [m].
+
+    clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
+    """
+    curvature = curvatures(mesh, positions, clamps=clamps)
+    axial = axial_strains(mesh, positions)
+    fibre = fibre_distance(rod)
+    if fibre is None or rod.material is None:
+        return Bending(curvature, axial, None, None)
+    strain = fibre * curvature + np.abs(axial)
+    return Bending(curvature, axial, rod.material.youngs_modulus * strain, strain)
+
+
+def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
+    """(k,) curvature [1/m] at each entry of `rod_nodes`."""
+    result = np.zeros(len(mesh.rod_nodes))
+    inner = np.ones(len(mesh.rod_nodes), dtype=bool)
+    first, last = mesh.rod_start, mesh.rod_stop - 1
+    inner[first] = inner[last] = False
+    before, here, after = (positions[mesh.bends[:, k]] for k in range(3))
+    result[inner] = _turn(unit(here - before), unit(after - here)) / mesh.voronoi_lengths
+    if clamps is not None:
+        for side, (end, neighbour) in enumerate(((first, first + 1), (last, last - 1))):
+            outward = unit(positions[mesh.rod_nodes[end]] - positions[mesh.rod_nodes[neighbour]])
+            half = 0.5 * np.abs(mesh.stations[end] - mesh.stations[neighbour])
+            result[end] = _turn(outward, clamps[side::2]) / half
+    return result
+
+
+def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:
+    """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one."""
+    lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
+    strain = lengths / mesh.edge_lengths - 1.0
+    begins = np.ones(len(mesh.rod_nodes), dtype=bool)
+    begins[mesh.rod_stop - 1] = False  # entries that an edge begins at
+    total, count = np.zeros(len(begins)), np.zeros(len(begins))
+    for entries in (np.flatnonzero(begins), np.flatnonzero(begins) + 1):
+        total[entries] += strain
+        count[entries] += 1
+    return total / count
+
+
+def fibre_distance(rod: Rod) -> float | None:
+    """Distance [m] of the outermost fibre from the axis about which a rod bends, whichever that is.
+
+    Of a section that is not round this is its farthest point: the stress is then an upper bound. None for a
+    given section, whose shape is not known.
+    """
+    section = rod.section
+    if isinstance(section, GivenSection):
+        return None
+    if isinstance(section, Circle | Tube):
+        return section.outer_radius
+    if isinstance(section, Ellipse):
+        return max(section.a, section.b)
+    if isinstance(section, RectangularSection):
+        return 0.5 * float(np.hypot(section.width, section.height))
+    raise InputError(f"the fibres of a section of kind {type(section).__name__} are not known")
+
+
+def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
+    """Largest bending strain over the section for curvatures towards m1 and m2 [1/m]: exact for each shape.
+
+    Raises
+    ------
+    InputError : a given section has stiffnesses and no shape.
+    """
+    section = rod.section
+    if isinstance(section, RectangularSection):  # at a corner
+        return np.asarray(0.5 * (section.width * np.abs(kappa1) + section.height * np.abs(kappa2)))
+    if isinstance(section, Ellipse):
+        return np.hypot(section.a * kappa1, section.b * kappa2)
+    fibre = fibre_distance(rod)
+    if fibre is None:
+        raise InputError("a given section has no fibres: its stress is not known; give a shape and a material")
+    return np.asarray(fibre * np.hypot(kappa1, kappa2))
+
+
+def _turn(before: Floats, after: Floats) -> Floats:
+    """(b,) integrated curvature 2 tan(phi/2) between unit tangents; exact also for small angles."""
+    binormal = cross(before, after)
+    return np.asarray(2.0 * np.sqrt(dot(binormal, binormal)) / (1.0 + dot(before, after)))

@@ -1,0 +1,75 @@
+"""All checks of a popped-up shell in one call."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gridshell.checks.bending import Bending, bending
+from gridshell.checks.deployment import Deployment, deploy
+from gridshell.checks.reactions import Reactions, reactions
+from gridshell.formfinding import Boundary, Popped
+from gridshell.formfinding.popup import Ends
+from gridshell.formfinding.progress import Progress, silent
+from gridshell.rods.section import Rod
+from gridshell.solve.constraint import Supports
+from gridshell.solve.mixed_newton import Problem, find_equilibrium
+
+
+@dataclass(frozen=True)
+class Checks:
+    """What was checked of the shells that converged.
+
+    Parameters
+    ----------
+    bending, reactions : by end condition.
+    deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
+    """
+
+    bending: dict[Ends, Bending]
+    reactions: dict[Ends, Reactions]
+    deployment: Deployment | None
+    on_the_way: tuple[Bending, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return () if self.deployment is None else self.deployment.warnings
+
+
+def check(
+    popped: Mapping[Ends, Popped], boundary: Boundary, rod: Rod, *, stages: int = 8, progress: Progress = silent
+) -> Checks:
+    """Check every shell that converged.
+
+    boundary : where its ends are held, and in which direction.
+    stages : of the deployment, the way up from flat of the pinned shell; 0: none.
+    """
+    done = {ends: shell for ends, shell in popped.items() if shell.report.converged}
+    bent = {
+        ends: bending(
+            shell.footprint.mesh, shell.positions, rod, clamps=boundary.tangents if ends == "clamped" else None
+        )
+        for ends, shell in done.items()
+    }
+    held = {ends: reactions_of(shell) for ends, shell in done.items()}
+    if "pinned" not in done or not stages:
+        return Checks(bent, held, None, ())
+    last = done["pinned"]
+    deployment = deploy(
+        last.shell, last.state, last.forces, stages=stages,
+        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+    )  # fmt: skip
+    on_the_way = tuple(bending(last.footprint.mesh, positions, rod) for positions in deployment.positions)
+    return Checks(bent, held, deployment, on_the_way)
+
+
+def reactions_of(popped: Popped) -> Reactions:
+    """Reactions of a popped-up shell.
+
+    The pop-up stops at its step tolerance, and forces are far more sensitive than shapes: one more Newton step is
+    taken first.
+    """
+    shell = popped.shell
+    length = 0.5 * float(np.ptp(popped.positions, axis=0).max())
+    problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), length, places=shell.places)
+    return reactions(shell, find_equilibrium(problem, popped.state, popped.forces))

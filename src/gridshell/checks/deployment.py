@@ -1,0 +1,151 @@
+"""Deployment: the equilibria through which a pinned shell comes from the flat grid to its final shape.
+
+The path is followed backwards, from the popped-up shell, whose ends go on straight lines to where they lie in the
+flat grid. So it ends in this very shell, needs no guess of the side to which the flat grid buckles, and every stage
+of it is an equilibrium of the elastic grid: nothing is interpolated between shapes. Where the path folds, the shell
+snaps, and on the building site it would have to be pushed: such stages are found and named.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.checks.reactions import Reactions, reactions
+from gridshell.geometry.vectors import cross
+from gridshell.model import Shell
+from gridshell.solve.constraint import Supports
+from gridshell.solve.mixed_newton import Equilibrium, Problem
+from gridshell.solve.path import follow
+
+Floats = NDArray[np.float64]
+Told = Callable[[float], None]
+
+SUSPICIOUS = 0.02  # of the energy: more than a smooth path leaves unaccounted for between two stages
+SAME = 1e-3  # of the shell's size: shapes further apart are different ones
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """Stages of a deployment, in the order of the building site.
+
+    Parameters
+    ----------
+    share : (s,) of the way that the ends have gone, ascending; 0 is the flat grid.
+    positions : (s, n, 3) of the mesh's nodes [m].
+    snaps : pairs of neighbouring shares between which the path folds: going forward, the shell does not come
+        from the first shape to the second by itself.
+    lost_at : share below which no equilibrium was found, or None; only the flat grid then stands before it.
+    """
+
+    share: Floats
+    positions: Floats
+    snaps: tuple[tuple[float, float], ...] = ()
+    lost_at: float | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read."""
+        words = [
+            f"between {100 * a:.0f} % and {100 * b:.0f} % of the way from flat the shell snaps: there it must be pushed"
+            for a, b in self.snaps
+        ]
+        if self.lost_at is not None:
+            words.append(f"the way from flat could not be followed below {100 * self.lost_at:.0f} %: stages are missing")
+        return tuple(words)
+
+
+def deploy(
+    shell: Shell, state: Floats, forces: Floats, *, stages: int, told: Told = lambda share: None
+) -> Deployment:
+    """Follow a popped-up shell back to the flat grid.
+
+    Parameters
+    ----------
+    state, forces : (N, 3) an equilibrium with pinned ends [m], and the axial forces (e,) of its edges [N].
+    stages : number of equilibria above the flat grid. They crowd near it, where the rise goes with the root of the
+        way.
+
+    Returns
+    -------
+    The stages reached. One that was not reached is missing; it is never replaced by something else.
+    """
+    path = _Path(shell, state)
+    shares = (np.arange(stages, -1, -1) / stages) ** 2
+    told(1.0)
+    here = path.settle(state, forces)
+    found, snaps, lost = [here], list[tuple[float, float]](), None
+    for before, share in zip(shares[:-2].tolist(), shares[1:-1].tolist(), strict=True):
+        told(share)
+        there = path.go(here, before, share)
+        if not there.report.converged:
+            lost = before
+            break
+        if path.folds(there, share, here, before):
+            snaps.append((share, before))
+        found.append(there)
+        here = there
+    positions = np.array([*(shell.positions(one.state) for one in found), path.flat])[::-1]
+    return Deployment(np.append(shares[: len(found)], 0.0)[::-1], positions, tuple(reversed(snaps)), lost)
+
+
+class _Path:
+    """A pinned shell whose ends lie somewhere between the flat grid (share 0) and the final places (share 1)."""
+
+    def __init__(self, shell: Shell, last: Floats) -> None:
+        self.shell = shell
+        positions, ends = shell.positions(last), shell.mesh.ends.ravel()
+        self.flat = laid_out(shell.mesh.flat, ends, positions)
+        self._first = self.flat[ends] + shell.lift[shell.ends] * np.array([0.0, 0.0, 1.0])
+        self._last = last[shell.ends]
+        self._length = 0.5 * float(np.ptp(positions, axis=0).max())
+
+    def settle(self, state: Floats, forces: Floats) -> Equilibrium:
+        """The equilibrium at share 1, next to `state`."""
+        return follow(lambda _: self._problem(1.0), state, forces, first_step=1.0)
+
+    def go(self, here: Equilibrium, start: float, stop: float) -> Equilibrium:
+        """From one share to another."""
+        return follow(
+            lambda t: self._problem((1 - t) * start + t * stop), here.state, here.forces, first_step=1.0
+        )
+
+    def folds(self, low: Equilibrium, share: float, high: Equilibrium, before: float) -> bool:
+        """Whether the way from `low` up to `high` leads elsewhere.
+
+        Tried only where the supports' work does not account for the change of energy: between shapes on one smooth
+        path it does, up to the error of the trapezoidal rule.
+        """
+        (one, r1), (two, r2) = self._energy(low), self._energy(high)
+        work = 0.5 * float(np.sum((r1.forces + r2.forces) * (r2.points - r1.points)))
+        if abs(two - one - work) <= SUSPICIOUS * max(one, two):
+            return False
+        again = self.go(low, share, before)
+        apart = np.linalg.norm(self.shell.positions(again.state - high.state), axis=1).max()
+        return not again.report.converged or bool(apart > SAME * self._length)
+
+    def _problem(self, share: float) -> Problem:
+        supports = Supports(self.shell.held_ends(), self.shell.ends, (1 - share) * self._first + share * self._last)
+        return Problem(self.shell.elements, self.shell.stretch, supports, self._length, places=self.shell.places)
+
+    def _energy(self, at: Equilibrium) -> tuple[float, Reactions]:
+        unused = np.zeros_like(at.state)
+        energy = sum(one.evaluate(at.state, unused) for one in (*self.shell.elements, self.shell.stretch))
+        return energy, reactions(self.shell, at)
+
+
+def laid_out(flat: Floats, ends: NDArray[np.intp], popped: Floats) -> Floats:
+    """The flat grid (n, 3) turned and moved in its plane to lie under the popped-up shell, at its lowest end [m].
+
+    The rods' ends then have the shortest ways to go, in the least-squares sense (Procrustes in the plane).
+    """
+    here, there = flat[ends], popped[ends]
+    a, b = here - here.mean(axis=0), there - there.mean(axis=0)
+    a[:, 2] = b[:, 2] = 0.0
+    angle = np.arctan2(cross(a, b)[:, 2].sum(), np.sum(a * b))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    result = np.empty_like(flat)
+    result[:, :2] = (flat - here.mean(axis=0))[:, :2] @ turn + there.mean(axis=0)[:2]
+    result[:, 2] = there[:, 2].min()
+    return result

@@ -1,0 +1,146 @@
+"""Pop-ups with every kind of joint, and what their joints carry, by free bodies."""
+
+from functools import cache
+from math import inf
+
+import numpy as np
+import pytest
+from numpy.linalg import norm
+
+import gridshell as gs
+from gridshell.checks.joint_loads import joint_loads
+from gridshell.checks.reactions import reactions
+from gridshell.joints.crossings import Places
+from gridshell.solve.constraint import Supports
+from gridshell.solve.mixed_newton import Problem, find_equilibrium
+
+ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+SPACING = 0.05
+SPAN = ROD.bend_stiffness / SPACING  # N m/rad
+THIN = gs.Rod(section=gs.Circle(radius=4e-4), material=gs.Material(youngs_modulus=1e6, density=1e3))
+JOINTS = {
+    "ball": gs.Ball(),
+    "pin": gs.Pin(),
+    "spring": gs.Spring(0.1 * SPAN, 3 * SPAN, SPAN),
+    "rigid": gs.Rigid(),
+    "two linkers": gs.Linker(rod=THIN),
+    "four linkers": gs.Linker(rod=THIN, corners=4),
+    "eccentric pin": gs.Pin(eccentricity=2e-4),
+    "eccentric spring": gs.Spring(0.0, SPAN, SPAN, eccentricity=2e-4),
+}
+every_joint = pytest.mark.parametrize("name", JOINTS)
+
+
+@cache
+def trimmed():
+    """An ellipsoid turned under the grid: no symmetry."""
+    layout = gs.GridLayout.orthogonal(rods="auto", spacing=SPACING, length="auto", edge=0.0126, rotate=0.3)
+    return gs.trim(gs.drape(layout, ROD, gs.Ellipsoid(a=0.2, b=0.16, c=0.13)))
+
+
+@cache
+def popped(name, ends="clamped", start="draped"):
+    cut = trimmed()
+    return gs.pop_up(gs.map_back(cut), cut.boundary, ROD, ends=ends, start=start, joint=JOINTS[name])
+
+
+def settled(shell, state, forces):
+    """One Newton step further, for forces to round-off."""
+    supports = Supports(shell.held_ends())
+    return find_equilibrium(Problem(shell.elements, shell.stretch, supports, 0.2, places=shell.places), state, forces)
+
+
+@every_joint
+def test_every_joint_pops_up_to_a_stable_shell(name):
+    report = popped(name).report
+    assert report.converged
+    assert report.stable
+
+
+@every_joint
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+def test_each_rod_is_in_balance_under_its_supports_and_its_joints(name, ends):
+    """Forces and moments on every rod as a free body: reactions and joint loads are found in different ways."""
+    shell = popped(name, ends).shell
+    found = settled(shell, popped(name, ends).state, popped(name, ends).forces)
+    shell = shell.with_elements(found.elements)
+    loads, held = joint_loads(shell, found.state), reactions(shell, found)
+    crossings, positions = shell.mesh.grid.crossings, found.state[shell.node_blocks]
+    places = Places(shell.mesh, shell.node_blocks, shell.first_angle).of_crossings
+    for rod in range(len(shell.mesh.grid.rods)):
+        force, moment = np.zeros(3), np.zeros(3)
+        for end in (2 * rod, 2 * rod + 1):
+            force += held.forces[end]
+            moment += held.moments[end] + np.cross(held.points[end], held.forces[end])
+        for joint, side in np.argwhere(crossings.rods == rod):
+            force += loads.forces[joint, side]
+            # the moment is about the second rod's node, and opposite on the first
+            on_second = loads.moments[joint] + np.cross(positions[places[joint, 1]], loads.forces[joint, 1])
+            moment += on_second if side else -on_second
+        largest = norm(loads.forces, axis=2).max()
+        assert norm(force) < 1e-8 * largest
+        assert norm(moment) < 1e-8 * largest * 0.2
+
+
+def test_a_spring_carries_its_stiffness_times_its_angle():
+    """About the normal; half an edge of each rod gives way in series: 1/k + 2 l/(4 EI)."""
+    shell = popped("spring").shell
+    found = settled(shell, popped("spring").state, popped("spring").forces)
+    loads = joint_loads(shell.with_elements(found.elements), found.state)
+    turned = loads.angles - loads.flat_angles
+    assert np.abs(turned).max() > 0.5
+    series = 1 / (1 / (0.1 * SPAN) + 2 * 0.0125 / (4 * ROD.bend_stiffness))
+    wide = np.abs(turned) > 0.1
+    # 3 % measured: the angle is that of chords over two edges of 12.5 mm, and edges in tails are shorter
+    assert -loads.shear_moments[wide] / turned[wide] == pytest.approx(series, rel=0.05)
+
+
+def test_a_pin_carries_no_moment_about_its_normal_and_a_ball_none_at_all():
+    for name in ("pin", "ball"):
+        shell = popped(name, "pinned").shell
+        found = settled(shell, popped(name, "pinned").state, popped(name, "pinned").forces)
+        loads = joint_loads(shell.with_elements(found.elements), found.state)
+        if name == "ball":
+            assert not loads.moments.any()
+        else:
+            assert loads.out_of_plane_moments.max() > 1e-3 * SPAN
+            # the normals of the tangents and of the material frames differ by the bend of half an edge
+            assert np.abs(loads.shear_moments).max() < 0.02 * loads.out_of_plane_moments.max()
+
+
+def test_pins_from_flat_reach_the_state_that_the_drape_releases_to():
+    flat, draped = popped("pin", "clamped", "flat"), popped("pin")
+    assert flat.report.stable
+    assert norm(flat.positions - draped.positions, axis=1).max() < 1e-6 * 0.2
+
+
+def test_soft_joints_pop_up_like_balls_and_stiff_ones_like_welds():
+    soft = gs.Spring(1e-6 * SPAN, 1e-6 * SPAN, 1e-6 * SPAN)
+    cut = trimmed()
+    for joint, like in ((soft, "ball"), (gs.Spring(1e4 * SPAN, inf, inf), "rigid")):
+        other = gs.pop_up(gs.map_back(cut), cut.boundary, ROD, joint=joint)
+        assert norm(other.positions - popped(like).positions, axis=1).max() < 2e-4 * 0.2
+    assert norm(popped("ball").positions - popped("rigid").positions, axis=1).max() > 0.01 * 0.2
+
+
+def test_joints_may_differ_from_place_to_place():
+    cut = trimmed()
+    count = len(cut.mesh.grid.crossings)
+    mixed = [gs.Rigid() if k % 2 else gs.Ball() for k in range(count)]
+    between = gs.pop_up(gs.map_back(cut), cut.boundary, ROD, joint=mixed)
+    assert between.report.stable
+    apart = [norm(between.positions - popped(name).positions) for name in ("ball", "rigid")]
+    assert min(apart) > 0.1 * norm(popped("ball").positions - popped("rigid").positions)
+    with pytest.raises(gs.InputError, match=f"{count} crossings: give one for all, or as many, not 3"):
+        gs.pop_up(gs.map_back(cut), cut.boundary, ROD, joint=mixed[:3])
+
+
+def test_a_gravity_drape_with_pins_ends_where_one_with_balls_does():
+    """Pins cost nothing (numerics.md, section 2): they scissor freely, and the rods hardly twist."""
+    layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=SPACING, length=0.9, edge=0.0126)
+    lengths = []
+    for joint in (gs.Ball(), gs.Pin()):
+        fallen = gs.drape(layout, ROD, gs.Hemisphere(radius=0.2), method="gravity", joint=joint)
+        assert fallen.converged
+        lengths.append([rod.length for rod in gs.trim(fallen).mesh.grid.rods])
+    assert np.abs(np.subtract(*lengths)).max() < 2e-3 * 0.2
