@@ -1,31 +1,53 @@
-"""The banded LDL^T against dense and LAPACK solvers, on chains, rings and random narrow patterns."""
+"""The band against dense, sparse and LAPACK solvers: chains, rings, shuffled numbers, supports in any direction."""
 
 import numpy as np
 import pytest
 from scipy.linalg import solveh_banded
-from scipy.sparse import csc_matrix, triu
 
-from gridshell.solve.banded import WIDEST, Banded, narrow_or_sparse
-from gridshell.solve.linear import Qdldl, SingularError
+from gridshell.model import Freedom
+from gridshell.solve.banded import Banded
+from gridshell.solve.constraint import NO_CURVATURE
+from gridshell.solve.linear import SingularError
+from gridshell.solve.summed import WIDEST, SparseSum, narrow_or_sparse
 
-
-def narrow(rng, size, width, *, shuffled=False, ring=False, shift=0.0):
-    """A random symmetric matrix of the half bandwidth `width`, dense."""
-    matrix = np.zeros((size, size))
-    for apart in range(width + 1):
-        i = np.arange(size if ring else size - apart)
-        values = rng.normal(size=len(i))
-        matrix[i, (i + apart) % size] = matrix[(i + apart) % size, i] = values
-    matrix += shift * np.eye(size)
-    order = rng.permutation(size) if shuffled else np.arange(size)
-    return matrix[np.ix_(order, order)]
+BLOCKS = 40
 
 
-def stored(matrix, **options):
-    """The solver of a dense matrix, and its values in the pattern."""
-    upper = csc_matrix(triu(csc_matrix(matrix)))
-    upper.sort_indices()
-    return Banded(upper.indptr.astype(np.int64), upper.indices.astype(np.int64), **options), upper.data
+def chain(width, *, ring=False, shuffled=False, seed=0):
+    """(m, width) stencils of neighbours in a row of blocks."""
+    starts = np.arange(BLOCKS if ring else BLOCKS - width + 1)
+    stencils = (starts[:, None] + np.arange(width)) % BLOCKS
+    if shuffled:
+        rng = np.random.default_rng(seed)
+        stencils = rng.permutation(BLOCKS)[rng.permutation(stencils)]
+    return stencils
+
+
+def freedom(rng):
+    """Free blocks, angles, fixed ones, and some that slide along a line or in a plane askew."""
+    free = Freedom.free(BLOCKS).with_directions(np.arange(1, BLOCKS, 2), (1.0, 0.0, 0.0))
+    free = free.with_directions(np.array([4, 5, 20]))
+    for block, count in ((6, 2), (7, 1), (30, 2), (11, 3)):
+        free = free.with_directions(np.array([block]), *np.linalg.qr(rng.normal(size=(3, 3)))[0][:count])
+    return free
+
+
+def random_hessians(rng, stencils):
+    values = rng.normal(size=(len(stencils), 3 * stencils.shape[1], 3 * stencils.shape[1]))
+    return values + values.transpose(0, 2, 1)
+
+
+def dense(hessians, stencils, diagonal, full, free):
+    """T' (sum of Hessians) T, and T (3N, size), term by term."""
+    total = np.diag(diagonal.ravel())
+    for i, block in enumerate(full):
+        total[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += block
+    for values, blocks in zip(hessians, stencils, strict=True):
+        rows = (3 * blocks[:, None] + np.arange(3)).ravel()
+        total[np.ix_(rows, rows)] += values
+    columns = [np.kron(np.eye(BLOCKS)[i], free.directions[i, c]) for i in range(BLOCKS) for c in range(free.count[i])]
+    t = np.array(columns).T
+    return t.T @ total @ t, t
 
 
 CASES = {
@@ -36,76 +58,105 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("kind", [Banded, SparseSum])
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("width", [1, 4, 10])
-def test_solution_and_inertia_are_those_of_numpy(case, width):
+@pytest.mark.parametrize("width", [2, 5])
+def test_solution_and_inertia_are_those_of_numpy(kind, case, width):
     rng = np.random.default_rng(width)
-    for shift in (-30.0, 1.0, 30.0):
-        matrix = narrow(rng, 60, width, shift=shift, **CASES[case])
-        solver, data = stored(matrix)
-        right = rng.normal(size=60)
-        assert solver.factor(data) == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
-        # 1e-8: without pivoting an indefinite matrix may lose digits; 2e-11 is the worst seen here
-        np.testing.assert_allclose(solver.solve(right), np.linalg.solve(matrix, right), rtol=1e-8, atol=1e-10)
+    stencils, free = chain(width, **CASES[case]), freedom(rng)
+    hessians, field = random_hessians(rng, stencils), rng.normal(size=(BLOCKS, 3))
+    full = random_hessians(rng, np.zeros((BLOCKS, 1)))
+    matrix = kind([stencils], free)
+    for shift in (-60.0, 2.0, 60.0):
+        diagonal = shift * rng.uniform(1, 2, size=(BLOCKS, 3))
+        matrix.clear()
+        matrix.add(0, hessians, stencils, free)
+        matrix.add_blocks(diagonal, full, free)
+        exact, t = dense(hessians, stencils, diagonal, full, free)
+        assert matrix.factor() == np.count_nonzero(np.linalg.eigvalsh(exact) < 0)
+        solution = t @ np.linalg.solve(exact, t.T @ field.ravel())
+        # without pivoting an indefinite matrix loses digits: 1e-9 is the worst seen
+        np.testing.assert_allclose(matrix.solve(field, free).ravel(), solution, atol=1e-7 * np.abs(solution).max())
 
 
-def test_reordering_narrows_a_shuffled_band_to_about_its_width():
-    rng = np.random.default_rng(0)
-    solver, _ = stored(narrow(rng, 300, 4, shuffled=True))
-    assert solver.half_bandwidth <= 8
-    ring, _ = stored(narrow(rng, 300, 4, shuffled=True, ring=True))
-    assert ring.half_bandwidth <= 16  # both arms of a ring side by side
+def test_turning_directions_need_no_new_matrix():
+    """As on a surface: the counts stay, the directions turn."""
+    rng = np.random.default_rng(3)
+    stencils, hessians = chain(3), None
+    hessians = random_hessians(rng, stencils)
+    field, inertia = rng.normal(size=(BLOCKS, 3)), np.full((BLOCKS, 3), 50.0)
+    frees = [freedom(np.random.default_rng(seed)) for seed in (1, 2)]
+    kept = Banded([stencils], frees[0])
+    for free in frees:
+        kept.clear()
+        kept.add(0, hessians, stencils, free)
+        kept.add_blocks(inertia, NO_CURVATURE, free)
+        kept.factor()
+        exact, t = dense(hessians, stencils, inertia, [], free)
+        np.testing.assert_allclose(
+            kept.solve(field, free).ravel(), t @ np.linalg.solve(exact, t.T @ field.ravel()), rtol=1e-10, atol=1e-12
+        )
+
+
+def test_reordering_narrows_a_shuffled_chain_to_its_width():
+    free = Freedom.free(BLOCKS)
+    for seed in range(5):
+        for width in (2, 3, 5):
+            alone = Banded([chain(width, shuffled=True, seed=seed)], free)
+            assert alone.half_bandwidth == 3 * width - 1
+            ring = Banded([chain(width, ring=True, shuffled=True, seed=seed)], free)
+            assert ring.half_bandwidth <= 6 * width - 1  # both arms of a ring side by side
+
+
+def test_rod_numbered_nodes_first_has_its_band_of_ten():
+    """x_0, theta_0, x_1, ... whatever the numbers: 4 unknowns a node, and 11 in an element."""
+    n = 30
+    nodes, angles = np.arange(n), n + np.arange(n - 1)
+    stencils = np.column_stack([nodes[:-2], angles[:-1], nodes[1:-1], angles[1:], nodes[2:]])
+    free = Freedom.free(2 * n - 1).with_directions(angles, (1.0, 0.0, 0.0))
+    assert Banded([stencils, np.column_stack([nodes[:-1], nodes[1:]])], free).half_bandwidth == 10
 
 
 def test_given_order_is_used():
-    rng = np.random.default_rng(0)
-    matrix = narrow(rng, 50, 3, shift=20.0)
-    order = np.arange(50)[::-1]
-    solver, data = stored(matrix, order=order)
-    solver.factor(data)
-    right = rng.normal(size=50)
-    assert solver.half_bandwidth == 3
-    np.testing.assert_allclose(solver.solve(right), np.linalg.solve(matrix, right), rtol=1e-12)
+    stencils, free = chain(2), Freedom.free(BLOCKS)
+    assert Banded([stencils], free, order=np.arange(BLOCKS)[::-1]).half_bandwidth == 5
+    assert Banded([stencils], free, order=np.roll(np.arange(BLOCKS), 1)).half_bandwidth == 3 * BLOCKS - 1
 
 
 def test_positive_band_is_solved_as_by_lapack():
     rng = np.random.default_rng(1)
-    matrix = narrow(rng, 2000, 10, shift=40.0)
-    solver, data = stored(matrix, refined=False)
-    right = rng.normal(size=2000)
-    band = np.array([np.append(np.diagonal(matrix, k), np.zeros(k)) for k in range(11)])
-    assert solver.factor(data) == 0
-    np.testing.assert_allclose(solver.solve(right), solveh_banded(band, right, lower=True), rtol=1e-12, atol=1e-14)
-
-
-def test_refinement_takes_digits_back():
-    """A first pivot of 1e-11 costs the others 11 digits; one refinement gives back as many as were left."""
-    rng = np.random.default_rng(2)
-    matrix = narrow(rng, 200, 4, shift=30.0)
-    matrix[0, 0] = 1e-11
-    exact = rng.normal(size=200)
-    errors = []
-    for refined in (False, True):
-        solver, data = stored(matrix, order=np.arange(200), refined=refined)
-        solver.factor(data)
-        errors.append(np.abs(solver.solve(matrix @ exact) - exact).max())
-    assert errors[0] > 1e-8
-    assert errors[1] < 1e-4 * errors[0]
+    stencils, free = chain(4), Freedom.free(BLOCKS)
+    matrix, field = Banded([stencils], free, order=np.arange(BLOCKS)), rng.normal(size=(BLOCKS, 3))
+    matrix.add(0, random_hessians(rng, stencils), stencils, free)
+    matrix.add_blocks(np.full((BLOCKS, 3), 100.0), NO_CURVATURE, free)
+    band = matrix.values[: matrix.size, : matrix.half_bandwidth + 1].T.copy()
+    assert matrix.factor() == 0
+    exact = solveh_banded(band, field.ravel(), lower=True)
+    np.testing.assert_allclose(matrix.solve(field, free).ravel(), exact, rtol=1e-12, atol=1e-14)
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
 def test_pivot_that_vanishes_or_is_not_finite_is_refused(value):
-    matrix = np.diag([1.0, 2.0, 3.0])
-    solver, data = stored(matrix)
-    data[1] = value
-    with pytest.raises(SingularError, match="pivot 1 "):
-        solver.factor(data)
+    free = Freedom.free(3).with_directions(np.array([0]))
+    matrix = Banded([np.array([[0], [1], [2]])], free, order=np.arange(3))
+    diagonal = np.ones((3, 3))
+    diagonal[2, 1] = value
+    matrix.add_blocks(diagonal, NO_CURVATURE, free)
+    with pytest.raises(SingularError, match="block 2 "):
+        matrix.factor()
+
+
+def test_single_unknowns_are_a_band_of_width_zero():
+    free = Freedom.free(3).with_directions(np.arange(3), (0.0, 1.0, 0.0))
+    matrix = Banded([np.arange(3)[:, None]], free)
+    matrix.add_blocks(np.tile([1.0, 4.0, 9.0], (3, 1)), NO_CURVATURE, free)
+    assert matrix.half_bandwidth == 0
+    assert matrix.factor() == 0
+    np.testing.assert_array_equal(matrix.solve(np.full((3, 3), 8.0), free), np.tile([0.0, 2.0, 0.0], (3, 1)))
 
 
 def test_wide_patterns_go_to_the_sparse_solver():
-    def choose(matrix):
-        upper = csc_matrix(triu(csc_matrix(matrix)))
-        return narrow_or_sparse(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
-
-    assert isinstance(choose(np.ones((WIDEST + 2, WIDEST + 2))), Qdldl)
-    assert isinstance(choose(np.ones((WIDEST + 1, WIDEST + 1))), Banded)
+    widest = (WIDEST + 1) // 3
+    for width, kind in ((widest, Banded), (widest + 1, SparseSum)):
+        chosen = narrow_or_sparse([np.arange(width)[None, :]], Freedom.free(width))
+        assert isinstance(chosen, kind)

@@ -53,6 +53,14 @@ class FlatRod:
         """Flat positions (..., 2) [m] at the material coordinates `s` [m]."""
         return np.asarray(self.origin) + np.asarray(s, dtype=float)[..., None] * np.asarray(self.direction)
 
+    def contains(self, piece: "FlatRod") -> bool:
+        """Whether another rod is this one or a piece of it."""
+        tiny = 1e-9 * self.length
+        same_line = (self.family, self.offset, self.origin, self.direction) == (
+            piece.family, piece.offset, piece.origin, piece.direction,
+        )  # fmt: skip
+        return same_line and self.start - tiny <= piece.start and piece.end <= self.end + tiny
+
     def cut(self, start: float, end: float) -> "FlatRod":
         return replace(self, start=start, end=end)
 

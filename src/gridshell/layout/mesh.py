@@ -147,7 +147,7 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
         for (s0, n0), (s1, _) in pairwise(fixed):
             pieces = edge_count(s1 - s0, edge)
             rod_nodes += [n0, *range(next_node, next_node + pieces - 1)]
-            stations += np.linspace(s0, s1, pieces, endpoint=False).tolist()
+            stations += [s0 + (s1 - s0) * k / pieces for k in range(pieces)]
             next_node += pieces - 1
         rod_nodes.append(fixed[-1][1])
         stations.append(fixed[-1][0])
@@ -160,16 +160,15 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
 
 
 def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
-    """The part of a mesh that belongs to `rods`: rods of its grid, cut at nodes; and its nodes (n,) in `mesh`.
+    """The part of a mesh that belongs to `rods`: pieces of its rods, cut at nodes; and its nodes (n,) in `mesh`.
 
     Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own, unless
     it would crowd the end, where it would make an edge far shorter and stiffer than the others.
     """
-    parent = {rod.name: index for index, rod in enumerate(mesh.grid.rods)}
     joint_of = {
         tuple(pair): int(node) for pair, node in zip(mesh.grid.crossings.rods.tolist(), mesh.joint_nodes, strict=True)
     }
-    index = [parent[rod.name] for rod in rods]
+    index = [next(k for k, whole in enumerate(mesh.grid.rods) if whole.contains(rod)) for rod in rods]
     grid = FlatGrid.of(rods, margin=margin)
     known = np.array([(min(index[a], index[b]), max(index[a], index[b])) in joint_of for a, b in grid.crossings.rods])
     grid = FlatGrid(grid.rods, grid.crossings.select(known.astype(bool)))
@@ -186,17 +185,18 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
         s = mesh.stations[mesh.rod_slice(place)]
         tiny = 1e-9 * rod.length
         inside = np.flatnonzero((s >= rod.start - tiny) & (s <= rod.end + tiny))
-        crowded = CROWDED * float(np.median(np.diff(s)))
-        for k in inside:
-            node = int(mesh.nodes_of(place)[k])
+        from_end = np.minimum(s[inside] - s[inside[0]], s[inside[-1]] - s[inside])
+        crowding = (from_end < CROWDED * float(np.median(np.diff(s)))) & (from_end > 0.0)
+        here = mesh.nodes_of(place)[inside].tolist()
+        for node, station, near in zip(here, s[inside].tolist(), crowding.tolist(), strict=True):
             if node in joined:
                 nodes.append(shared[node])
-            elif k not in inside[[0, -1]] and np.abs(s[k] - s[inside[[0, -1]]]).min() < crowded:
+            elif near:
                 continue
             else:
                 nodes.append(len(source))
                 source.append(node)
-            stations.append(float(s[k]))
+            stations.append(station)
     chosen = np.array(source, dtype=np.intp)
     part = GridMesh(
         grid, mesh.flat[chosen], np.array(nodes, dtype=np.intp), np.array(starts, dtype=np.intp),

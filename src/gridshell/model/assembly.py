@@ -50,8 +50,8 @@ class Assembly:
         slots = tuple(
             np.where(key >= 0, slot[np.minimum(np.searchsorted(flat, key), len(flat) - 1)], -1) for key in keys
         )
-        block, k = np.repeat(np.arange(n), count), np.concatenate([np.arange(c) for c in count] or [np.empty(0)])
-        heights = above[block] + k.astype(np.intp) + 1
+        block = np.repeat(np.arange(n), count)
+        heights = above[block] + np.arange(len(block)) - freedom.first[block] + 1
         indptr = np.concatenate([[0], np.cumsum(heights)])
         indices = _row_indices(column, row, start, freedom.first, count, above, begin, int(indptr[-1]))
         return Assembly(indptr, indices, count, above, slots)

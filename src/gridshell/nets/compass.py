@@ -7,10 +7,11 @@ second order in the step, with an error expansion in even powers when every inte
 
 from dataclasses import dataclass
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.geometry.vectors import cross, dot
+from gridshell.geometry.vectors import cross, dot, unit
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
@@ -96,83 +97,124 @@ def geodesics(target: Target, start: Floats, direction: Floats, steps: list[Floa
         going = np.flatnonzero((chords[step] > 0) & np.isfinite(point[:, 0]))
         if len(going) == 0:
             break
-        normal = target.on_surface(point[going]).normal
-        flat = tangent[going] - dot(tangent[going], normal)[:, None] * normal
-        flat /= np.linalg.norm(flat, axis=1)[:, None]
-        h = chords[step, going]
-        turn = np.zeros(len(going))  # angle of the chord out of the tangent plane
+        here, h = point[going], chords[step, going]
+        normal = unit(target.implicit(here).gradient)
+        flat = unit(tangent[going] - dot(tangent[going], normal)[:, None] * normal)
+        turn, change = np.zeros(len(going)), np.full(len(going), np.inf)  # angle of the chord out of the tangent plane
+        chord, swing = flat.copy(), normal.copy()
         for _ in range(NEWTON_STEPS):
-            unit = np.cos(turn)[:, None] * flat + np.sin(turn)[:, None] * normal
-            swing = -np.sin(turn)[:, None] * flat + np.cos(turn)[:, None] * normal
-            value, gradient, _ = target.implicit(point[going] + h[:, None] * unit)
-            change = value / (h * dot(gradient, swing))
-            turn = turn - change
-            if np.all(np.abs(change) < TOLERANCE):
+            value, gradient, _ = target.implicit(here + h[:, None] * chord)
+            if not _turned(flat, normal, value, gradient, h, turn, change, chord, swing):
                 break
-        unit = np.cos(turn)[:, None] * flat + np.sin(turn)[:, None] * normal
         lost = ~(np.abs(turn) < 1.2) | ~(np.abs(change) < 1e-9)
-        point[going] = point[going] + h[:, None] * unit
+        point[going] = here + h[:, None] * chord
         point[going[lost]] = np.nan
-        tangent[going] = unit
+        tangent[going] = chord
         path[step, going] = point[going]
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
+@nb.njit(cache=True, error_model="numpy")
+def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # type: ignore[no-untyped-def]
+    """One Newton step of all chords, in place; `swing` is the derivative of `chord` by `turn`. Whether to go on."""
+    going = False
+    for m in range(len(turn)):
+        slope = 0.0
+        for k in range(3):
+            slope += gradient[m, k] * swing[m, k]
+        change[m] = value[m] / (h[m] * slope)
+        turn[m] -= change[m]
+        cos, sin = np.cos(turn[m]), np.sin(turn[m])
+        for k in range(3):
+            chord[m, k] = cos * flat[m, k] + sin * normal[m, k]
+            swing[m, k] = cos * normal[m, k] - sin * flat[m, k]
+        if not abs(change[m]) < TOLERANCE:
+            going = True
+    return going
+
+
 def _fill_quadrants(target: Target, net: Net) -> None:
     """All four quadrants together, one anti-diagonal at a time: its nodes depend only on earlier ones."""
-    nu, nv = len(net.u), len(net.v)
     i0, j0 = net.origin
-    for diagonal in range(2, nu + nv):
-        i_parts, j_parts = [], []
-        for i_side, j_side in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-            i_reach = nu - 1 - i0 if i_side > 0 else i0
-            j_reach = nv - 1 - j0 if j_side > 0 else j0
-            a = np.arange(max(1, diagonal - j_reach), min(i_reach, diagonal - 1) + 1)
-            i_parts.append(i0 + i_side * a)
-            j_parts.append(j0 + j_side * (diagonal - a))
-        i, j = np.concatenate(i_parts), np.concatenate(j_parts)
-        if len(i) == 0:
-            break
-        i_back, j_back = i - np.sign(i - i0), j - np.sign(j - j0)
-        earlier = net.points[i, j_back, 0] + net.points[i_back, j, 0] + net.points[i_back, j_back, 0]
-        ready = np.flatnonzero(np.isfinite(earlier))
-        if len(ready) == 0:
-            continue
-        i, j, i_back, j_back = i[ready], j[ready], i_back[ready], j_back[ready]
-        net.points[i, j] = _compass(
-            target,
-            a=net.points[i, j_back],
-            b=net.points[i_back, j],
-            d=net.points[i_back, j_back],
-            from_a=np.abs(net.v[j] - net.v[j_back]),
-            from_b=np.abs(net.u[i] - net.u[i_back]),
-            side=np.sign(i - i0) * np.sign(j - j0),
-        )
+    for diagonal in range(2, len(net.u) + len(net.v)):
+        i, j, a, b, d, from_a, from_b, side = _next_nodes(net.points, net.u, net.v, i0, j0, diagonal)
+        if len(i):
+            net.points[i, j] = _compass(target, a, b, d, from_a, from_b, side)
 
 
-def _compass(
-    target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: NDArray[np.intp]
-) -> Floats:
+@nb.njit(cache=True)
+def _next_nodes(points, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
+    """Indices of the nodes of an anti-diagonal whose neighbours are known: A towards the u axis, B towards the v axis,
+    D across; the two chords, and the side of the net's quadrant."""
+    nu, nv = len(u), len(v)
+    most = 4 * diagonal
+    i, j, side = np.empty(most, dtype=np.intp), np.empty(most, dtype=np.intp), np.empty(most)
+    a, b, d = np.empty((most, 3)), np.empty((most, 3)), np.empty((most, 3))
+    from_a, from_b = np.empty(most), np.empty(most)
+    count = 0
+    for quadrant in range(4):
+        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
+        for along in range(1, diagonal):
+            p, q = i0 + i_side * along, j0 + j_side * (diagonal - along)
+            if not (0 <= p < nu and 0 <= q < nv):
+                continue
+            p_back, q_back = p - i_side, q - j_side
+            if not np.isfinite(points[p, q_back, 0] + points[p_back, q, 0] + points[p_back, q_back, 0]):
+                continue
+            i[count], j[count], side[count] = p, q, i_side * j_side
+            a[count], b[count], d[count] = points[p, q_back], points[p_back, q], points[p_back, q_back]
+            from_a[count], from_b[count] = abs(v[q] - v[q_back]), abs(u[p] - u[p_back])
+            count += 1
+    return (
+        i[:count], j[:count], a[:count], b[:count], d[:count], from_a[:count], from_b[:count], side[:count]
+    )  # fmt: skip
+
+
+def _compass(target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: Floats) -> Floats:
     """Points P (n, 3) of the surface with |P - A| = from_a and |P - B| = from_b, across from D.
 
     NaN where there is none, or where the net folds: (P - B) x (P - A) no longer points along the normal.
     """
     p = a + b - d
+    change = np.empty(len(p))
     for _ in range(NEWTON_STEPS):
         value, gradient, _ = target.implicit(p)
-        pa, pb = p - a, p - b
-        ra = 0.5 * (dot(pa, pa) - from_a**2)
-        rb = 0.5 * (dot(pb, pb) - from_b**2)
-        ab = cross(pa, pb)
-        volume = dot(ab, gradient)
-        step = ra[:, None] * cross(pb, gradient) + rb[:, None] * cross(gradient, pa) + value[:, None] * ab
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            step /= volume[:, None]
-        p = p - step
-        size = np.abs(step).max(axis=1) / np.minimum(from_a, from_b)
-        if np.all((size < TOLERANCE * 1e3) | ~(size < 1.0)):
+        if not _towards(p, a, b, from_a, from_b, value, gradient, change):
             break
     sine = dot(cross(p - b, p - a), gradient) * side
     sine /= np.linalg.norm(gradient, axis=1) * from_a * from_b
-    p[~(size < 1e-8) | ~(sine > SMALLEST_SINE)] = np.nan
+    p[~(change < 1e-8) | ~(sine > SMALLEST_SINE)] = np.nan
     return p
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _towards(p, a, b, from_a, from_b, value, gradient, change):  # type: ignore[no-untyped-def]
+    """One Newton step of all points p (n, 3), in place; `change` (n,) its size over the chords. Whether to go on.
+
+    The three equations |p - a|^2 = from_a^2, |p - b|^2 = from_b^2 and f(p) = 0 have the gradients pa, pb and g, whose
+    inverse is made of their cross products. A point that runs away is not waited for.
+    """
+    going = False
+    x, y, g, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for m in range(len(p)):
+        ra, rb = -from_a[m] * from_a[m], -from_b[m] * from_b[m]
+        for k in range(3):
+            x[k], y[k], g[k] = p[m, k] - a[m, k], p[m, k] - b[m, k], gradient[m, k]
+            ra += x[k] * x[k]
+            rb += y[k] * y[k]
+        volume = 0.0
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            normal = x[i] * y[j] - x[j] * y[i]
+            volume += normal * g[k]
+            step[k] = (
+                0.5 * ra * (y[i] * g[j] - y[j] * g[i]) + 0.5 * rb * (g[i] * x[j] - g[j] * x[i]) + value[m] * normal
+            )
+        largest = 0.0
+        for k in range(3):
+            p[m, k] -= step[k] / volume
+            largest = max(largest, abs(step[k] / volume)) if volume != 0.0 else np.nan
+        change[m] = largest / min(from_a[m], from_b[m])
+        if TOLERANCE * 1e3 <= change[m] < 1.0:
+            going = True
+    return going

@@ -101,17 +101,45 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController().select(user_api="blas")
 
 
-def _dissected(indptr: NDArray[np.int64], indices: NDArray[np.int64], places: Floats) -> NDArray[np.intp]:
+def _dissected(indptr: NDArray[np.int64], indices: NDArray[np.int64], places: Floats) -> Ints:
     """Unknowns that lie at one place stay together; the places are dissected."""
-    columns = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
     same = np.zeros(len(places), dtype=bool)  # as the unknown before: the directions of one node follow each other
     same[1:] = (places[1:] == places[:-1]).all(axis=1)
     block = np.cumsum(~same) - 1
-    key = np.unique(block[columns] * (block[-1] + 1) + block[indices])
-    pairs = np.column_stack([key // (block[-1] + 1), key % (block[-1] + 1)])
-    order = dissect(places[~same], pairs[pairs[:, 0] != pairs[:, 1]])
     begin = np.append(np.flatnonzero(~same), len(places))
-    return np.concatenate([np.arange(begin[b], begin[b + 1]) for b in order])
+    start, neighbours = _coupled(indptr, indices, block, begin)
+    order = dissect(places[~same], start, neighbours)
+    first = begin[order]
+    size = begin[order + 1] - first
+    return np.asarray(np.repeat(first - np.cumsum(size) + size, size) + np.arange(len(places)))
+
+
+@nb.njit(cache=True)
+def _coupled(indptr, indices, block, begin):  # type: ignore[no-untyped-def]
+    """The other blocks to which each block of unknowns is coupled, as start and neighbours."""
+    n = len(begin) - 1
+    mark, count = np.full(n, -1, dtype=np.int64), np.zeros(n + 1, dtype=np.int64)
+    start, neighbours, place = count, np.empty(0, dtype=np.int64), count
+    for sweep in range(2):  # count, then fill
+        mark[:] = -1
+        for b in range(n):
+            for j in range(begin[b], begin[b + 1]):
+                for e in range(indptr[j], indptr[j + 1]):
+                    a = block[indices[e]]
+                    if a != b and mark[a] != b:
+                        mark[a] = b
+                        if sweep == 0:
+                            count[a + 1] += 1
+                            count[b + 1] += 1
+                        else:
+                            neighbours[place[a]], neighbours[place[b]] = b, a
+                            place[a] += 1
+                            place[b] += 1
+        if sweep == 0:
+            start = np.cumsum(count)
+            place = start.copy()
+            neighbours = np.empty(start[n], dtype=np.int64)
+    return start, neighbours
 
 
 def _minimum_degree(indptr: NDArray[np.int64], indices: NDArray[np.int64]) -> NDArray[np.intp]:

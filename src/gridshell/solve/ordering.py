@@ -1,65 +1,119 @@
 """Elimination orders: nested dissection by place, which knows that a gridshell's mesh lies in a plane."""
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+Ints = NDArray[np.int64]
 
 LEAF = 6  # blocks that are not divided further
 UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
 
 
-def dissect(places: Floats, pairs: Ints) -> Ints:
+def dissect(places: Floats, start: Ints, neighbours: Ints) -> Ints:
     """Order blocks so that separators come last: first both parts of a cut, each dissected, then what joins them.
 
     Parameters
     ----------
     places : (n, d) where each block lies; any coordinates in which neighbours are near will do.
-    pairs : (m, 2) blocks that are coupled in the matrix.
+    start, neighbours : the blocks coupled to block i are neighbours[start[i] : start[i + 1]].
 
     Returns
     -------
     (n,) blocks in the order of their elimination.
     """
-    order = np.empty(len(places), dtype=np.intp)
-    local = np.empty(len(places), dtype=np.intp)
-    tasks = [(0, np.arange(len(places)), pairs)]  # where the blocks' positions begin in the order, blocks, pairs
-    while tasks:
-        begin, blocks, coupled = tasks.pop()
-        if len(blocks) <= LEAF:
-            order[begin : begin + len(blocks)] = blocks
+    return np.asarray(_dissect(np.ascontiguousarray(places, dtype=np.float64), start, neighbours))
+
+
+@nb.njit(cache=True)
+def _dissect(places, start, neighbours):  # type: ignore[no-untyped-def]
+    """Segments of `order` are divided in place until they are small; `segment` tells which one a block is in."""
+    n = len(places)
+    order, segment = np.arange(n), np.zeros(n, dtype=np.int64)
+    rank, crossing, part = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int8)
+    begins, ends = [0], [n]
+    newest = 0
+    while len(begins) > 0:
+        begin, end = begins.pop(), ends.pop()
+        if end - begin <= LEAF:
             continue
-        local[blocks] = np.arange(len(blocks))
-        ends = local[coupled]
-        left = _cut(places[blocks], ends)
-        across = left[ends[:, 0]] != left[ends[:, 1]]
-        touching = ends[across]
-        sides = [np.unique(touching[left[touching] == side]) for side in (True, False)]
-        joining = sides[0] if len(sides[0]) <= len(sides[1]) else sides[1]
-        part = np.where(left, 0, 1)
-        part[joining] = 2
-        kinds = part[ends]
-        for side in (0, 1):
-            chosen = blocks[part == side]
-            inner = coupled[(kinds[:, 0] == side) & (kinds[:, 1] == side)]
-            tasks.append((begin, chosen, inner))
-            begin += len(chosen)
-        order[begin : begin + len(joining)] = blocks[joining]
+        here = segment[order[begin]]
+        blocks = _by_place(places, order[begin:end].copy())
+        for k in range(len(blocks)):
+            rank[blocks[k]] = k
+        best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing)
+        _separate(blocks, segment, here, rank, best, start, neighbours, part)
+        newest += 2
+        at = begin
+        for side in range(3):
+            first = at
+            for k in range(len(blocks)):
+                if part[blocks[k]] == side:
+                    order[at] = blocks[k]
+                    at += 1
+            if side < 2 and at > first:
+                for k in range(first, at):
+                    segment[order[k]] = newest - side
+                begins.append(first)
+                ends.append(at)
+            elif side == 2:
+                for k in range(first, at):
+                    segment[order[k]] = -1
     return order
 
 
-def _cut(places: Floats, ends: Ints) -> NDArray[np.bool_]:
-    """(n,) which blocks lie before a straight cut across the longest extent that few pairs cross."""
-    axis = int(np.argmax(np.ptp(places, axis=0)))
-    x = places[:, axis]
-    by_place = np.argsort(x, kind="stable")
-    rank = np.empty(len(x), dtype=np.intp)
-    rank[by_place] = np.arange(len(x))
-    low, high = rank[ends].min(axis=1), rank[ends].max(axis=1)
-    crossing = np.cumsum(np.bincount(low, minlength=len(x)) - np.bincount(high, minlength=len(x)))
-    first = max(1, int(UNBALANCED * len(x)))
-    window = np.arange(first - 1, len(x) - first)  # a cut after this rank
-    balance = np.abs(2 * (window + 1) / len(x) - 1.0)
-    best = window[np.argmin(crossing[window] * (1.0 + balance))]
-    return np.asarray(rank <= best)
+@nb.njit(cache=True)
+def _by_place(places, blocks):  # type: ignore[no-untyped-def]
+    """The blocks along their longest extent."""
+    axis, longest = 0, -1.0
+    for d in range(places.shape[1]):
+        low, high = np.inf, -np.inf
+        for b in blocks:
+            low, high = min(low, places[b, d]), max(high, places[b, d])
+        if high - low > longest:
+            axis, longest = d, high - low
+    x = np.empty(len(blocks))
+    for k in range(len(blocks)):
+        x[k] = places[blocks[k], axis]
+    return blocks[np.argsort(x, kind="mergesort")]
+
+
+@nb.njit(cache=True)
+def _best_cut(blocks, segment, here, rank, start, neighbours, crossing):  # type: ignore[no-untyped-def]
+    """Rank of the last block before the straight cut that few couplings cross, near the middle."""
+    n = len(blocks)
+    crossing[: n + 1] = 0
+    for b in blocks:
+        for e in range(start[b], start[b + 1]):
+            other = neighbours[e]
+            if segment[other] == here and rank[other] > rank[b]:
+                crossing[rank[b]] += 1
+                crossing[rank[other]] -= 1
+    margin = max(1, int(UNBALANCED * n))
+    best, least, across = margin - 1, np.inf, 0
+    for k in range(n - margin):
+        across += crossing[k]
+        cost = across * (1.0 + abs(2.0 * (k + 1) / n - 1.0))
+        if k >= margin - 1 and cost < least:
+            best, least = k, cost
+    return best
+
+
+@nb.njit(cache=True)
+def _separate(blocks, segment, here, rank, best, start, neighbours, part):  # type: ignore[no-untyped-def]
+    """Parts 0 before and 1 after the cut, and 2, which joins them: those on one side that are coupled to the other."""
+    touching = np.zeros(2, dtype=np.int64)
+    for b in blocks:
+        side = 0 if rank[b] <= best else 1
+        part[b] = side
+        for e in range(start[b], start[b + 1]):
+            other = neighbours[e]
+            if segment[other] == here and (rank[other] <= best) != (side == 0):
+                part[b] = 3 + side
+                touching[side] += 1
+                break
+    joining = 0 if touching[0] <= touching[1] else 1
+    for b in blocks:
+        if part[b] >= 3:
+            part[b] = 2 if part[b] - 3 == joining else part[b] - 3

@@ -2,17 +2,19 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite, sqrt
 
 import numpy as np
 
 from gridshell.errors import InputError
 from gridshell.targets.domain import Disc, Domain, EllipseDomain, require_positive
-from gridshell.targets.target import Floats, Implicit, Target
+from gridshell.targets.standing import Standing
+from gridshell.targets.target import Floats, Implicit
 
 
 @dataclass(frozen=True)
-class _Quadric(Target):
+class _Quadric(Standing):
     """F = scale (sum_k w_k x_k^2 + slope z - 1), centred on the origin, cut at the base plane."""
 
     @property
@@ -35,12 +37,19 @@ class _Quadric(Target):
         return 0.0, 0.0
 
     def implicit(self, x: Floats) -> Implicit:
-        w = np.array(self.weights)
-        value = self.scale * (x * x @ w + self.slope * x[:, 2] - 1.0)
-        gradient = 2.0 * self.scale * w * x
-        gradient[:, 2] += self.scale * self.slope
-        hessian = np.broadcast_to(np.diag(2.0 * self.scale * w), (len(x), 3, 3))
+        weights, slope, second = self._form
+        value = x * x @ weights + slope * x[:, 2] - self.scale
+        gradient = 2.0 * weights * x
+        gradient[:, 2] += slope
+        hessian = np.empty((len(x), 3, 3))
+        hessian[:] = second
         return Implicit(value, gradient, hessian)
+
+    @cached_property
+    def _form(self) -> tuple[Floats, float, Floats]:
+        """Weights and slope times the scale, and the Hessian: the march asks for them thousands of times."""
+        weights = self.scale * np.array(self.weights)
+        return weights, self.scale * self.slope, np.diag(2.0 * weights)
 
     def height(self, xy: Floats) -> Floats:
         w = self.weights
