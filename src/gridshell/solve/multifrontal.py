@@ -389,7 +389,7 @@ def _numeric(  # type: ignore[no-untyped-def]
     """Factorise front by front; False where a pivot vanishes or is not finite."""
     stack = np.empty(max(1, stack_size))
     work = np.empty(largest * largest)
-    column = np.empty(largest)
+    columns = np.empty((4, largest))
     top = 0
     for s in range(len(first) - 1):
         size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
@@ -408,7 +408,7 @@ def _numeric(  # type: ignore[no-untyped-def]
                 i = relative[begin + a]
                 for b in range(a + 1):
                     front[i, relative[begin + b]] += update[a, b]
-        if not _eliminate(front, own, column, pivots[first[s] : first[s + 1]]):
+        if not _eliminate(front, own, columns, pivots[first[s] : first[s + 1]]):
             return False
         panels[panel_start[s] : panel_start[s + 1]] = front[:, :own].copy().ravel()
         m = size - own
@@ -421,26 +421,40 @@ def _numeric(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _eliminate(front, own, column, pivots):  # type: ignore[no-untyped-def]
-    """Eliminate the first `own` pivots of the lower triangle: L in the columns, the Schur complement after them."""
+def _eliminate(front, own, columns, pivots):  # type: ignore[no-untyped-def]
+    """Eliminate the first `own` pivots of the lower triangle: L in the columns, the Schur complement after them.
+
+    Four pivots at a time, so that each row behind them is read and written once for all four. Of a large front the
+    columns past the block follow by BLAS.
+    """
     size = front.shape[0]
     block = own if size < LARGE else BLOCK
     for begin in range(0, own, block):
         end = min(begin + block, own)
-        reach = size if block == own else end  # columns updated at once; the others follow by BLAS
-        for k in range(begin, end):
-            d = front[k, k]
-            if not np.isfinite(d) or d == 0.0:
-                return False
-            pivots[k] = d
-            for i in range(k + 1, size):
-                column[i] = front[i, k]
-            for i in range(k + 1, size):
-                factor = column[i] / d
-                front[i, k] = factor
+        reach = size if block == own else end  # columns updated at once
+        for k in range(begin, end, 4):
+            after = min(k + 4, end)
+            for p in range(k, after):
+                d = front[p, p]
+                if not np.isfinite(d) or d == 0.0:
+                    return False
+                pivots[p] = d
+                column = columns[p - k]
+                for i in range(p + 1, size):
+                    column[i] = front[i, p]
+                    front[i, p] /= d
+                for i in range(p + 1, size):
+                    for q in range(p + 1, min(i + 1, after)):
+                        front[i, q] -= front[i, p] * column[q]
+            for i in range(after, size):
                 last = min(i + 1, reach)
-                for j in range(k + 1, last):
-                    front[i, j] -= factor * column[j]
+                if after == k + 4:
+                    _subtract_four(front[i, after:last], columns[:, after:last], front[i, k:after])
+                else:
+                    for p in range(k, after):
+                        factor, column = front[i, p], columns[p - k]
+                        for j in range(after, last):
+                            front[i, j] -= factor * column[j]
         if reach < size and end < size:
             below = front[end:, begin:end].copy()
             scaled = below * pivots[begin:end]
@@ -448,6 +462,14 @@ def _eliminate(front, own, column, pivots):  # type: ignore[no-untyped-def]
                 b = min(a + 256, size - end)
                 front[end + a : end + b, end : end + b] -= np.dot(below[a:b], scaled[:b].T)
     return True
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _subtract_four(row, columns, factors):  # type: ignore[no-untyped-def]
+    f0, f1, f2, f3 = factors[0], factors[1], factors[2], factors[3]
+    c0, c1, c2, c3 = columns[0], columns[1], columns[2], columns[3]
+    for j in range(len(row)):
+        row[j] -= f0 * c0[j] + f1 * c1[j] + f2 * c2[j] + f3 * c3[j]
 
 
 @nb.njit(cache=True, error_model="numpy")
