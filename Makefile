@@ -1,5 +1,5 @@
 # The habits of the house. `make` alone shows them.
-.PHONY: help lint types test accept accept-rods pictures bench
+.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints pictures bench
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -18,9 +18,18 @@ test:      ## all tests
 accept:    ## print the acceptance table (and install into a new environment)
 	python -m tests.acceptance.accept
 
+accept-targets: ## print the table of targets of any kind (some minutes)
+	python -m tests.acceptance.targets
+
 accept-rods: ## print the table of the rod alone
 	python -m tests.acceptance.rods
 	python -m tests.acceptance.rods_dynamics
+
+accept-joints: ## print the table of joints and couplings
+	python -m tests.acceptance.joints
+
+accept-output: ## print the table of what people take away: drawings, checks, reports
+	python -m tests.acceptance.output
 
 pictures:  ## the README's pictures, made by the program
 	python docs/pictures.py

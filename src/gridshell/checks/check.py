@@ -7,13 +7,15 @@ import numpy as np
 
 from gridshell.checks.bending import Bending, bending
 from gridshell.checks.deployment import Deployment, deploy
+from gridshell.checks.joint_loads import JointLoads, joint_loads
 from gridshell.checks.reactions import Reactions, reactions
 from gridshell.formfinding import Boundary, Popped
 from gridshell.formfinding.popup import Ends
 from gridshell.formfinding.progress import Progress, silent
+from gridshell.model import Shell
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Problem, find_equilibrium
+from gridshell.solve.mixed_newton import Equilibrium, Problem, find_equilibrium
 
 
 @dataclass(frozen=True)
@@ -22,12 +24,13 @@ class Checks:
 
     Parameters
     ----------
-    bending, reactions : by end condition.
+    bending, reactions, joints : by end condition.
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
     """
 
     bending: dict[Ends, Bending]
     reactions: dict[Ends, Reactions]
+    joints: dict[Ends, JointLoads]
     deployment: Deployment | None
     on_the_way: tuple[Bending, ...]
 
@@ -51,25 +54,25 @@ def check(
         )
         for ends, shell in done.items()
     }
-    held = {ends: reactions_of(shell) for ends, shell in done.items()}
+    settled = {ends: settled_shell(shell) for ends, shell in done.items()}
+    held = {ends: reactions(*pair) for ends, pair in settled.items()}
+    carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     if "pinned" not in done or not stages:
-        return Checks(bent, held, None, ())
+        return Checks(bent, held, carried, None, ())
     last = done["pinned"]
     deployment = deploy(
         last.shell, last.state, last.forces, stages=stages,
         told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
     )  # fmt: skip
     on_the_way = tuple(bending(last.footprint.mesh, positions, rod) for positions in deployment.positions)
-    return Checks(bent, held, deployment, on_the_way)
+    return Checks(bent, held, carried, deployment, on_the_way)
 
 
-def reactions_of(popped: Popped) -> Reactions:
-    """Reactions of a popped-up shell.
-
-    The pop-up stops at its step tolerance, and forces are far more sensitive than shapes: one more Newton step is
-    taken first.
-    """
+def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:
+    """A popped-up shell one Newton step further: the pop-up stops at its step tolerance, and forces are far more
+    sensitive than shapes."""
     shell = popped.shell
     length = 0.5 * float(np.ptp(popped.positions, axis=0).max())
     problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), length, places=shell.places)
-    return reactions(shell, find_equilibrium(problem, popped.state, popped.forces))
+    found = find_equilibrium(problem, popped.state, popped.forces)
+    return shell.with_elements(found.elements), found

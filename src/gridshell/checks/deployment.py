@@ -52,13 +52,13 @@ class Deployment:
             for a, b in self.snaps
         ]
         if self.lost_at is not None:
-            words.append(f"the way from flat could not be followed below {100 * self.lost_at:.0f} %: stages are missing")
+            words.append(
+                f"the way from flat could not be followed below {100 * self.lost_at:.0f} %: stages are missing"
+            )
         return tuple(words)
 
 
-def deploy(
-    shell: Shell, state: Floats, forces: Floats, *, stages: int, told: Told = lambda share: None
-) -> Deployment:
+def deploy(shell: Shell, state: Floats, forces: Floats, *, stages: int, told: Told = lambda share: None) -> Deployment:
     """Follow a popped-up shell back to the flat grid.
 
     Parameters
@@ -107,9 +107,7 @@ class _Path:
 
     def go(self, here: Equilibrium, start: float, stop: float) -> Equilibrium:
         """From one share to another."""
-        return follow(
-            lambda t: self._problem((1 - t) * start + t * stop), here.state, here.forces, first_step=1.0
-        )
+        return follow(lambda t: self._problem((1 - t) * start + t * stop), here.state, here.forces, first_step=1.0)
 
     def folds(self, low: Equilibrium, share: float, high: Equilibrium, before: float) -> bool:
         """Whether the way from `low` up to `high` leads elsewhere.

@@ -35,6 +35,7 @@ def elastic_joints(
     crossings : (m,) which of the grid's; joints : what is there.
     of_rods : (rods, 3) EI1, EI2 and GJ of each rod [N m2].
     """
+    _refuse_mixtures(places.mesh.joint_nodes[crossings], joints)
     stiff = np.array([joint.shear + joint.out_of_plane + joint.twist > 0 for joint in joints], dtype=bool)
     crossings, joints = crossings[stiff], [joint for joint, kept in zip(joints, stiff, strict=True) if kept]
     if not joints:
@@ -84,7 +85,6 @@ def _between(
     _, node = np.unique(nodes, return_inverse=True)
     total = np.zeros((node.max() + 1, 3, 3))
     np.add.at(total, np.repeat(node, 2)[first], held.reshape(-1, 3, 3)[first])
-    _refuse_mixtures(node, joints)
     pair = held[:, 0] @ np.linalg.pinv(total, hermitian=True)[node] @ held[:, 1]
     pair = 0.5 * (pair + pair.transpose(0, 2, 1))
     return _by_strains(pair, directions)

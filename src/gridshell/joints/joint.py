@@ -32,6 +32,11 @@ class Joint(Protocol):
         """Whether it carries moments between the frames of its rods, so that their twist matters."""
         ...
 
+    @property
+    def holds_normals(self) -> bool:
+        """Whether it keeps its rods from spinning about themselves, as a spring in shear alone does not."""
+        ...
+
 
 @dataclass(frozen=True)
 class Ball:
@@ -43,7 +48,7 @@ class Ball:
     name = "ball"
     shear = out_of_plane = twist = eccentricity = 0.0
     rest_angle = None
-    turns_frames = False
+    turns_frames = holds_normals = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +59,7 @@ class Pin:
     name = "pin"
     shear, out_of_plane, twist = 0.0, inf, inf
     rest_angle = None
-    turns_frames = True
+    turns_frames = holds_normals = True
 
     def __post_init__(self) -> None:
         _check_eccentricity(self.eccentricity)
@@ -71,7 +76,7 @@ class Rigid:
     eccentricity: float = 0.0
     name = "rigid"
     shear = out_of_plane = twist = inf
-    turns_frames = True
+    turns_frames = holds_normals = True
 
     def __post_init__(self) -> None:
         _check_rest_angle(self.rest_angle)
@@ -87,7 +92,8 @@ class Spring:
     shear : about the normal [N m/rad]; `inf` is rigid.
     out_of_plane, twist : of a corner, about the axis in the plane across the corner's bisector, and about it
         [N m/rad]. Where rods cross, what is twist to one corner is out of plane to the next: the four corners give
-        the mean of both in every direction. They act apart only where two rods end in one corner.
+        the mean of both in every direction. They act apart only where two rods end in one corner. The bisector is
+        that of the directions of a path around the corner, in along one rod and out along the other.
     rest_angle : angle from the first rod's direction to the second's about the normal at rest [rad]; None: as in the
         flat grid.
     """
@@ -110,7 +116,11 @@ class Spring:
 
     @property
     def turns_frames(self) -> bool:
-        return self.shear + self.out_of_plane + self.twist > 0 or self.eccentricity != 0.0
+        return self.shear > 0 or self.holds_normals
+
+    @property
+    def holds_normals(self) -> bool:
+        return self.out_of_plane + self.twist > 0 or self.eccentricity != 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +141,7 @@ class Linker:
     corners: Literal[2, 4] = 2
     name = "linker"
     eccentricity = 0.0
-    turns_frames = True
+    turns_frames = holds_normals = True
 
     def __post_init__(self) -> None:
         if self.corners not in (2, 4):

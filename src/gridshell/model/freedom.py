@@ -17,6 +17,9 @@ class Freedom:
     Supports, prescribed motion and sliding on a surface are all the same: directions taken away. The reduced
     system in the free directions is symmetric (ERRATA to HQK Eq 11, whose row-filtered form is not).
 
+    A direction of zero length is blocked: it keeps its place among the unknowns, where a solver puts a one on the
+    diagonal, so that what touches and leaves at each step of a motion needs no new plan of the matrix.
+
     Parameters
     ----------
     directions : (n, 3, 3); `directions[i, k]` is the k-th free direction of block i, orthonormal.
@@ -53,6 +56,12 @@ class Freedom:
     def _slots(self) -> tuple[Ints, Ints]:
         block = np.repeat(np.arange(len(self.count)), self.count)
         return block, np.arange(self.size) - self.first[block]
+
+    @cached_property
+    def blocked(self) -> Ints:
+        """Reduced DOFs whose direction is zero."""
+        block, k = self._slots
+        return np.flatnonzero(~self.directions[block, k].any(axis=1))
 
     def expand(self, q: Floats) -> Floats:
         """Displacements (n, 3) of reduced DOFs (size,)."""

@@ -231,7 +231,7 @@ class _Builder:
         )
         bends = self._bends()
         linkers, linker_ties = self._linkers()
-        turned = [n for n, one in enumerate(self.joints) if one.turns_frames]
+        turned = [n for n, one in enumerate(self.joints) if one.holds_normals]
         steady = np.unique(mesh.grid.crossings.rods[turned]) if self.isotropic else np.arange(len(self.rods))
         loose = np.setdiff1d(np.arange(len(self.rods)), steady) if self.twist else np.empty(0, dtype=np.intp)
         spinning = self.first_angle + np.searchsorted(mesh.edge_rods, loose)
