@@ -1,5 +1,5 @@
 # The habits of the house. `make` alone shows them.
-.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints pictures bench
+.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints pictures bench bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -34,5 +34,9 @@ accept-output: ## print the table of what people take away: drawings, checks, re
 pictures:  ## the README's pictures, made by the program
 	python docs/pictures.py
 
-bench:     ## start-up of the whole process against the bare imports
+bench:     ## start-up of the whole process against the bare imports; time of a rod's step against its nodes
 	python benchmarks/startup.py
+	python benchmarks/rod_scaling.py
+
+bench-rods: ## a cantilever side by side with PyElastica (pip install -e ".[bench]"; ten minutes)
+	python benchmarks/pyelastica_cantilever.py

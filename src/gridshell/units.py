@@ -10,7 +10,19 @@ from typing import Literal
 
 from gridshell.errors import InputError
 
-Kind = Literal["length", "angle", "stress", "density", "acceleration", "rotational stiffness", "number"]
+Kind = Literal[
+    "length",
+    "angle",
+    "stress",
+    "density",
+    "acceleration",
+    "rotational stiffness",
+    "force",
+    "bending stiffness",
+    "mass per length",
+    "inertia per length",
+    "number",
+]
 
 
 @dataclass(frozen=True)
@@ -74,6 +86,14 @@ _KINDS: dict[Kind, _Units] = {
     "rotational stiffness": _Units(
         "a rotational stiffness", '"0.5 N m/rad"', _factors("1 Nm/rad Nm", "1000 kNm/rad kNm", "0.001 Nmm/rad Nmm")
     ),
+    "force": _Units("a force", '"5 kN"', _factors("1 N", "1000 kN", "1e6 MN", "4.4482216152605 lbf")),
+    "bending stiffness": _Units(
+        "a bending stiffness",
+        '"2.5 kN m2"',
+        _factors("1 Nm2", "1000 kNm2", "1e6 MNm2", "0.000001 Nmm2", "0.001 kNmm2", "1e-4 Ncm2", "0.1 kNcm2"),
+    ),
+    "mass per length": _Units("a mass per length", '"1.2 kg/m"', _factors("1 kg/m", "0.001 g/m", "1 g/mm")),
+    "inertia per length": _Units("an inertia per length", '"0.001 kg m"', _factors("1 kgm", "0.001 gm", "0.001 kgmm")),
     "number": _Units("a plain number", "0.5", {}),
 }
 

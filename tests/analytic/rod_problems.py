@@ -268,7 +268,9 @@ class Localised:
         (z - z0) / (1 - z0) = tanh^2(s/s*),   1/s* = M / (2 EI) sqrt((1 - z0) / (1 + z0)),
 
     s from the middle. Ends come nearer by the integral of 1 - z, 2 (1 - z0) s*, and turn by M L / GJ plus the
-    integral of psi' (1 - z). Bergou's figures: L 9.29, EI 1.345, GJ 0.789, 27 turns, ends nearer by 0.3.
+    integral of psi' (1 - z). Bergou's figures: L 9.29, EI 1.345, GJ 0.789, 27 turns, ends nearer by 0.3. (The paper's
+    f(phi) = (cos phi - cos phi0) / (1 - cos phi0) is (z - z0) / (1 - z0), and its bending modulus and its twist
+    modulus times the twist are EI and M.)
     """
 
     length, ei, gj, nearer, turn = 9.29, 1.345, 0.789, 0.3, 54 * pi

@@ -569,7 +569,11 @@ def test_a_surface_that_is_not_smooth_is_refused_with_place_and_remedy(formula):
 
 
 def test_the_domain_that_is_proposed_will_do():
-    HeightField(formula="sqrt(0.2^2 - x^2 - y^2)", domain=Disc(0.19))
+    formula = "sqrt(0.2^2 - x^2 - y^2)"
+    with pytest.raises(InputError, match=r"radius 0\.19 m"):
+        HeightField(formula=formula, domain=DISC)
+    ball = HeightField(formula=formula, domain=Disc(0.19))
+    assert ball.height(np.array([[0.12, 0.0], [0.0, 0.16]])) == pytest.approx([0.16, 0.12], abs=1e-15)
     with pytest.raises(InputError, match=r"size 0\.3\d m x 0\.2\d m"):
         HeightField(formula="sqrt(0.19^2 - x^2)", domain=Rectangle((0.4, 0.3)))
 
@@ -586,8 +590,21 @@ def test_the_domain_that_is_proposed_will_do():
         "(x + 0.2)^2.5",
     ],
 )
-def test_sharp_but_smooth_surfaces_are_accepted(smooth):
-    HeightField(formula=smooth, domain=DISC)
+def test_sharp_but_smooth_surfaces_are_taken_as_they_are(smooth):
+    target = HeightField(formula=smooth, domain=DISC)
+    xy = 0.2 * np.array([[0.0, 0.0], [0.5, -0.4], [-0.7, 0.3], [-0.999, 0.0]])
+    names = {
+        "x": xy[:, 0],
+        "y": xy[:, 1],
+        "exp": np.exp,
+        "sqrt": np.sqrt,
+        "tanh": np.tanh,
+        "sin": np.sin,
+        "abs": np.abs,
+    }
+    assert target.height(xy) == pytest.approx(
+        eval(smooth.replace("^", "**"), names) + 0 * xy[:, 0], rel=1e-12, abs=1e-15
+    )
 
 
 def test_wrong_arguments_are_refused():

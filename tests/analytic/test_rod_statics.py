@@ -124,6 +124,18 @@ def test_cantilever_strip_buckles_sideways_at_prandtls_load():
     assert lateral_load(40) == pytest.approx(1.0, abs=2e-3)  # 4e-4 measured; 1.3e-4 is left by the plane bending
 
 
+def test_localised_hump_is_van_der_heijden_and_thompsons():
+    """In closed form, m = ML/EI and t = T L^2/EI [Coyne 1990; van der Heijden and Thompson 2000]:
+
+    ends nearer by sqrt(16/t (1 - m^2/4t)) of the length, and turned by m EI/GJ + 4 arccos(m / 2 sqrt(t)).
+    """
+    exact = Localised()
+    m = exact.moment * exact.length / exact.ei
+    t = m * m / (2 * (1 + exact.z0))
+    assert sqrt(16 / t * (1 - m * m / (4 * t))) * exact.length == pytest.approx(exact.nearer, rel=1e-10)
+    assert m * exact.ei / exact.gj + 4 * np.arccos(m / (2 * sqrt(t))) == pytest.approx(exact.turn, rel=1e-10)
+
+
 def test_stretched_and_twisted_rod_localises_as_bergou_says():
     exact, edges = Localised(), (400, 800, 1600)
     assert exact.length / exact.width > 20  # so that the ends do not feel the hump
@@ -417,6 +429,35 @@ FLAT = gs.Rod(gs.Ellipse(1e-3, 2e-3), gs.Material(1e9, 1e3))
         ),
         (lambda: gs.solve_rod(CLAMPED, spinning=("end",), turns={"end": 1.0}), "both spin and be turned"),
         (lambda: gs.solve_rod(CLAMPED, tangents={"end": (-1, 0, 0)}), "turns back on itself"),
+        (lambda: gs.ElasticRod.of([["a", "b", "c"]] * 3, ROUND), "must be numbers"),
+        (lambda: gs.ElasticRod.of(straight(4) * [np.nan, 1, 1], ROUND), "must be finite"),
+        (lambda: gs.ElasticRod.of([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]], ROUND), "folds back on itself after edge 0"),
+        (lambda: gs.ElasticRod.of(straight(4), lambda s: None), "made of Rod"),
+        (lambda: gs.ElasticRod.of(straight(4), FLAT, natural="curly"), "curly"),
+        (lambda: gs.ElasticRod.of(straight(4), FLAT, natural=np.zeros((2, 2))), r"shape \(3, 2\)"),
+        (lambda: gs.ElasticRod.of(straight(4), FLAT, natural=(np.nan, 0.0)), "natural curvatures must be finite"),
+        (lambda: gs.ElasticRod.of(straight(4), ROUND, natural_twist=np.nan), "natural_twist must be finite"),
+        (lambda: gs.ElasticRod.of(straight(4), ROUND, director=(0, 0, 0)), "director must not be zero"),
+        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped={"start": (0, 0, 0)}), "tangent .* must not be zero"),
+        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped={"start": (1, 0)}), "three numbers"),
+        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped={"end": (-1, 0, 0)}), "points against the rod"),
+        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped="start"), "in a row"),
+        (lambda: CLAMPED.state(np.zeros((3, 3))), r"shape \(5, 3\)"),
+        (lambda: CLAMPED.state(angles=np.zeros(3)), r"shape \(4,\)"),
+        (lambda: gs.solve_rod(CLAMPED, forces={0: (0, 0, np.nan)}), "force on node 0 must be finite"),
+        (lambda: gs.solve_rod(CLAMPED, forces=np.full((5, 3), np.inf)), "forces on all nodes must be finite"),
+        (lambda: gs.solve_rod(CLAMPED, forces={1.5: X}), "whole number"),
+        (lambda: gs.solve_rod(CLAMPED, gravity=9.81), "gravity must be three numbers"),
+        (lambda: gs.solve_rod(CLAMPED, positions={0: (1, 0)}), "position of node 0"),
+        (lambda: gs.solve_rod(CLAMPED, along={0: [(2, 0, 0)]}), "unit vectors"),
+        (lambda: gs.solve_rod(CLAMPED, along={0: [X, X]}), "right angles"),
+        (lambda: gs.solve_rod(CLAMPED, tangents={"end": (0, 0, 0)}), "must not be zero"),
+        (lambda: gs.solve_rod(CLAMPED, directors={"end": X}), "the director lies along"),
+        (lambda: gs.solve_rod(CLAMPED, turns={"end": np.nan}), "turn of the .end. must be finite"),
+        (lambda: gs.solve_rod(CLAMPED, angles={0: np.nan}), "angle of edge 0 must be finite"),
+        (lambda: gs.solve_rod(CLAMPED, moments={0: np.nan}), "moment at 0 must be finite"),
+        (lambda: gs.solve_rod(CLAMPED, start=CLAMPED.state() * np.nan), "to start from must be finite"),
+        (lambda: gs.solve_rod(CLAMPED, steps=1.5), "1, 2, ... steps"),
         (lambda: gs.Rod(gs.GivenSection(1, 1, 1, 1), gs.Material(1.0, 1.0)), "leave the material out"),
         (lambda: gs.Rod(gs.Circle(1.0)), "needs a material"),
         (lambda: FLAT.bend_stiffness, "two bending stiffnesses"),
@@ -444,11 +485,40 @@ def test_rod_that_nothing_holds_is_refused():
         gs.solve_rod(rod, forces={3: (0, 0, EI)})
 
 
-def squeezed(**options):
+def squeezed(line=X, **options):
     """A clamped rod, straight, whose ends come nearer by a tenth: at once to 25 times its buckling load."""
     kind = gs.Rod(gs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=1.0))
-    rod = gs.ElasticRod.of(straight(40), kind, clamped={"start": X, "end": X})
-    return gs.solve_rod(rod, positions={-1: (0.9, 0, 0)}, steps=10, **options)
+    rod = gs.ElasticRod.of(straight(40)[:, :1] * line, kind, clamped={"start": line, "end": line})
+    return gs.solve_rod(rod, positions={-1: 0.9 * np.array(line)}, steps=10, **options)
+
+
+def test_bow_that_turns_freely_about_its_line_is_stable():
+    """Its mode of no stiffness comes out as negative or positive, as round-off has it: by where the line points."""
+    for line in np.random.default_rng(0).normal(size=(10, 3)):
+        line /= np.linalg.norm(line)
+        bow = squeezed(line)
+        more = gs.solve_rod(bow.rod, start=bow, positions={-1: 0.89 * line}, stable=False)
+        assert more.report.negative_modes == 0
+
+
+def test_single_mode_of_a_true_saddle_is_counted():
+    """In a plane, between the first and the second buckling load of a clamped rod: 4 and 8.18 pi^2 EI."""
+    kind = gs.Rod(gs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=1.0))
+    rod = gs.ElasticRod.of(straight(40), kind, clamped={"start": X, "end": X}, twist=False)
+    plane = dict.fromkeys(range(1, 40), (X, Z))
+    for share, modes in ((3.8, 0), (4.2, 1), (7.8, 1), (8.6, 2)):
+        shape = gs.solve_rod(rod, positions={-1: (1 - share * pi**2 / 1e5, 0, 0)}, along=plane, stable=False)
+        assert shape.report.negative_modes == modes
+
+
+def test_natural_curvature_at_a_clamp_is_that_of_the_node_beside_it():
+    curvatures = np.column_stack([np.arange(1.0, 5.0), np.zeros(4)])
+    for clamps in (("start", "end"), ("end", "start")):
+        rod = gs.ElasticRod.of(straight(5), THIN, natural=curvatures, natural_twist=[1, 2, 3, 4], clamped=clamps)
+        natural = rod.elements[0].natural_curvature[:, 0] / rod.bend_lengths
+        ends = [1.0 if end == "start" else 4.0 for end in clamps]
+        np.testing.assert_allclose(natural, [1, 2, 3, 4, *ends], rtol=1e-14)
+        np.testing.assert_allclose(rod.elements[0].natural_twist / rod.bend_lengths, [1, 2, 3, 4, *ends], rtol=1e-12)
 
 
 def test_squeezed_rod_leaves_its_straight_saddle_for_the_elastica():
@@ -466,7 +536,7 @@ def test_saddle_is_passed_over_if_asked_for():
 
 
 def test_saddle_that_cannot_be_left_is_refused(monkeypatch):
-    monkeypatch.setattr("gridshell.solve.rod_statics.STRETCHES", 0)
+    monkeypatch.setattr("gridshell.solve.rod_statics.MOST_DOWN", 0)
     with pytest.raises(gs.ConvergenceError, match="not stable") as caught:
         squeezed()
     assert caught.value.report.negative_modes > 0

@@ -17,7 +17,7 @@ from gridshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from gridshell.model import Shell
 from gridshell.nets import ChebyshevNet, chebyshev_net
 from gridshell.nets.apron import with_apron
-from gridshell.rods.section import Rod
+from gridshell.rods.section import GivenSection, Rod
 from gridshell.rods.stretch import Stretch
 from gridshell.solve.mixed_newton import Problem, find_equilibrium
 from gridshell.targets import Target
@@ -45,10 +45,11 @@ def bound_drape(
     start = np.empty((mesh.node_count, 3))
     for k, line in enumerate(grid.rods):
         start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
-    shell = Shell.of(mesh, rod)
+    rod_within = _within_surface(rod)
+    shell = Shell.of(mesh, rod_within)
     problem = Problem(
         elements=shell.elements,
-        stretch=_penalty(shell.stretch, rod, target, len(grid.rods)),
+        stretch=_penalty(shell.stretch, rod_within, target, len(grid.rods)),
         constraint=_bind(target, mesh, start),
         length=target.size,
         inextensible=True,
@@ -96,6 +97,16 @@ def bound_drape(
         dropped=net.dropped,
         warnings=tuple(warnings),
     )
+
+
+def _within_surface(rod: Rod) -> Rod:
+    """The rod with EI2 for all directions.
+
+    Out of the surface the rods bend as it bends; what is theirs to choose is the bend within it, towards m2, the first
+    director being the normal. So the twist angles are left out, as of a round rod.
+    """
+    within = rod.bend_stiffnesses[1]
+    return Rod(GivenSection(rod.stretch_stiffness, within, within, rod.twist_stiffness))
 
 
 def _penalty(stretch: Stretch, rod: Rod, target: Target, rods: int) -> Stretch:

@@ -5,6 +5,7 @@ from typing import Literal
 from gridshell.errors import InputError
 from gridshell.formfinding.bound import bound_drape
 from gridshell.formfinding.draped import Draped
+from gridshell.formfinding.falling import Fall, falling_drape
 from gridshell.formfinding.gravity import gravity_drape
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.joints import Joint
@@ -12,7 +13,7 @@ from gridshell.layout import GridLayout
 from gridshell.rods.section import Rod
 from gridshell.targets import Target
 
-Method = Literal["bound", "gravity"]
+Method = Literal["bound", "gravity", "paper"]
 
 
 def drape(
@@ -24,6 +25,7 @@ def drape(
     anchor: tuple[float, float] | None = None,
     gravity: float = 9.81,
     joint: Joint | None = None,
+    fall: Fall | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Lay a flat grid of rods on a target.
@@ -31,11 +33,13 @@ def drape(
     Parameters
     ----------
     method : "bound" marches the inextensible net and binds the grid to it; "gravity" lets the user's own rods
-        fall on the target (static equilibrium, frictionless unilateral contact), from flat.
+        fall on the target (static equilibrium, frictionless unilateral contact), from flat; "paper" lets them
+        fall in time, as the paper does.
     anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
-    gravity : acceleration [m/s2], for method "gravity".
-    joint : what the rods do to each other where they cross, for method "gravity"; ball joints without. The bound
-        drape has none: its net is a matter of geometry.
+    gravity : acceleration [m/s2], for methods "gravity" and "paper".
+    joint : what the rods do to each other where they cross, for methods "gravity" and "paper"; ball joints
+        without. The bound drape has none: its net is a matter of geometry.
+    fall : height, time stepping, coupling, friction and drag, for method "paper".
 
     Raises
     ------
@@ -45,4 +49,8 @@ def drape(
         return bound_drape(target, layout, rod, anchor=anchor, progress=progress)
     if method == "gravity":
         return gravity_drape(target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, progress=progress)
-    raise InputError(f'drape method must be "bound" or "gravity", not {method!r}')
+    if method == "paper":
+        return falling_drape(
+            target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, fall=fall, progress=progress
+        )
+    raise InputError(f'drape method must be "bound", "gravity" or "paper", not {method!r}')

@@ -30,6 +30,7 @@ from gridshell.targets import Target
 Floats = NDArray[np.float64]
 
 EDGES_A_SPAN = 6
+SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class FoundForm:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
-        return (*self.draped.warnings, *_popped_warnings(self.popped))
+        return (*self.draped.warnings, *_popped_warnings(self.popped), *_springs_off(self.agreement))
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,18 @@ def _popped_status(popped: dict[Ends, Popped]) -> str:
         if not shell.report.converged:
             return f"pop-up ({ends}) {shell.report.status.sentence}"
     return "converged"
+
+
+def _springs_off(compared: dict[Ends, Agreement]) -> tuple[str, ...]:
+    """With its ends clamped a convex shell keeps to the target; one that does not is held by nothing there."""
+    gap = compared.get("clamped")
+    if gap is None or gap.max_relative < SPRUNG:
+        return ()
+    x, y, z = gap.where
+    return (
+        f"the free grid springs off the target by {gap.max:.3g} m ({100 * gap.max_relative:.1f} % of its size) near "
+        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends: dips and ridges need graded stiffness or supports",
+    )
 
 
 def _popped_warnings(popped: dict[Ends, Popped]) -> tuple[str, ...]:

@@ -28,7 +28,8 @@ def adapted(directors: Floats, tangents: Floats) -> Floats:
     flat = np.linalg.norm(across, axis=-1) <= _ALONG * np.linalg.norm(directors, axis=-1)
     if np.any(flat):
         row = np.argwhere(flat)[0].tolist()
-        raise InputError(f"director {row} lies along its edge or is zero: give one across the rod")
+        which = f"director {row}" if row else "the director"
+        raise InputError(f"{which} lies along its edge or is zero: give one across the rod")
     return unit(across)
 
 

@@ -11,6 +11,7 @@ from typing import Self
 import numba as nb
 import numpy as np
 
+from gridshell.geometry.vectors import unit
 from gridshell.rods.elements import NO_HESSIANS, Floats, Ints
 
 
@@ -26,6 +27,12 @@ class IsotropicBend:
 
     blocks: Ints
     stiffness: Floats
+
+    def curvatures(self, state: Floats) -> Floats:
+        """(b,) |kappa| [-], integrated: the edges' unit vectors differ by 2 sin(phi/2), and add up to 2 cos(phi/2)."""
+        x = state[self.blocks]
+        before, after = unit(x[:, 1] - x[:, 0]), unit(x[:, 2] - x[:, 1])
+        return np.asarray(2 * np.linalg.norm(after - before, axis=1) / np.linalg.norm(after + before, axis=1))
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         return float(_isotropic_bend(state, self.blocks, self.stiffness, gradient, hessians))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gridshell.errors import InputError
+from gridshell.geometry.given import finite
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -58,6 +59,7 @@ class PointLoads:
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
         force = np.zeros_like(mass)
+        _check_blocks(self.blocks, len(mass))
         np.add.at(force, self.blocks, self.forces)
         return force
 
@@ -86,7 +88,7 @@ class Damping:
 
     def drag(self, mass: Floats) -> Floats:
         """(N, 3) force by velocity [N s/m]."""
-        return self.rate * mass + np.asarray(self.coefficients, dtype=float)
+        return self.rate * mass + finite("the damping coefficients", self.coefficients, *mass.shape)
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ class ImplicitForce:
     blocks: Ints
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> None:
-        return None
+        _check_blocks(self.blocks, len(mass))
 
     def at(self, time: float, state: Floats, velocity: Floats, step: float) -> tuple[Floats, Floats]:
         """(N, 3) forces, and (m, 3k, 3k) minus the symmetric part of their derivative by the step's end state."""
@@ -134,6 +136,11 @@ class ImplicitForce:
                 given = _checked(derivative, hessians.shape, self.force, time)
                 hessians -= share * (given + given.transpose(0, 2, 1))
         return force, hessians
+
+
+def _check_blocks(blocks: Ints, count: int) -> None:
+    if blocks.size and not (blocks.min() >= 0 and blocks.max() < count):
+        raise InputError(f"a force acts on block {blocks.max()}, but they run from 0 to {count - 1}")
 
 
 def _checked(given: Floats, shape: tuple[int, ...], source: object, time: float) -> Floats:

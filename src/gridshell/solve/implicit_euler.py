@@ -4,8 +4,10 @@
 
 Newton's method is damped by the natural monotonicity test [Deuflhard 2004, section 3.3]: a step is kept if the
 simplified step that follows, by the same factors, is shorter. All lengths of steps are measured by the mass,
-sqrt(sum m dq^2), so that metres and radians may be summed. The simplified step also corrects: where the motion
-is smooth, one factorisation a step is enough.
+sqrt(sum m dq^2), so that metres and radians may be summed. The simplified step also corrects, and tells what is
+left: steps of the lengths L0, L1 by one matrix are followed by one of about 2 L1^2 / L0, since the error of the
+matrix, which made L1 of L0 where it grew from nothing, is there from the start. Where the motion is smooth, one
+factorisation, two solutions and two evaluations, one with the Hessian, make a step.
 
 A step whose matrix has negative pivots is refused. It would be longer than the time in which an instability
 grows, and could end on a saddle of  |dq - h v|^2_M / 2h^2 + E;  at a minimum of that function, reached over convex
@@ -24,18 +26,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError
-from gridshell.model import Assembly, Freedom
+from gridshell.model import Freedom
 from gridshell.rods.elements import NO_HESSIANS, Elements
-from gridshell.solve.banded import narrow_or_sparse
 from gridshell.solve.constraint import NO_CURVATURE, Constraint, Supports
 from gridshell.solve.forces import Damping, Force, ImplicitForce
-from gridshell.solve.linear import LinearSolver, SingularError
+from gridshell.solve.linear import SingularError
+from gridshell.solve.summed import SummedMatrix, narrow_or_sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-Solver = Callable[[NDArray[np.int64], NDArray[np.int64]], LinearSolver]
+MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
-RELATIVE = 1e-9  # of the step's own motion; the simplified step that is this short has been taken too
+RELATIVE = 1e-9  # of the step's own motion: what is left once the last simplified step has been taken
 ROUND_OFF = 1e-13  # of the state: no step can be told from zero below this
 CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth going on with
 MOST_ITERATIONS = 20
@@ -109,7 +111,7 @@ class Motion:
         elements, explicit = (
             tuple(element.refreshed(state) for element in some) for some in (self.elements, self.explicit)
         )
-        return replace(self, elements=elements, explicit=explicit)
+        return type(self)(elements, self.mass, self.constraint, self.forces, explicit)
 
     def in_parts(self, most: int = PART) -> Self:
         """The same motion with its element sets cut into sets of at most `most` elements."""
@@ -136,10 +138,10 @@ class Refused:
 
 
 class ImplicitEuler:
-    """Takes single steps; keeps the pattern, its factors and the buffers between them, and nothing of the motion."""
+    """Takes single steps; keeps the matrix and the buffers between them, and nothing of the motion."""
 
-    def __init__(self, solver: Solver = narrow_or_sparse) -> None:
-        self._make_solver = solver
+    def __init__(self, matrix: MakeMatrix = narrow_or_sparse) -> None:
+        self._make_matrix = matrix
         self._planned: tuple[object, ...] = ()
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
@@ -148,8 +150,7 @@ class ImplicitEuler:
         constraint = motion.constraint_at(end)
         free = constraint.freedom(state)
         implicit = tuple(force for force in motion.forces if isinstance(force, ImplicitForce))
-        self._plan(motion, implicit, free)
-        held, drag = np.zeros_like(state), np.zeros_like(state)
+        held, inertia = np.zeros_like(state), motion.mass / step**2
         for element in motion.explicit:
             element.evaluate(state, held)
         np.negative(held, out=held)
@@ -158,14 +159,15 @@ class ImplicitEuler:
             if given is not None:
                 held += given
             if isinstance(force, Damping):
-                drag += force.drag(motion.mass)
-        inertia = motion.mass / step**2 + drag / step
+                inertia += force.drag(motion.mass) / step
         if not np.isfinite(held).all():
             raise InputError(f"an external force is not finite at t = {end:.6g} s: check its parameters")
+        self._plan(motion, implicit, free)
+        held += motion.mass * velocity / step
         return _Newton(self, motion, constraint, implicit, inertia, held, state, velocity, end, step).solve()
 
     def _plan(self, motion: Motion, implicit: tuple[ImplicitForce, ...], free: Freedom) -> None:
-        """The assembly; made anew only where the elements' blocks or the number of free directions have changed."""
+        """Room; made anew only where the elements' blocks or the number of free directions have changed."""
         blocks = [*(element.blocks for element in motion.elements), *(force.blocks for force in implicit)]
         old = self._planned
         if old and len(old) == len(blocks) + 1 and all(a is b for a, b in zip(old[1:], blocks, strict=True)):
@@ -173,9 +175,7 @@ class ImplicitEuler:
             if count is free.count or np.array_equal(count, free.count):  # type: ignore[arg-type]
                 return
         self._planned = (free.count, *blocks)
-        self.assembly = Assembly.of(blocks, free)
-        self.solver = self._make_solver(self.assembly.indptr, self.assembly.indices)
-        self.data = np.empty(len(self.assembly.indices))
+        self.matrix = self._make_matrix(blocks, free)
         widths = {3 * b.shape[1]: max(len(c) for c in blocks if c.shape[1] == b.shape[1]) for b in blocks}
         self.buffers = {width: np.zeros((count, width, width)) for width, count in widths.items()}
 
@@ -189,7 +189,7 @@ class _Newton:
     constraint: Constraint
     implicit: tuple[ImplicitForce, ...]
     inertia: Floats  # (N, 3) diagonal M / h^2 + C / h
-    held: Floats
+    held: Floats  # (N, 3) M v / h and the forces that stay over the step
     start: Floats
     velocity: Floats
     end: float
@@ -198,96 +198,78 @@ class _Newton:
     def solve(self) -> Step | Refused:
         free = self.constraint.freedom(self.start)
         moved = np.zeros_like(self.start)
-        inertial = _reduced(self.velocity, free.directions, free.count, free.first, free.size)
-        _add_free(self.step, inertial, free.directions, free.count, free.first, moved)
+        _add_free(self.step, self.velocity, free.directions, free.count, moved)
         going = self.constraint.remaining(self.start)
         if going is not None:
             moved += going
         state, moved = self._retracted(moved)
         floor = ROUND_OFF * self._size(self.start)
-        factorizations = 0
         for iteration in range(1, MOST_ITERATIONS + 1):
             free = self.constraint.freedom(state)
-            residual, _ = self._residual(free, state, moved, hessian=True)
-            if not np.isfinite(residual).all():
-                return Refused("an edge turned by half a revolution, or the state is not finite", factorizations)
-            factorizations += 1
             try:
-                negative = self.plan.solver.factor(self.plan.data)
+                total = self._forces(free, state, moved, hessian=True)
+                negative = self.plan.matrix.factor()
             except SingularError as error:
-                return Refused(str(error), factorizations)
+                return Refused(f"{error}: an edge turned by half a revolution, or nothing holds a block", iteration)
             if negative:
-                return Refused(f"the step's matrix has {negative} negative pivots", factorizations)
-            newton = self._expanded(free, self.plan.solver.solve(-residual))
+                return Refused(f"the step's matrix has {negative} negative pivots", iteration)
+            newton = self.plan.matrix.solve(total, free)
             length, share = self._size(newton), 1.0
             while True:
-                state, trial = self._retracted(moved + share * newton)
+                state, trial = self._retracted(moved - share * newton)
                 simplified, reactions = self._simplified(state, trial)
                 left = self._size(simplified)
                 if left <= (1.0 - 0.25 * share) * length or left <= floor:
                     break
                 share *= 0.5
                 if share < LEAST_SHARE:
-                    return Refused("Newton's iteration does not contract", factorizations)
+                    return Refused("Newton's iteration does not contract", iteration)
             moved = trial
             while share == 1.0:
-                state, moved = self._retracted(moved + simplified)
-                if left <= RELATIVE * self._size(moved) + floor:
-                    return Step(state, moved / self.step, reactions, iteration, factorizations)
+                state, moved = self._retracted(moved - simplified)
+                bound = RELATIVE * self._size(moved) + floor
+                if left <= bound or 2.0 * left * left <= bound * length:
+                    return Step(state, moved / self.step, reactions, iteration, iteration)
                 if not left < CONTRACTION * length:
                     break
                 length = left
                 simplified, reactions = self._simplified(state, moved)
                 left = self._size(simplified)
-        return Refused(f"Newton's iteration has not converged in {MOST_ITERATIONS} steps", factorizations)
+        return Refused(f"Newton's iteration has not converged in {MOST_ITERATIONS} steps", iteration)
 
     def _simplified(self, state: Floats, moved: Floats) -> tuple[Floats, Floats]:
-        """Newton's step from here by the factors of the last matrix, and the forces of the supports."""
+        """Minus Newton's step from here by the factors of the last matrix, and the forces of the supports."""
         free = self.constraint.freedom(state)
-        residual, total = self._residual(free, state, moved)
-        return self._expanded(free, self.plan.solver.solve(-residual)), total
+        total = self._forces(free, state, moved)
+        return self.plan.matrix.solve(total, free), total
 
-    def _residual(self, free: Freedom, state: Floats, moved: Floats, *, hessian: bool = False) -> tuple[Floats, Floats]:
-        """Out-of-balance forces in the free directions (size,) and in all (N, 3); Newton's matrix, if wanted."""
-        plan = self.plan
-        total = np.zeros_like(state)
+    def _forces(self, free: Freedom, state: Floats, moved: Floats, *, hessian: bool = False) -> Floats:
+        """(N, 3) out-of-balance forces; if wanted, sums up Newton's matrix."""
+        matrix, buffers = self.plan.matrix, self.plan.buffers
+        total = self.inertia * moved
+        total -= self.held
         if hessian:
-            plan.data[:] = 0.0
+            matrix.clear()
         for which, element in enumerate(self.motion.elements):
-            hessians = NO_HESSIANS
-            if hessian:
-                hessians = plan.buffers[3 * element.blocks.shape[1]][: len(element.blocks)]
+            hessians = buffers[3 * element.blocks.shape[1]][: len(element.blocks)] if hessian else NO_HESSIANS
             element.evaluate(state, total, hessians)
             if hessian:
-                plan.assembly.add(which, hessians, element.blocks, free, plan.data)
+                matrix.add(which, hessians, element.blocks, free)
         for which, force in enumerate(self.implicit, start=len(self.motion.elements)):
             given, hessians = force.at(self.end, state, moved / self.step, self.step)
             total -= given
             if hessian:
-                plan.assembly.add(which, hessians, force.blocks, free, plan.data)
-        reduced = np.empty(free.size)
-        _balance(
-            total, self.inertia, self.motion.mass, self.held, moved, self.velocity, self.step,
-            free.directions, free.count, free.first, reduced,
-        )  # fmt: skip
+                matrix.add(which, hessians, force.blocks, free)
         if hessian:
             curvature = self.constraint.curvature(state, total)
-            _add_inertia(
-                self.inertia, curvature if len(curvature) else NO_CURVATURE,
-                free.directions, free.count, free.first, plan.assembly.indptr, plan.data,
-            )  # fmt: skip
-        return reduced, total
+            matrix.add_blocks(self.inertia, curvature if len(curvature) else NO_CURVATURE, free)
+        return total
 
     def _retracted(self, moved: Floats) -> tuple[Floats, Floats]:
         """State and motion on the constraint. Where it is flat the motion keeps all its digits: v = dq / h."""
         state = self.start + moved
         back = self.constraint.retract(state)
         return (state, moved) if back is state else (back, back - self.start)
-
-    def _expanded(self, free: Freedom, q: Floats) -> Floats:
-        motion = np.zeros_like(self.start)
-        _add_free(1.0, q, free.directions, free.count, free.first, motion)
-        return motion
 
     def _size(self, motion: Floats) -> float:
         return float(_mass_norm(self.motion.mass, motion))
@@ -309,57 +291,17 @@ def _parts(elements: Elements, most: int) -> list[Elements]:
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _balance(total, inertia, mass, held, moved, velocity, step, directions, count, first, reduced):  # type: ignore[no-untyped-def]
-    """Add inertia, drag and held forces to the gradient `total` [N]; `reduced` is its part in the free directions."""
-    for i in range(len(total)):
-        for k in range(3):
-            total[i, k] += inertia[i, k] * moved[i, k] - mass[i, k] * velocity[i, k] / step - held[i, k]
-        for c in range(count[i]):
-            reduced[first[i] + c] = (
-                directions[i, c, 0] * total[i, 0]
-                + directions[i, c, 1] * total[i, 1]
-                + directions[i, c, 2] * total[i, 2]
-            )
-
-
-@nb.njit(cache=True, error_model="numpy")
-def _add_inertia(inertia, curvature, directions, count, first, indptr, data):  # type: ignore[no-untyped-def]
-    """Add T' (diag(inertia) + curvature) T of each block; a column of the upper triangle ends with its diagonal."""
-    curved = len(curvature) > 0
-    for i in range(len(inertia)):
-        for c in range(count[i]):
-            diagonal = indptr[first[i] + c + 1] - 1
-            for r in range(c + 1):
-                value = 0.0
-                for k in range(3):
-                    value += directions[i, r, k] * inertia[i, k] * directions[i, c, k]
-                    if curved:
-                        for j in range(3):
-                            value += directions[i, r, k] * curvature[i, k, j] * directions[i, c, j]
-                data[diagonal - c + r] += value
-
-
-@nb.njit(cache=True, error_model="numpy")
-def _reduced(field, directions, count, first, size):  # type: ignore[no-untyped-def]
-    q = np.empty(size)
-    for i in range(len(field)):
-        for c in range(count[i]):
-            total = 0.0
-            for k in range(3):
-                total += directions[i, c, k] * field[i, k]
-            q[first[i] + c] = total
-    return q
-
-
-@nb.njit(cache=True, error_model="numpy")
-def _add_free(share, q, directions, count, first, motion):  # type: ignore[no-untyped-def]
+def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyped-def]
+    """Add a share of the part of `field` in the free directions."""
     for i in range(len(motion)):
         for c in range(count[i]):
+            d = directions[i, c]
+            part = share * (d[0] * field[i, 0] + d[1] * field[i, 1] + d[2] * field[i, 2])
             for k in range(3):
-                motion[i, k] += share * q[first[i] + c] * directions[i, c, k]
+                motion[i, k] += part * d[k]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@nb.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _mass_norm(mass, motion):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(len(motion)):

@@ -11,6 +11,7 @@ class Status(Enum):
     STALLED = "stalled"
     DIVERGED = "diverged"
     SLID_OFF = "slid off"
+    MOVING = "not at rest"
 
     @property
     def sentence(self) -> str:
@@ -23,6 +24,7 @@ _SENTENCES = {
     "reduce the spacing",
     Status.DIVERGED: "the iteration diverged; reduce the spacing, or choose another anchor or heading",
     Status.SLID_OFF: "the grid slid off the target (nothing holds it there without friction); use method = bound",
+    Status.MOVING: "was not at rest when its time was over; give it a longer duration, or drag",
 }
 
 

@@ -1,27 +1,26 @@
 """Equilibrium of one rod: what is held, where it goes, what pulls; followed by steps from a start to the goal.
 
-Two things set a rod apart from a shell. Its twist angles mean something only together with the source frames,
-so these stand still while one equilibrium is sought and move to it once it is found (`follow` does not carry
-them). And lengths and angles are unknowns of one system: the solver sees lengths as shares of the rod's own, so
-that neither the unit nor the size of the rod decides how far a step goes.
+Two things set a rod apart from a shell. Lengths and angles are unknowns of one system: the solver sees lengths as
+shares of the rod's own, so that neither the unit nor the size of the rod decides how far a step goes. And the energies
+change along the way, where natural strains are let go bit by bit, so that `follow` does not serve.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Self
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gridshell.errors import ConvergenceError, InputError
+from gridshell.geometry.given import finite, vector
 from gridshell.geometry.vectors import cross, unit
-from gridshell.model.elastic_rod import ElasticRod, End, RodStrains
+from gridshell.model.elastic_rod import ElasticRod, RodStrains
 from gridshell.model.freedom import Freedom
+from gridshell.model.rod_line import End
 from gridshell.rods.bend_twist import BendTwist
-from gridshell.rods.elements import NO_HESSIANS, Elements, Ints
+from gridshell.rods.elements import Elements
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import NUDGE, Problem, find_equilibrium
+from gridshell.solve.mixed_newton import NUDGE, Equilibrium, Problem, find_equilibrium
 from gridshell.solve.report import SolveReport, Status
 from gridshell.solve.rod_supports import RodSupports, SupportPath, index_of
 
@@ -29,9 +28,10 @@ Floats = NDArray[np.float64]
 _NONE: Mapping[int, ArrayLike] = {}
 
 EASY = 6  # a step of no more iterations may be followed by a longer one
-MOST = 40
-STRETCH, STRETCHES = 8, 40  # on the way down from a saddle: iterations from one source, and how often
+MOST, MOST_DOWN = 40, 320  # iterations of a step; on the way down from a saddle
 SMALLEST_STEP = 1e-3
+NEUTRAL = 1e-6  # a mode of less than this of EI/L, the rod moving by its length, is one that nothing resists, such as
+# the turn of a round rod's bow about the line of its clamps: round-off chooses its sign
 
 
 @dataclass(frozen=True)
@@ -137,14 +137,15 @@ def solve_rod(
     InputError : a support or a load that this rod does not have.
     ConvergenceError : the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
     """
-    if steps < 1:
-        raise InputError(f"a path takes at least 1 step, not {steps}")
+    if not (isinstance(steps, int) and steps >= 1):
+        raise InputError(f"a path takes 1, 2, ... steps, not {steps}")
     came = start if isinstance(start, RodShape) else None
-    state = came.state if came else np.array(rod.state() if start is None else start, dtype=float)
+    state = came.state if came else rod.state() if start is None else np.array(start, dtype=float)
     if came and came.rod is not rod:
         raise InputError("twist angles belong to their frames: go on from a shape with its own rod, shape.rod")
     if state.shape != (rod.block_count, 3):
         raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
+    finite("the state to start from", state, *state.shape)
     wanted = RodSupports(positions, along or {}, tangents or {}, directors or {}, turns or {}, spinning, angles or {})
     path = SupportPath.of(rod, state, wanted)
     load = _load(rod, forces, moments or {}, gravity, spinning)
@@ -153,6 +154,7 @@ def solve_rod(
     axial = came.axial_forces if came else rod.stretch.stiffness * rod.stretch.strains(state)
     held = () if came else tuple(_stress_free(element, state) for element in rod.elements)
     before = _gradient(held or rod.elements, rod, state, axial)  # this load makes the start an equilibrium
+    scale = _scale(rod)
     t, step = 0.0, 1.0 / steps
     reports = list[SolveReport]()
     while t < 1.0:
@@ -160,10 +162,12 @@ def solve_rod(
         if 1.0 - there < 1e-9:
             there = 1.0
         pulls = (1 - there) * before + there * load
-        found = _next(rod, partial(_released, held, there), path.at(there), pulls, state, axial, slide=stable)
+        problem = _problem(rod, _released(held, rod.elements, there), path.at(there), pulls)
+        found = _next(problem, rod.bend_energy, state / scale, axial * rod.length, slide=stable)
         reports.append(found.report)
         if found.report.converged:
-            t, state, axial, rod = there, found.state, found.forces, found.rod
+            t, state, axial = there, found.state * scale, found.forces / rod.length
+            rod = replace(rod, elements=_released(rod.elements, found.elements, 0.0))
             if found.report.iterations <= EASY:
                 step *= 1.6
         else:
@@ -192,94 +196,59 @@ def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Fr
     return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
 
 
-@dataclass(frozen=True)
-class _FromOneSource:
-    """Elements whose source frames stay where they are."""
-
-    elements: Elements
-    blocks: Ints = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "blocks", self.elements.blocks)
-
-    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        return self.elements.evaluate(state, gradient, hessians)
-
-    def refreshed(self, state: Floats) -> Self:
-        return self
+def _scale(rod: ElasticRod) -> Floats:
+    """(N, 1) length of the rod at nodes, 1 at angles."""
+    scale = np.ones((rod.block_count, 1))
+    scale[rod.nodes] = scale[rod.ghosts] = rod.length
+    return scale
 
 
-@dataclass(frozen=True)
-class _Found:
-    """An equilibrium: the rod with its sources at the state (N, 3), and axial forces (edges,) [N]."""
-
-    rod: ElasticRod
-    state: Floats
-    forces: Floats
-    report: SolveReport
-    mode: Floats | None
-
-
-Release = Callable[[tuple[Elements, ...]], tuple[Elements, ...]]
+def _problem(rod: ElasticRod, elements: tuple[Elements, ...], supports: Supports, load: Floats) -> Problem:
+    """In lengths measured by the rod's own; energies stay in joule. Bends and twists know no lengths."""
+    stretch = replace(
+        rod.stretch, rest_lengths=rod.stretch.rest_lengths / rod.length, stiffness=rod.stretch.stiffness * rod.length
+    )
+    scale = _scale(rod)
+    return Problem(
+        elements, stretch, replace(supports, goals=supports.goals / scale[supports.moved]), 1.0, load=load * scale
+    )
 
 
-def _next(
-    rod: ElasticRod, release: Release, supports: Supports, load: Floats, state: Floats, axial: Floats, *, slide: bool
-) -> _Found:
+def _next(problem: Problem, bend_energy: float, state: Floats, axial: Floats, *, slide: bool) -> Equilibrium:
     """The equilibrium next to `state`; if `slide`, from a saddle on along its mode, to either side in turn.
 
-    As `find_stable`, but for sources that keep up with the rod on its way down: in the frames of one source an
-    edge can turn by less than half a revolution.
+    As `find_stable`, but a mode that nothing resists makes no saddle.
     """
-    first = _solve(rod, release, supports, load, state, axial)
+    first = best = find_equilibrium(problem, state, axial, most_iterations=MOST)
+    if _is_neutral(problem, first, bend_energy):
+        first = best = replace(first, mode=None, report=replace(first.report, negative_modes=0))
     reports = [first.report]
-    best = first
     for side in (1.0, -1.0) if slide and first.mode is not None else ():
         assert first.mode is not None
-        found = replace(first, state=first.state + side * NUDGE * first.mode)
-        for _ in range(STRETCHES):
-            found = _solve(found.rod, release, supports, load, found.state, found.forces, descend=True)
-            reports.append(found.report)
-            if found.report.status is not Status.STALLED:
-                break
+        nudged = first.state + side * NUDGE * first.mode
+        below = replace(problem, elements=first.elements)
+        found = find_equilibrium(below, nudged, first.forces, descend=True, most_iterations=MOST_DOWN)
+        if _is_neutral(problem, found, bend_energy):
+            found = replace(found, mode=None, report=replace(found.report, negative_modes=0))
+        reports.append(found.report)
         if found.report.stable:
             best = found
             break
     return replace(best, report=best.report.after(*(report for report in reports if report is not best.report)))
 
 
-def _solve(
-    rod: ElasticRod,
-    release: Release,
-    supports: Supports,
-    load: Floats,
-    state: Floats,
-    axial: Floats,
-    *,
-    descend: bool = False,
-) -> _Found:
-    """One Newton solve from one source, lengths being measured by the rod's own; energies stay in joule."""
-    unit_length = float(rod.stretch.rest_lengths.sum())
-    scale = np.ones((rod.block_count, 1))
-    scale[rod.nodes] = scale[rod.ghosts] = unit_length
-    problem = Problem(
-        tuple(_FromOneSource(element) for element in release(rod.elements)),
-        replace(
-            rod.stretch,
-            rest_lengths=rod.stretch.rest_lengths / unit_length,
-            stiffness=rod.stretch.stiffness * unit_length,
-        ),
-        replace(supports, goals=supports.goals / scale[supports.moved]),
-        1.0,
-        load=load * scale,
-    )
-    found = find_equilibrium(
-        problem, state / scale, axial * unit_length, descend=descend, most_iterations=STRETCH if descend else MOST
-    )
-    end = found.state * scale
-    mode = None if found.mode is None else found.mode * scale
-    lost = found.report.status is Status.DIVERGED
-    return _Found(rod if lost else rod.refreshed(end), end, found.forces / unit_length, found.report, mode)
+def _is_neutral(problem: Problem, found: Equilibrium, bend_energy: float) -> bool:
+    """Whether the one negative mode of an equilibrium is round-off."""
+    if found.mode is None or found.report.negative_modes != 1:
+        return False
+    curvature = 0.0
+    for part in (*found.elements, problem.stretch):
+        width = 3 * part.blocks.shape[1]
+        hessians = np.zeros((len(part.blocks), width, width))
+        part.evaluate(found.state, np.zeros_like(found.state), hessians)
+        along = found.mode[part.blocks].reshape(-1, width)
+        curvature += float(np.einsum("mi,mij,mj->", along, hessians, along))
+    return abs(curvature) < NEUTRAL * bend_energy
 
 
 def _stress_free(element: Elements, state: Floats) -> Elements:
@@ -287,8 +256,8 @@ def _stress_free(element: Elements, state: Floats) -> Elements:
     return element.relaxed(state) if isinstance(element, BendTwist) else element
 
 
-def _released(held: tuple[Elements, ...], t: float, own: tuple[Elements, ...]) -> tuple[Elements, ...]:
-    """Elements whose natural strains have gone the share t from those of `held`, if any, to their own."""
+def _released(held: tuple[Elements, ...], own: tuple[Elements, ...], t: float) -> tuple[Elements, ...]:
+    """The elements `own`, their natural strains only the share t of the way from those of `held`, if any."""
     result = list(own)
     for k, first in enumerate(held):
         last = own[k]
@@ -321,15 +290,13 @@ def _load(
     load = np.zeros((rod.block_count, 3)) if gravity is None else rod.weight(gravity)
     if isinstance(forces, Mapping):
         for node, force in forces.items():
-            load[index_of(node, rod.node_count, "node")] += np.asarray(force, dtype=float)
+            load[index_of(node, rod.node_count, "node")] += vector(f"the force on node {node}", force)
     else:
-        given = np.asarray(forces, dtype=float)
-        if given.shape != rod.rest.shape:
-            raise InputError(f"forces on all nodes have the shape {rod.rest.shape}, not {given.shape}")
-        load[rod.nodes] += given
+        load[rod.nodes] += finite("the forces on all nodes", forces, rod.node_count, 3)
     if moments and not rod.twists:
         raise InputError("this rod carries no twist angles: build it with twist=True")
-    for place, moment in moments.items():
+    for place, given in moments.items():
+        moment = finite(f"the moment at {place!r}", given)
         if isinstance(place, str):
             if place not in spinning:
                 raise InputError(f'the moment at "{place}" needs a clamp there that spins: spinning=("{place}",)')

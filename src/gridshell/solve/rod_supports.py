@@ -8,9 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from gridshell.errors import InputError
 from gridshell.geometry.frames import adapted, parallel_transport, signed_angle
+from gridshell.geometry.given import direction, finite, vector
 from gridshell.geometry.vectors import cross, dot, unit
-from gridshell.model.elastic_rod import ElasticRod, End
+from gridshell.model.elastic_rod import ElasticRod
 from gridshell.model.freedom import Freedom
+from gridshell.model.rod_line import End
 from gridshell.solve.constraint import Supports
 
 Floats = NDArray[np.float64]
@@ -63,9 +65,9 @@ class SupportPath:
                 goals[int(rod.ghost_angles[k])] = state[rod.ghost_angles[k]]
         for node, goal in wanted.positions.items():
             block = index_of(node, rod.node_count, "node")
-            goals[block] = state[block] if goal is None else np.asarray(goal, dtype=float)
+            goals[block] = state[block] if goal is None else vector(f"the position of node {node}", goal)
         for edge, angle in wanted.angles.items():
-            goals[rod.node_count + index_of(edge, rod.edge_count, "edge")] = np.array([angle, 0.0, 0.0])
+            goals[rod.node_count + index_of(edge, rod.edge_count, "edge")] = _about(f"the angle of edge {edge}", angle)
         clamps = tuple(_TurningClamp.of(rod, state, k, goals, wanted) for k in range(len(rod.clamps)))
         holds_spin = rod.twists and rod.free_spin and not any(block >= rod.node_count for block in goals)
         if holds_spin:
@@ -73,7 +75,8 @@ class SupportPath:
         moved = np.array(list(goals), dtype=np.intp)
         free = rod.freedom()
         for node, directions in wanted.along.items():
-            free = free.with_directions(np.array([index_of(node, rod.node_count, "node")]), *directions)
+            block = index_of(node, rod.node_count, "node")
+            free = free.with_directions(np.array([block]), *_orthonormal(node, directions))
         spins = [int(rod.ghost_angles[rod.clamps.index(end)]) for end in wanted.spinning]
         free = free.with_directions(np.array(spins, dtype=np.intp), SPIN).with_directions(moved)
         last = np.array([goals[block] for block in goals]).reshape(-1, 3)
@@ -105,21 +108,21 @@ class _TurningClamp:
         outward = -1.0 if end == "start" else 1.0
         arm = outward * (state[ghost] - state[node])
         reach, now = float(np.linalg.norm(arm)), unit(arm)
-        then = unit(np.asarray(wanted.tangents.get(end, now), dtype=float))
+        then = direction(f'the tangent at the "{end}"', wanted.tangents.get(end, now))
         angle = float(np.arctan2(np.linalg.norm(cross(now, then)), dot(now, then)))
         if angle > np.pi - 1e-6:
             raise InputError(f'the clamp at "{end}" turns back on itself: give its way in two solves')
         side = unit(then - dot(now, then) * now) if angle > 1e-12 else np.zeros(3)
         if end in wanted.directors or end in wanted.turns:
             block = int(rod.ghost_angles[k])
-            theta = float(state[block, 0]) + wanted.turns.get(end, 0.0)
+            turn = finite(f'the turn of the "{end}"', wanted.turns.get(end, 0.0))
+            theta = float(state[block, 0] + turn)
             if end in wanted.directors:
                 d1 = rod.reference_directors(state)[rod.edge_count + k]
                 m1 = np.cos(state[block, 0]) * d1 + np.sin(state[block, 0]) * cross(now, d1)
                 carried = parallel_transport(m1, now, then)
-                theta += float(
-                    signed_angle(carried, adapted(np.asarray(wanted.directors[end], dtype=float), then), then)
-                )
+                given = direction(f'the director at the "{end}"', wanted.directors[end])
+                theta += float(signed_angle(carried, adapted(given, then), then))
             goals[block] = np.array([theta, 0.0, 0.0])
         return _TurningClamp(ghost, state[node], goals[node], outward * reach, now, side, angle)
 
@@ -129,7 +132,21 @@ class _TurningClamp:
         return (1 - t) * self.start + t * self.goal + self.reach * turned
 
 
+def _about(name: str, angle: float) -> Floats:
+    """(3,) block of a twist angle."""
+    return np.array([float(finite(name, angle)), 0.0, 0.0])
+
+
+def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) -> Sequence[tuple[float, float, float]]:
+    rows = np.array([vector(f"a free direction of node {node}", one) for one in directions]).reshape(-1, 3)
+    if np.abs(rows @ rows.T - np.eye(len(rows))).max(initial=0.0) > 1e-9:
+        raise InputError(f"the free directions of node {node} must be unit vectors at right angles to each other")
+    return directions
+
+
 def index_of(given: int, count: int, what: str) -> int:
+    if not isinstance(given, int | np.integer):
+        raise InputError(f"a {what} is a whole number, not {given!r}")
     if not -count <= given < count:
         raise InputError(f"the rod has no {what} {given}: they run from 0 to {count - 1}")
     return given % count

@@ -5,20 +5,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, isfinite
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import ConvergenceError, InputError
-from gridshell.solve.banded import narrow_or_sparse
-from gridshell.solve.implicit_euler import ImplicitEuler, Motion, Refused, Solver
+from gridshell.solve.implicit_euler import ImplicitEuler, MakeMatrix, Motion, Refused, Step
 from gridshell.solve.step_limit import refuse_unstable
+from gridshell.solve.summed import narrow_or_sparse
 from gridshell.solve.time_series import End, Moment, MotionReport, Recorder, TimeSeries
 
 Floats = NDArray[np.float64]
 
 EASY = 5  # Newton iterations after which a step that was halved may grow back
 HALVINGS = 20
+
+
+class Stepper(Protocol):
+    """Takes single steps."""
+
+    def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused: ...
 
 
 def simulate(
@@ -33,7 +40,9 @@ def simulate(
     halvings: int = HALVINGS,
     stream: str | Path | None = None,
     progress: Callable[[Moment], None] | None = None,
-    solver: Solver = narrow_or_sparse,
+    matrix: MakeMatrix = narrow_or_sparse,
+    stepper: Stepper | None = None,
+    stop: Callable[[Moment], bool] | None = None,
 ) -> TimeSeries:
     """Move from `state` (N, 3) and `velocity` (N, 3; at rest without) at the time `start` to `until` [s].
 
@@ -49,6 +58,8 @@ def simulate(
     halvings : how often a step may be halved.
     stream : folder for the record, instead of memory; read it with `TimeSeries.load`.
     progress : told of every moment that is recorded.
+    stepper : takes the steps; `ImplicitEuler` with `matrix` without.
+    stop : asked at every moment of the grid of times whether to end there.
 
     Returns
     -------
@@ -61,12 +72,12 @@ def simulate(
     InputError : a value that is not finite comes in, from the caller or from a force.
     """
     velocity = np.zeros_like(state) if velocity is None else velocity
-    _check(motion, state, velocity, until - start, step, every)
+    _check(motion, state, velocity, until - start, step, every, halvings)
     begun = clock.perf_counter()
     count = max(1, ceil((until - start) / step - 1e-9))
     refuse_unstable(motion, state, (until - start) / count)
     grid = _Grid(start, (until - start) / count)
-    stepper = ImplicitEuler(solver)
+    stepper = stepper or ImplicitEuler(matrix)
     recorder = Recorder(1 + count // every, state.shape, stream)
     moment = Moment(start, state.copy(), velocity.copy(), motion.in_parts())
     tally = _Tally()
@@ -97,9 +108,12 @@ def simulate(
             tally.smallest = min(tally.smallest, grid.step)
             ahead = grid.next(grow=taken.iterations <= EASY)
             moment = Moment(ahead.time, taken.state, taken.velocity, moment.motion.refreshed(taken.state))
-            done, grid = ahead.number > grid.number and ahead.number % every == 0, ahead
-            if done:
+            even, grid = ahead.number > grid.number, ahead
+            if even and grid.number % every == 0:
                 record()
+            if even and stop is not None and stop(moment):
+                end = End.STOPPED
+                break
     except KeyboardInterrupt:
         end = End.INTERRUPTED
     report = MotionReport(
@@ -157,7 +171,9 @@ class _Tally:
     reason: str = ""
 
 
-def _check(motion: Motion, state: Floats, velocity: Floats, duration: float, step: float, every: int) -> None:
+def _check(
+    motion: Motion, state: Floats, velocity: Floats, duration: float, step: float, every: int, halvings: int
+) -> None:
     shape = motion.mass.shape
     for name, array in (("state", state), ("velocity", velocity), ("mass", motion.mass)):
         if array.shape != shape:
@@ -168,9 +184,13 @@ def _check(motion: Motion, state: Floats, velocity: Floats, duration: float, ste
     if not (motion.mass >= 0).all():
         where = np.argwhere(motion.mass < 0)[0].tolist()
         raise InputError(f"the mass is {motion.mass[tuple(where)]} at {where}: masses must not be negative")
+    if not motion.mass.any():
+        raise InputError("nothing here has mass: give the section a mass per length, or a material")
     if not (isfinite(step) and step > 0):
         raise InputError(f"the step must be positive, not {step} s")
     if not (isfinite(duration) and duration > 0):
         raise InputError(f"the motion must end after it starts, not {duration} s later")
+    if halvings < 0:
+        raise InputError(f"a step may be halved 0, 1, ... times, not {halvings}")
     if every < 1:
         raise InputError(f"record every 1, 2, ... steps, not every {every}")

@@ -39,7 +39,7 @@ def step_limit(motion: Motion, state: Floats, time: float = 0.0) -> float:
         return np.inf
     free = motion.constraint_at(time).freedom(state)
     mass = free.reduce_diagonal(motion.mass)
-    difference = _stiffness(motion.explicit, state, free) - _stiffness(motion.elements, state, free)
+    difference = tangent_stiffness(motion.explicit, state, free) - tangent_stiffness(motion.elements, state, free)
     if not mass.all():
         difference, mass = _followed(difference, mass > 0), mass[mass > 0]
     scale = diags(1.0 / np.sqrt(mass))
@@ -86,7 +86,7 @@ def _followed(difference: csc_matrix, moving: NDArray[np.bool_]) -> csc_matrix:
     return csc_matrix(difference[moving][:, moving] + fill)
 
 
-def _stiffness(elements: tuple[Elements, ...], state: Floats, free: Freedom) -> csc_matrix:
+def tangent_stiffness(elements: tuple[Elements, ...], state: Floats, free: Freedom) -> csc_matrix:
     """Hessian in the free directions, whole."""
     scrap = np.zeros_like(state)
     blocks = [one.blocks for one in elements]

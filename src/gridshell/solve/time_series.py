@@ -18,6 +18,7 @@ class End(Enum):
 
     FINISHED = "finished"
     INTERRUPTED = "interrupted"
+    STOPPED = "stopped"
     STALLED = "stalled"
 
     @property
@@ -27,6 +28,7 @@ class End(Enum):
 
 _SENTENCES = {
     End.FINISHED: "reached its end",
+    End.STOPPED: "was told to stop",
     End.INTERRUPTED: "was interrupted; go on from `series.last`",
     End.STALLED: "could not go on with the smallest step allowed; look at the loads there, or allow a smaller step",
 }

@@ -1,0 +1,237 @@
+"""The paper's drape: the grid falls on the target in time and comes to rest there [HQK section 3].
+
+Implicit Euler, the rods tied as the coupling says, contact by modified masses (`contact.modified_mass`). Nothing is
+anchored: without friction the draped state is unstable sideways, and it is reached because the fall is symmetric, or
+because touching nodes that are stopped at each step creep. How fast it would slide off is part of the result.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridshell.contact.modified_mass import ModifiedMass, Stopped, Touching
+from gridshell.errors import InputError
+from gridshell.formfinding.draped import Draped, smallest_joint_angle
+from gridshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
+from gridshell.formfinding.progress import Progress, silent
+from gridshell.formfinding.rest import Rest, held_back, joint_gap, lowest_modes, out_of_balance
+from gridshell.geometry.vectors import dot
+from gridshell.joints import Coupling, Joint, SharedDofs
+from gridshell.layout import GridLayout, mesh_grid
+from gridshell.model import Shell
+from gridshell.rods.section import Rod
+from gridshell.solve.contact_euler import ContactEuler
+from gridshell.solve.forces import Damping, Gravity
+from gridshell.solve.implicit_euler import Motion
+from gridshell.solve.report import SolveReport, Status
+from gridshell.solve.simulate import simulate
+from gridshell.solve.step_limit import step_limit
+from gridshell.solve.summed import narrow_or_dissected
+from gridshell.solve.time_series import Moment, TimeSeries
+from gridshell.targets import Target
+
+Floats = NDArray[np.float64]
+
+STILL = 1e-7  # kinetic energy, of weight times size
+BALANCED = 2e-3  # out-of-balance force on a node, of the weight of the heaviest
+USUAL_STEP = 0.01  # [s] on a target of 0.2 m; times go with the square root of lengths
+USUAL_DURATION = 6.0
+USUAL_SIZE = 0.2  # [m]
+OF_LIMIT = 0.9  # share of the explicit ties' step limit that is taken
+UNSTABLE = -1e-3  # [1/s2]: the free turn about the vertical has 0 up to round-off
+CHECKS = 10  # moments between two looks at the rest
+
+
+@dataclass(frozen=True)
+class Fall:
+    """How the grid falls.
+
+    Parameters
+    ----------
+    coupling : how the rods hold together (shared DOFs, implicit or explicit penalty).
+    height : of the flat grid above the target's highest point [m].
+    time_step, duration : [s]; None: 10 ms and 6 s on a target of 0.2 m, and as the square root of its size; explicit
+        ties at most nine tenths of their step limit. The fall ends when the grid is at rest.
+    stopped : what an impact takes of a node's velocity, see `ModifiedMass`.
+    friction : Coulomb's coefficient between rods and target.
+    drag : rate at which all velocities decay [1/s].
+    stream : folder for the frames, read with `TimeSeries.load`; None keeps none.
+    every : frames are streamed each so many steps.
+    """
+
+    coupling: Coupling = field(default_factory=SharedDofs)
+    height: float = 0.05
+    time_step: float | None = None
+    duration: float | None = None
+    stopped: Stopped = "wholly"
+    friction: float = 0.0
+    drag: float = 0.0
+    stream: str | Path | None = None
+    every: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("height", "time_step", "duration"):
+            value = getattr(self, name)
+            if value is not None and not (isfinite(value) and value > 0):
+                raise InputError(f"the fall's {name} must be positive, not {value}")
+
+
+def falling_drape(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    joint: Joint | None = None,
+    fall: Fall | None = None,
+    progress: Progress = silent,
+) -> Draped:
+    """Let `layout` fall on `target` in time; see `drape`.
+
+    Raises
+    ------
+    StabilityError : the time step is beyond the limit of explicit ties.
+    ConvergenceError : a step fails however small.
+    """
+    fall = fall or Fall()
+    top = standing_point(target, anchor, gravity)
+    grid = falling_grid(target, layout, anchor)
+    mesh = mesh_grid(grid, layout.edge, marks=middle_marks(grid, layout))
+    shell = Shell.of(mesh, rod, joint=joint, coupling=fall.coupling)
+    falling = _Falling(target, shell, gravity, fall, progress)
+    series = falling.run(over(mesh, layout, top + [0.0, 0.0, fall.height]))
+    rest, report = falling.outcome(series)
+    assert series.last is not None
+    positions = shell.positions(series.last.state)
+    if slid_off(mesh, positions, layout, top, target):
+        report = replace(report, status=Status.SLID_OFF)
+    angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
+    return Draped(
+        method="paper",
+        target=target,
+        layout=layout,
+        rod=rod,
+        mesh=mesh,
+        positions=positions,
+        rods=grid.rods,
+        levels=(report,),
+        max_gap=float(max(0.0, -target.contact(positions).distance.min())),
+        pulls=falling.pulls(series.last),
+        min_angle=angle,
+        min_angle_at=where,
+        own_ends=None,
+        anchor=anchor,
+        gravity=gravity,
+        net=None,
+        warnings=_warnings(rest),
+        rest=rest,
+    )
+
+
+class _Falling:
+    """The motion, and what is asked of it on the way and at its end."""
+
+    def __init__(self, target: Target, shell: Shell, gravity: float, fall: Fall, progress: Progress) -> None:
+        nodes = np.arange(shell.node_count)
+        massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # linkers with nodes of their own, too
+        pull = Gravity(massive, (0.0, 0.0, -gravity))
+        self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
+        self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
+        self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)
+        self._heaviest = float(-self.load[:, 2].min())
+        self._weight = float(-self.load[:, 2].sum())
+        law = ModifiedMass(target, nodes, fall.stopped, fall.friction)
+        self.stepper = ContactEuler(law, narrow_or_dissected(shell.places))
+
+    def run(self, positions: Floats) -> TimeSeries:
+        fall, slowness = self.fall, float(np.sqrt(self.target.size / USUAL_SIZE))
+        normals = np.tile([0.0, 0.0, 1.0], (len(positions), 1)) if self.shell.angles else None
+        state = self.shell.state(positions, normals=normals)
+        step = fall.time_step or min(USUAL_STEP * slowness, OF_LIMIT * step_limit(self.motion, state))
+        duration = fall.duration or USUAL_DURATION * slowness
+        never = int(np.ceil(duration / step)) + 1
+        return simulate(
+            self.motion,
+            state,
+            until=duration,
+            step=step,
+            every=fall.every if fall.stream else never,
+            stream=fall.stream,
+            stepper=self.stepper,
+            stop=self._looking(),
+        )
+
+    def _looking(self) -> Callable[[Moment], bool]:
+        """Asked at each step: tells where it is, and from time to time whether it rests."""
+        count = 0
+
+        def look(moment: Moment) -> bool:
+            nonlocal count
+            count += 1
+            if count % CHECKS:
+                return False
+            energy, force = self.activity(moment)
+            self._progress("drape", f"falling, t = {moment.time:.3f} s, kinetic energy {energy:.1e} J", force)
+            return self.rests(energy, force)
+
+        return look
+
+    @property
+    def touching(self) -> Touching:
+        assert self.stepper.last is not None
+        return self.stepper.last  # type: ignore[return-value]
+
+    def activity(self, moment: Moment) -> tuple[float, float]:
+        """Kinetic energy [J] and largest out-of-balance force [N]."""
+        energy = moment.motion.kinetic_energy(moment.velocity)
+        return energy, held_back(moment.motion, moment.state, self.load, self.touching)
+
+    def rests(self, energy: float, force: float) -> bool:
+        return energy < STILL * self._weight * self.target.size and force < BALANCED * self._heaviest
+
+    def pulls(self, last: Moment) -> int:
+        """Nodes in contact that the target would have to pull."""
+        push = out_of_balance(last.motion, last.state, self.load)[self.touching.nodes]
+        return int(np.count_nonzero(dot(push, self.touching.normals) < 0))
+
+    def outcome(self, series: TimeSeries) -> tuple[Rest, SolveReport]:
+        last, done = series.last, series.report
+        assert last is not None
+        assert done is not None
+        energy, force = self.activity(last)
+        resting = self.rests(energy, force)
+        growth = lowest_modes(last.motion, last.state, self.load, self.touching, self.target) if resting else ()
+        gap = joint_gap(self.shell, last.state)
+        rest = Rest(resting, last.time, energy, force, gap, growth, done.steps, done.refused_steps)
+        strain = float(np.abs(self.shell.stretch.strains(last.state)).max())
+        report = SolveReport(
+            Status.CONVERGED if resting else Status.MOVING,
+            self.shell.freedom().size,
+            done.iterations,
+            done.factorizations,
+            done.seconds,
+            force,
+            strain,
+            sum(s < UNSTABLE for s in growth),
+        )
+        return rest, report
+
+
+def _warnings(rest: Rest) -> tuple[str, ...]:
+    if not rest.at_rest:
+        return (
+            f"the grid is NOT AT REST after {rest.time:.3g} s: kinetic energy {rest.kinetic_energy:.1e} J, "
+            f"out-of-balance force {rest.force_residual:.1e} N; give it a longer duration, or drag",
+        )
+    if rest.fastest_growth:
+        count = sum(s < UNSTABLE for s in rest.growth)
+        return (
+            f"at rest, but without friction unstable sideways: {count} modes or more grow, the fastest as "
+            f"exp({rest.fastest_growth:.2g} t / s); it was reached by symmetry, or by the stopping of touching nodes",
+        )
+    return ()
