@@ -1,5 +1,5 @@
 # The habits of the house. `make` alone shows them.
-.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints pictures bench bench-rods
+.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints accept-paper paper pictures bench bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -30,6 +30,12 @@ accept-joints: ## print the table of joints and couplings
 
 accept-output: ## print the table of what people take away: drawings, checks, reports
 	python -m tests.acceptance.output
+
+accept-paper: ## print the table of the paper's own time stepping (some minutes)
+	python -m tests.acceptance.paper
+
+paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (some minutes)
+	python docs/paper.py
 
 pictures:  ## the README's pictures, made by the program
 	python docs/pictures.py

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         OutputError,
         StabilityError,
     )
+    from gridshell.fabrication import Fabrication
     from gridshell.form import Form, PoppedUp, find_form, pop_up_table
     from gridshell.formfinding import (
         Agreement,
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from gridshell.model.elastic_rod import ElasticRod, RodStrains
     from gridshell.model.shell import Shell
     from gridshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
+    from gridshell.output.takeaway import DrawingStyle, Takeaway
     from gridshell.rods.section import Circle, Ellipse, GivenSection, Material, RectangularSection, Rod, Tube
     from gridshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
     from gridshell.solve.implicit_euler import ImplicitEuler, Motion
@@ -62,17 +64,22 @@ if TYPE_CHECKING:
         Cap,
         Disc,
         Ellipsoid,
+        Freeform,
         HeightField,
         Hemisphere,
         Paraboloid,
+        Placement,
         Rectangle,
         Target,
+        heights_from,
+        surface_from,
     )
 
 _HOMES = {
     "gridshell.errors": (
         "ConvergenceError", "GridshellError", "InputError", "NetLimitError", "OutputError", "StabilityError",
     ),
+    "gridshell.fabrication": ("Fabrication",),
     "gridshell.form": ("Form", "PoppedUp", "find_form", "pop_up_table"),
     "gridshell.formfinding": (
         "Agreement", "Boundary", "Draped", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
@@ -88,27 +95,30 @@ _HOMES = {
     "gridshell.rods.section": (
         "Circle", "Ellipse", "GivenSection", "Material", "RectangularSection", "Rod", "Tube",
     ),
+    "gridshell.output.takeaway": ("DrawingStyle", "Takeaway"),
     "gridshell.solve.rod_statics": ("RodShape", "solve_rod"),
     "gridshell.solve.forces": ("Damping", "ExplicitForce", "Gravity", "ImplicitForce", "PointLoads"),
     "gridshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
     "gridshell.solve.simulate": ("simulate",),
     "gridshell.solve.time_series": ("Moment", "TimeSeries"),
     "gridshell.targets": (
-        "Cap", "Disc", "Ellipsoid", "HeightField", "Hemisphere", "Paraboloid", "Rectangle", "Target",
+        "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
+        "Target", "heights_from", "surface_from",
     ),
 }  # fmt: skip
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping", "Disc",
-    "Draped", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "FlatGrid", "FlatRod",
-    "Footprint", "Form", "GivenSection", "Gravity", "GridLayout", "GridMesh", "GridshellError", "HeightField",
-    "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Linker", "Material",
-    "Moment", "Motion", "NetLimitError", "OutputError", "Paraboloid", "Pin", "PointLoads", "Popped", "PoppedUp",
-    "Rectangle", "RectangularSection", "Rigid", "Rod", "RodShape", "RodStrains", "SharedDofs", "Shell",
-    "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net",
-    "drape", "find_form", "map_back", "mesh_grid", "pop_up", "pop_up_table", "simulate", "solve_rod",
-    "sphere_net_end", "sphere_net_rod", "straight_rods", "trim",
+    "Agreement", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping", "Disc", "Draped",
+    "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication",
+    "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity", "GridLayout", "GridMesh",
+    "GridshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError",
+    "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutputError", "Paraboloid", "Pin", "Placement",
+    "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rod", "RodShape", "RodStrains",
+    "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube",
+    "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
+    "pop_up_table", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from",
+    "trim",
 ]  # fmt: skip
 
 

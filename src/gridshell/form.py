@@ -13,13 +13,13 @@ from gridshell.case.of import case_text
 from gridshell.checks import check
 from gridshell.errors import InputError
 from gridshell.fabrication import fabricate
-from gridshell.formfinding import Boundary, FoundForm, PoppedTable, find_stages, pop_up_stages
+from gridshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
 from gridshell.formfinding.drape import Method
 from gridshell.formfinding.popup import Ends
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.joints import Joint
 from gridshell.layout import FlatGrid, GridLayout
-from gridshell.output import Archive, write
+from gridshell.output import Archive
 from gridshell.output.result import States, form_result, form_states, table_result, table_states
 from gridshell.output.summary import summary_text
 from gridshell.output.takeaway import Takeaway
@@ -54,9 +54,9 @@ class Form(FoundForm):
             case_toml = case_text(
                 self.target, self.layout, self.rod, joint=self.joint,
                 method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
-                takeaway=takeaway,
+                fall=draped.fall, takeaway=takeaway,
             )  # fmt: skip
-        return _archive(self, self.trimmed.boundary, form_states(self), case_toml, takeaway, progress)
+        return _archive(self, form_states(self), case_toml, takeaway, progress)
 
     def save(
         self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
@@ -67,7 +67,7 @@ class Form(FoundForm):
         ------
         OutputError : the folder cannot be written, or holds something else.
         """
-        return write(self.archive(case_toml, takeaway=takeaway), folder)
+        return self.archive(case_toml, takeaway=takeaway).save(folder)
 
 
 class PoppedUp(PoppedTable):
@@ -83,24 +83,22 @@ class PoppedUp(PoppedTable):
 
     def archive(self, *, takeaway: Takeaway | None = None, progress: Progress = silent) -> Archive:
         """Everything that is kept, checked and made ready to be built."""
-        return _archive(self, self.boundary, table_states(self), "", takeaway or Takeaway(), progress)
+        return _archive(self, table_states(self), "", takeaway or Takeaway(), progress)
 
     def save(self, folder: str | PathLike[str], *, takeaway: Takeaway | None = None) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return write(self.archive(takeaway=takeaway), folder)
+        return self.archive(takeaway=takeaway).save(folder)
 
 
-def _archive(
-    job: Form | PoppedUp, boundary: Boundary, states: States, case_toml: str, takeaway: Takeaway, progress: Progress
-) -> Archive:
+def _archive(job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress) -> Archive:
     """A job's result and states with its checks and its fabrication."""
     mesh = job.footprint.mesh
-    checks = check(job.popped, boundary, job.rod, stages=takeaway.stages, progress=progress)
+    checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
     final = next((job.popped[ends].positions for ends in PREFERRED if ends in checks.bending), None)
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
     result = workshop_result(job.result(), mesh, checks, made, takeaway.strength)
     result["drawings"] = takeaway.drawings.parameters()
-    return Archive(result, states | workshop_states(checks), case_toml)
+    return Archive(result, states | workshop_states(checks), case_toml).as_stored()
 
 
 def find_form(
@@ -112,6 +110,7 @@ def find_form(
     anchor: tuple[float, float] | None = None,
     gravity: float = 9.81,
     joint: Joint | None = None,
+    fall: Fall | None = None,
     ends: Sequence[Ends] = ("pinned", "clamped"),
     progress: Progress = silent,
 ) -> Form:
@@ -124,6 +123,7 @@ def find_form(
     rod : section and material of every rod.
     method, anchor, gravity : of the drape, see `drape`.
     joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
+    fall : of method "paper", see `drape`.
     ends : end conditions of the pop-up.
     progress : called as progress(stage, detail, residual) at every iteration.
 
@@ -137,7 +137,7 @@ def find_form(
     """
     found = find_stages(
         target, layout, rod,
-        method=method, anchor=anchor, gravity=gravity, joint=joint, ends=ends, progress=progress,
+        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends, progress=progress,
     )  # fmt: skip
     return Form(**{field.name: getattr(found, field.name) for field in fields(found)})
 

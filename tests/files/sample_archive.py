@@ -156,3 +156,20 @@ def _agreement(states: dict[str, np.ndarray], end: str) -> dict[str, Any]:
     top, rms = float(gap.max()), float(np.sqrt(np.mean(gap**2)))
     return {"max": top, "rms": rms, "max_relative": top / RADIUS, "rms_relative": rms / RADIUS,
             "where": states[f"popped_{end}"][int(gap.argmax())].tolist()}  # fmt: skip
+
+
+def with_way_up(archive: Archive, stages: int = 9) -> Archive:
+    """The archive with a way up from flat, stresses and a check: shapes of the right size, not equilibria."""
+    flat, final = archive.states["flat"], archive.states["popped_pinned"]
+    share = np.linspace(0, 1, stages) ** 2
+    rise = np.array([0.0, 0.0, 1.0])
+    history = np.array([(1 - s) * flat + s * final + 0.05 * s * (1 - s) * rise for s in share])
+    entries = len(archive.states["rod_nodes"])
+    stress = np.abs(np.sin(np.arange(entries) / 50))
+    states = archive.states | {
+        "history": history, "history_share": share,
+        "history_stress": np.outer(share, stress).astype(np.float32),
+        "stress_pinned": stress, "stress_clamped": 0.8 * stress,
+    }  # fmt: skip
+    rows = [{"share": float(s), "height": float(np.ptp(x[:, 2]))} for s, x in zip(share, history, strict=True)]
+    return Archive({**archive.result, "deployment": {"ends": "pinned", "stages": rows}}, states, archive.case_toml)

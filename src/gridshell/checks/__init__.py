@@ -1,6 +1,6 @@
 """Is it safe to build: bending and stress, reactions and their balance, the way up from flat."""
 
-from gridshell.checks.bending import Bending, bending, curvatures, fibre_distance, fibre_strain
+from gridshell.checks.bending import Bending, bending, bending_of, curvatures, fibre_distance, fibre_strain
 from gridshell.checks.check import Checks, check, settled_shell
 from gridshell.checks.deployment import Deployment, deploy
 from gridshell.checks.joint_loads import JointLoads, joint_loads
@@ -13,6 +13,7 @@ __all__ = [
     "JointLoads",
     "Reactions",
     "bending",
+    "bending_of",
     "check",
     "curvatures",
     "deploy",

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from gridshell.errors import InputError
 from gridshell.geometry.vectors import cross, dot, unit
 from gridshell.layout import GridMesh
+from gridshell.model import Shell
+from gridshell.rods.bend_twist import BendTwist
 from gridshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
 
 Floats = NDArray[np.float64]
@@ -34,28 +36,57 @@ class Bending:
     strain: Floats | None
 
 
-def bending(mesh: GridMesh, positions: Floats, rod: Rod, *, clamps: Floats | None = None) -> Bending:
+def bending_of(shell: Shell, state: Floats, rod: Rod) -> Bending:
+    """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis."""
+    clamps = unit(state[shell.ghosts] - state[shell.ends]) if len(shell.ghosts) else None
+    return bending(
+        shell.mesh, shell.positions(state), rod, clamps=clamps, components=curvature_components(shell, state)
+    )
+
+
+def bending(
+    mesh: GridMesh, positions: Floats, rod: Rod, *, clamps: Floats | None = None, components: Floats | None = None
+) -> Bending:
     """Bending of the rods of `mesh` with nodes at `positions` (n, 3) [m].
 
+    Parameters
+    ----------
     clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
+    components : (k, 2) curvatures towards m1 and m2 [1/m]; without, the stress of a section that is not round is an
+        upper bound, as if it bent towards its farthest point.
     """
     curvature = curvatures(mesh, positions, clamps=clamps)
     axial = axial_strains(mesh, positions)
     fibre = fibre_distance(rod)
     if fibre is None or rod.material is None:
         return Bending(curvature, axial, None, None)
-    strain = fibre * curvature + np.abs(axial)
+    bent = fibre * curvature if components is None else fibre_strain(rod, components[:, 0], components[:, 1])
+    strain = bent + np.abs(axial)
     return Bending(curvature, axial, rod.material.youngs_modulus * strain, strain)
+
+
+def curvature_components(shell: Shell, state: Floats) -> Floats | None:
+    """(k, 2) curvatures towards m1 and m2 [1/m] at each entry of `rod_nodes`; None where rods bend alike all ways."""
+    frames = next((one for one in shell.within if isinstance(one, BendTwist)), None)
+    mesh = shell.mesh
+    if frames is None or len(frames.blocks) != len(mesh.bends) + len(shell.ghosts):
+        return None
+    result = np.zeros((len(mesh.rod_nodes), 2))
+    strains, inner = frames.strains(state)[:, :2], _inner(mesh)
+    result[inner] = strains[: len(mesh.bends)] / mesh.voronoi_lengths[:, None]
+    if len(shell.ghosts):
+        s, first, last = mesh.stations, mesh.rod_start, mesh.rod_stop - 1
+        half = 0.5 * np.column_stack([s[first + 1] - s[first], s[last] - s[last - 1]]).ravel()
+        result[np.column_stack([first, last]).ravel()] = strains[len(mesh.bends) :] / half[:, None]
+    return result
 
 
 def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
     """(k,) curvature [1/m] at each entry of `rod_nodes`."""
     result = np.zeros(len(mesh.rod_nodes))
-    inner = np.ones(len(mesh.rod_nodes), dtype=bool)
     first, last = mesh.rod_start, mesh.rod_stop - 1
-    inner[first] = inner[last] = False
     before, here, after = (positions[mesh.bends[:, k]] for k in range(3))
-    result[inner] = _turn(unit(here - before), unit(after - here)) / mesh.voronoi_lengths
+    result[_inner(mesh)] = _turn(unit(here - before), unit(after - here)) / mesh.voronoi_lengths
     if clamps is not None:
         for side, (end, neighbour) in enumerate(((first, first + 1), (last, last - 1))):
             outward = unit(positions[mesh.rod_nodes[end]] - positions[mesh.rod_nodes[neighbour]])
@@ -111,6 +142,13 @@ def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
     if fibre is None:
         raise InputError("a given section has no fibres: its stress is not known; give a shape and a material")
     return np.asarray(fibre * np.hypot(kappa1, kappa2))
+
+
+def _inner(mesh: GridMesh) -> NDArray[np.bool_]:
+    """(k,) which entries of `rod_nodes` are not ends."""
+    inner = np.ones(len(mesh.rod_nodes), dtype=bool)
+    inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
+    return inner
 
 
 def _turn(before: Floats, after: Floats) -> Floats:

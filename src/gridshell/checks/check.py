@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gridshell.checks.bending import Bending, bending
+from gridshell.checks.bending import Bending, bending, bending_of
 from gridshell.checks.deployment import Deployment, deploy
 from gridshell.checks.joint_loads import JointLoads, joint_loads
 from gridshell.checks.reactions import Reactions, reactions
-from gridshell.formfinding import Boundary, Popped
+from gridshell.formfinding import Popped
 from gridshell.formfinding.popup import Ends
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.model import Shell
@@ -39,22 +39,14 @@ class Checks:
         return () if self.deployment is None else self.deployment.warnings
 
 
-def check(
-    popped: Mapping[Ends, Popped], boundary: Boundary, rod: Rod, *, stages: int = 8, progress: Progress = silent
-) -> Checks:
+def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress: Progress = silent) -> Checks:
     """Check every shell that converged.
 
-    boundary : where its ends are held, and in which direction.
     stages : of the deployment, the way up from flat of the pinned shell; 0: none.
     """
     done = {ends: shell for ends, shell in popped.items() if shell.report.converged}
-    bent = {
-        ends: bending(
-            shell.footprint.mesh, shell.positions, rod, clamps=boundary.tangents if ends == "clamped" else None
-        )
-        for ends, shell in done.items()
-    }
     settled = {ends: settled_shell(shell) for ends, shell in done.items()}
+    bent = {ends: bending_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     if "pinned" not in done or not stages:
@@ -64,7 +56,8 @@ def check(
         last.shell, last.state, last.forces, stages=stages,
         told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
     )  # fmt: skip
-    on_the_way = tuple(bending(last.footprint.mesh, positions, rod) for positions in deployment.positions)
+    flat = bending(last.footprint.mesh, deployment.positions[0], rod)
+    on_the_way = (flat, *(bending_of(last.shell, state, rod) for state in deployment.states))
     return Checks(bent, held, carried, deployment, on_the_way)
 
 

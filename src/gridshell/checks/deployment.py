@@ -34,6 +34,7 @@ class Deployment:
     ----------
     share : (s,) of the way that the ends have gone, ascending; 0 is the flat grid.
     positions : (s, n, 3) of the mesh's nodes [m].
+    states : (s - 1, N, 3) of the shell, without the flat grid.
     snaps : pairs of neighbouring shares between which the path folds: going forward, the shell does not come
         from the first shape to the second by itself.
     lost_at : share below which no equilibrium was found, or None; only the flat grid then stands before it.
@@ -41,6 +42,7 @@ class Deployment:
 
     share: Floats
     positions: Floats
+    states: Floats
     snaps: tuple[tuple[float, float], ...] = ()
     lost_at: float | None = None
 
@@ -86,8 +88,9 @@ def deploy(shell: Shell, state: Floats, forces: Floats, *, stages: int, told: To
             snaps.append((share, before))
         found.append(there)
         here = there
-    positions = np.array([*(shell.positions(one.state) for one in found), path.flat])[::-1]
-    return Deployment(np.append(shares[: len(found)], 0.0)[::-1], positions, tuple(reversed(snaps)), lost)
+    states = np.array([one.state for one in reversed(found)])
+    positions = np.array([path.flat, *(shell.positions(state) for state in states)])
+    return Deployment(np.append(shares[: len(found)], 0.0)[::-1], positions, states, tuple(reversed(snaps)), lost)
 
 
 class _Path:

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import OutputError
-from gridshell.output.folder import read_json, replacing
+from gridshell.output.folder import put, read_json, replacing
 
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
 GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
@@ -36,6 +36,20 @@ class Archive:
     states: dict[str, NDArray[Any]]
     case_toml: str = ""
 
+    def as_stored(self) -> "Archive":
+        """The archive as a reader will see it: the result in JSON's own types."""
+        return replace(self, result=json.loads(json_text(self.result)))
+
+    def summary(self) -> str:
+        """One screen of text."""
+        from gridshell.output.summary import summary_text
+
+        return summary_text(self.result)
+
+    def save(self, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:
+        """As `write`."""
+        return write(self, folder, kinds)
+
     @property
     def name(self) -> str:
         """What the result is called: its own name, else its target's kind."""
@@ -48,22 +62,43 @@ class Archive:
         return next((state for state in reversed(SHELLS) if state in self.states), None)
 
 
-def write(archive: Archive, folder: str | os.PathLike[str]) -> Path:
+def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:
     """Write the whole result folder, replacing an older result; returns its absolute path.
+
+    kinds : of files beside the archive (see `files.KINDS`); default: all that every installation can.
 
     Raises
     ------
     OutputError : the folder cannot be written, or holds something that is not a gridshell result.
     """
-    archive = replace(archive, result=json.loads(json_text(archive.result)))  # what a reader will see
+    from gridshell.output.files import files_of
+
+    archive = archive.as_stored()
     with replacing(folder) as temporary:
-        for name, content in _files(archive).items():
-            file = temporary / name
-            file.parent.mkdir(exist_ok=True)
-            file.write_text(content, encoding="utf-8", newline="\n")
+        put(temporary / "result.json", json_text(archive.result))
+        if archive.case_toml:
+            put(temporary / "case.toml", archive.case_toml)
+        for name, content in files_of(archive, kinds):
+            put(temporary / name, content)
         with open(temporary / "states.npz", "wb") as stream:
             np.savez_compressed(stream, allow_pickle=False, **archive.states)
     return Path(folder).expanduser().resolve()
+
+
+def export(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> list[str]:
+    """Write files of some kinds (see `files.KINDS`) into `folder`, each replaced as a whole; returns their names.
+
+    Raises
+    ------
+    InputError : a kind needs a package that is not installed. OutputError : the folder cannot be written.
+    """
+    from gridshell.output.files import files_of
+
+    names = []
+    for name, content in files_of(archive.as_stored(), kinds):
+        put(Path(folder) / name, content)
+        names.append(name)
+    return names
 
 
 def read(folder: str | os.PathLike[str]) -> Archive:
@@ -117,29 +152,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if isfinite(value) else None
     return value
-
-
-def _files(archive: Archive) -> dict[str, str]:
-    """Content of every text file of the folder."""
-    from gridshell.output.dxf import plan_dxf
-    from gridshell.output.models import obj_text, vtp_text
-    from gridshell.output.plan import flat_plan
-    from gridshell.output.plansvg import plan_svg
-    from gridshell.output.report import report_html
-    from gridshell.output.schedule import joints_csv, rods_csv
-
-    plan = flat_plan(archive)
-    files = {"case.toml": archive.case_toml} if archive.case_toml else {}
-    files |= {
-        "result.json": json_text(archive.result),
-        "drawings/plan.svg": plan_svg(plan),
-        "drawings/plan.dxf": plan_dxf(plan),
-        "schedule/rods.csv": rods_csv(archive),
-        "schedule/joints.csv": joints_csv(archive),
-    }
-    for state in SHELLS:
-        if state in archive.states:
-            files[f"model/{state}.obj"] = obj_text(archive, state)
-            files[f"model/{state}.vtp"] = vtp_text(archive, state)
-    files["report.html"] = report_html(archive, plan)
-    return files

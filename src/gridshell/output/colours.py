@@ -1,4 +1,4 @@
-"""Colours of numbers: two maps of even lightness steps, given by a few control points."""
+"""Colours of numbers: three maps of even lightness steps, given by a few control points."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,6 +7,7 @@ Floats = NDArray[np.float64]
 
 # Signed: dark in the middle, so that rods without a gap are drawn in ink on light paper.
 SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f28c3a")
+STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
 HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 
 

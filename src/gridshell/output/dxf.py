@@ -1,69 +1,63 @@
-"""The flat plan as DXF in millimetres, on named layers, the same bytes for the same plan."""
+"""A drawing as DXF in millimetres, on named layers, the same bytes for the same drawing."""
 
 import io
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gridshell.output.plan import NOTE, FlatPlan
+from gridshell.output.drawing import LAYERS, Drawing, Path, Text
 
 if TYPE_CHECKING:
-    from ezdxf.document import Drawing
     from ezdxf.layouts import Modelspace
 
-LAYERS = {  # name: AutoCAD colour
-    "CUT": 7, "MARK": 1, "LABEL": 3, "LABEL-JOINTS": 8, "BOUNDARY-FLAT": 5, "BOUNDARY-FINAL": 6, "TITLE": 7,
-}  # fmt: skip
 CAP = 0.72  # height of a capital over the text size; DXF measures text by its capitals
 
 
-def plan_dxf(plan: FlatPlan) -> str:
-    """One LINE a rod on CUT, a circle a joint on MARK, labels, both boundary curves, and a title."""
+def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str:
+    """A LINE, LWPOLYLINE or 3D POLYLINE for each path, a CIRCLE for each mark, a TEXT for each text.
+
+    names : for each layer the name that it takes in the file, where that is another.
+    """
     import ezdxf
     from ezdxf import units
 
+    layer = {name: (names or {}).get(name, name) for name in LAYERS}
     fixed = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True  # no clock and no random id in the file
     try:
-        drawing = ezdxf.new("R2010", units=units.MM)
-        for name, colour in LAYERS.items():
-            drawing.layers.add(name, color=colour)
-        _draw(plan, drawing)
+        file = ezdxf.new("R2010", units=units.MM)
+        for name, shown in layer.items():
+            file.layers.add(shown, color=LAYERS[name].number)
+        space = file.modelspace()
+        for path in drawing.paths:
+            _path(space, path, layer[path.layer])
+        for mark in drawing.marks:
+            space.add_circle(mark.at.tolist(), mark.radius, dxfattribs={"layer": layer[mark.layer]})
+        for text in drawing.texts:
+            _text(space, text, layer[text.layer])
+        file.classes.add_required_classes(file.dxfversion)  # from a set, whose order changes from run to run
+        file.classes.classes = dict(sorted(file.classes.classes.items()))
         stream = io.StringIO()
-        drawing.write(stream)
+        file.write(stream)
     finally:
         ezdxf.options.write_fixed_meta_data_for_testing = fixed
     return stream.getvalue()
 
 
-def _draw(plan: FlatPlan, drawing: "Drawing") -> None:
-    space = drawing.modelspace()
-    for a, b in plan.lines.tolist():
-        space.add_line(a, b, dxfattribs={"layer": "CUT"})
-    radius = min(1.0, 0.05 * plan.spacing)
-    for mark in plan.marks.tolist():
-        space.add_circle(mark, radius, dxfattribs={"layer": "MARK"})
-    if len(plan.footprint):
-        space.add_lwpolyline(plan.footprint.tolist(), close=True, dxfattribs={"layer": "BOUNDARY-FLAT"})
-    if len(plan.boundary):
-        space.add_polyline3d(plan.boundary.tolist(), close=True, dxfattribs={"layer": "BOUNDARY-FINAL"})
-    _write(plan, space)
+def _path(space: "Modelspace", path: Path, layer: str) -> None:
+    points, style = path.points.tolist(), {"layer": layer}
+    if not path.flat:
+        space.add_polyline3d(points, close=path.closed, dxfattribs=style)
+    elif len(points) == 2:
+        space.add_line(*points, dxfattribs=style)
+    else:
+        space.add_lwpolyline(points, close=path.closed, dxfattribs=style)
 
 
-def _write(plan: FlatPlan, space: "Modelspace") -> None:
-    """All texts."""
+def _text(space: "Modelspace", text: Text, layer: str) -> None:
     from ezdxf.enums import TextEntityAlignment as Align
 
-    height = CAP * plan.text_size
-    for item in plan.labels:
-        style = {"layer": "LABEL", "height": height, "rotation": float(np.degrees(item.angle))}
-        text = space.add_text(item.text, dxfattribs=style)
-        text.set_placement(item.centre.tolist(), align=Align.MIDDLE_CENTER)
-    small = {"layer": "LABEL-JOINTS", "height": CAP * 0.12 * plan.spacing}  # fits between two joints
-    for joint, mark in zip(plan.joints, plan.marks, strict=True):
-        space.add_text(joint.id, dxfattribs=small).set_placement((mark + 0.06 * plan.spacing).tolist())
-    size = 0.018 * plan.extent
-    left, below = plan.lines.reshape(-1, 2).min(axis=0, initial=0.0) - (0.0, 6 * plan.text_size)
-    for k, line in enumerate((plan.name, "Flat plan, units mm, scale 1:1", plan.summary, NOTE)):
-        title = {"layer": "TITLE", "height": CAP * size * (1.5 if k == 0 else 1.0)}
-        space.add_text(line, dxfattribs=title).set_placement((left, below - 1.7 * (k + 1) * size))
+    align = {"start": Align.LEFT, "middle": Align.CENTER, "end": Align.RIGHT}[text.anchor]
+    style = {"layer": layer, "height": CAP * text.size, "rotation": float(np.degrees(text.angle))}
+    space.add_text(text.text, dxfattribs=style).set_placement(text.at.tolist(), align=align)

@@ -1,4 +1,4 @@
-"""The tables of a report: supports side by side, key figures, levels of the drape, rods."""
+"""The tables of a report: supports side by side, key figures, levels of the drape."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -46,6 +46,19 @@ _DRAPE: tuple[Entry, ...] = (
     ("smallest angle between rods", "min_angle_deg", wording.degrees),
     ("time", "seconds", wording.seconds),
 )
+_BENDING: tuple[Entry, ...] = (
+    ("Smallest radius of curvature", "min_radius", wording.millimetres),
+    ("Largest strain, bending and axial", "max_strain", wording.percent),
+    ("Largest stress, bending and axial", "max_stress", wording.stress),
+    ("Utilisation of the strength", "utilisation", wording.percent),
+    ("Sharpest at this share of the way", "share", wording.percent),
+)
+_REACTIONS: tuple[Entry, ...] = (
+    ("Largest support force", "largest_force", wording.newtons),
+    ("Largest support moment", "largest_moment", wording.newton_metres),
+    ("Sum of all forces over the largest", "force_imbalance", wording.small),
+    ("Sum of all moments over the largest", "moment_imbalance", wording.small),
+)
 _OWN_ENDS: tuple[Entry, ...] = (
     ("own cuts against the net's, at most", "max", wording.millimetres),
     ("own cuts against the net's, median", "median", wording.millimetres),
@@ -63,6 +76,23 @@ def supports_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
             if any(value is not None for value in values):
                 rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
     return {"ends": ends, "rows": rows} if rows else None
+
+
+def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
+    """What was checked, for each kind of ends and on the way up: `columns` and `rows` of (title, values)."""
+    bent, held = result.get("bending") or {}, result.get("reactions") or {}
+    columns = [key for key in (*ENDS, "pop_up") if key in bent]
+    rows = []
+    for title, key, show in _BENDING:
+        values = [bent[column].get(key) for column in columns]
+        if any(value is not None for value in values):
+            rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
+    for title, key, show in _REACTIONS:
+        values = [(held.get(column) or {}).get(key) for column in columns]
+        if any(value is not None for value in values):
+            rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
+    heads = ["on the way up" if column == "pop_up" else column for column in columns]
+    return {"columns": heads, "rows": rows} if rows else None
 
 
 def key_figures(result: Mapping[str, Any], plan: FlatPlan) -> list[tuple[str, list[Row]]]:
@@ -88,19 +118,6 @@ def levels_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     return {"columns": [column.replace("_", " ") for column in columns], "rows": rows} if levels else None
 
 
-def rods_table(plan: FlatPlan) -> list[dict[str, Any]]:
-    """One entry a rod: id, family, number of joints; offset, start, end and length as texts [mm]."""
-    return [
-        {
-            "id": rod.id,
-            "family": rod.family,
-            "joints": len(rod.joints),
-            "mm": [_hundredths(value) for value in (rod.offset, rod.start, rod.end, rod.length)],
-        }
-        for rod in plan.rods
-    ]
-
-
 def _listed(table: Mapping[str, Any], listed: tuple[Entry, ...]) -> list[Row]:
     return [(title, show(table[key])) for title, key, show in listed if table.get(key) is not None]
 
@@ -114,7 +131,3 @@ def _cut_list(plan: FlatPlan) -> list[Row]:
         ("longest rod", wording.millimetres(max(lengths, default=None), 5)),
         ("shortest rod", wording.millimetres(min(lengths, default=None), 5)),
     ]
-
-
-def _hundredths(metres: float | None) -> str:
-    return wording.UNKNOWN if metres is None else f"{round(1e3 * metres, 2) + 0.0:.2f}"

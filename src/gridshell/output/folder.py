@@ -58,6 +58,19 @@ def replacing(folder: str | os.PathLike[str]) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
+def put(file: Path, content: str | bytes) -> None:
+    """Write a file as a whole: a kill leaves the old one or the new one."""
+    beside = file.with_name(f".{file.name}.new")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_bytes(content if isinstance(content, bytes) else content.encode())
+        beside.replace(file)
+    except OSError as error:
+        with suppress(OSError):
+            beside.unlink()
+        raise OutputError(f"cannot write {file}: {error.strerror}; choose another folder") from error
+
+
 def read_json(path: Path) -> dict[str, Any]:
     """The table in `path`, checked to be a result that this version understands."""
     try:

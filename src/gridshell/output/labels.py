@@ -1,15 +1,15 @@
-"""Rod labels beyond the rods' ends, moved outwards until none covers another."""
+"""Labels that never cover each other."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from gridshell.output.drawing import BELOW, LETTER, LINE, Text
 
 Floats = NDArray[np.float64]
 
-LETTER = 0.62  # width of a capital or digit over the text size
-LINE = 0.95  # height of a line of text over its size, a little air included
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 NEAR, FAR = 14, 150  # places that are tried at an end: where no rod is covered either; at all
 
@@ -32,51 +32,117 @@ class Label:
     end: Floats
     moved: bool
 
+    def written(self, size: float) -> Text:
+        """The text itself, its box about the centre."""
+        across = np.array([-np.sin(self.angle), np.cos(self.angle)])
+        baseline = self.centre - (0.5 * LINE - BELOW) * size * across
+        return Text(self.text, baseline, size, "LABEL", anchor="middle", angle=self.angle)
+
     def box(self, size: float) -> Floats:
         """Corners (4, 2) of the text's box for this text size."""
-        along = np.array([np.cos(self.angle), np.sin(self.angle)])
-        half = 0.5 * LETTER * size * len(self.text) * along
-        side = 0.5 * LINE * size * np.array([-along[1], along[0]])
-        return np.array([self.centre + a * half + b * side for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+        return self.written(size).box()
 
 
-def place(texts: Sequence[str], rods: Floats, size: float) -> list[Label]:
+class Room:
+    """The boxes (4, 2) that are taken, found by the square of the plane that they lie in."""
+
+    def __init__(self, square: float) -> None:
+        self._square = square
+        self._taken: dict[tuple[int, int], list[Floats]] = {}
+
+    def free(self, box: Floats) -> bool:
+        """Whether no box that was taken is met."""
+        near = [other for key in self._keys(box) for other in self._taken.get(key, ())]
+        return not near or not boxes_meet(box, np.array(near))
+
+    def take(self, box: Floats) -> None:
+        for key in self._keys(box):
+            self._taken.setdefault(key, []).append(box)
+
+    def _keys(self, box: Floats) -> Iterator[tuple[int, int]]:
+        (x0, y0), (x1, y1) = (np.floor(corner / self._square).astype(int) for corner in (box.min(0), box.max(0)))
+        return ((x, y) for x in range(x0, x1 + 1) for y in range(y0, y1 + 1))
+
+
+def place(texts: Sequence[str], rods: Floats, size: float, *, both: bool = True) -> list[Label]:
     """Labels at both ends of the rods (m, 2, 2); a second end that is too crowded goes without.
 
     size : of the text, in the unit of `rods`.
+    both : else at the first end only.
     """
     placed: list[Label] = []
-    boxes = np.empty((0, 4, 2))
-    for end in (0, 1):
+    room = Room(4 * size)
+    for end in (0, 1) if both else (0,):
         for k, text in enumerate(texts):
-            label = _first_free(text, rods[k, end], rods[k, 1 - end], size, boxes, rods, must=end == 0)
+            label = _first_free(text, rods[k, end], rods[k, 1 - end], size, room, rods, must=end == 0)
             if label is not None:
                 placed.append(label)
-                boxes = np.concatenate([boxes, label.box(size)[None]])
+                room.take(label.box(size))
     return placed
 
 
+def leaders(labels: Sequence[Label], size: float) -> Iterator[Floats]:
+    """Lines (2, 2) from the rods' ends to those labels that stand off, where no other label is in their way."""
+    boxes = [label.box(size) for label in labels]
+    for k, label in enumerate(labels):
+        away = label.centre - label.end
+        near = label.centre - away / np.linalg.norm(away) * size * (0.3 + 0.5 * LETTER * len(label.text))
+        line = np.array([label.end, near])
+        others = (
+            box for j, box in enumerate(boxes) if j != k and np.ptp([box[0], label.centre], axis=0).max() < 80 * size
+        )
+        if label.moved and not any(lines_meet(box, line[None]) for box in others):
+            yield line
+
+
+def spread(places: ArrayLike, gap: float) -> Floats:
+    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
+
+    Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
+    """
+    asked = np.asarray(places, dtype=float)
+    order = np.argsort(asked, kind="stable")
+    wanted = asked[order] - gap * np.arange(len(asked))  # now they need only be ascending
+    groups: list[tuple[float, int]] = []
+    for value in wanted.tolist():
+        group = (value, 1)
+        while groups and groups[-1][0] > group[0]:
+            mean, count = groups.pop()
+            group = ((mean * count + group[0] * group[1]) / (count + group[1]), count + group[1])
+        groups.append(group)
+    result = np.empty_like(asked)
+    result[order] = np.concatenate([np.full(n, mean) for mean, n in groups] or [np.empty(0)]) + gap * np.arange(
+        len(asked)
+    )
+    return result
+
+
 def _first_free(
-    text: str, end: Floats, other: Floats, size: float, boxes: Floats, rods: Floats, *, must: bool
+    text: str, end: Floats, other: Floats, size: float, room: Room, rods: Floats, *, must: bool
 ) -> Label | None:
     for label, step in _places(text, end, other, size):
         box = label.box(size)
         if step >= NEAR and not must:
             return None
-        if not boxes_meet(box, boxes) and (step >= NEAR or not lines_meet(box, rods)):
+        if room.free(box) and (step >= NEAR or not lines_meet(box, rods)):
             return label
-    return next(_places(text, end, other, size))[0]
+    return None
 
 
-def _places(text: str, end: Floats, other: Floats, size: float) -> Iterator[tuple[Label, int]]:
+def _places(text: str, end: Floats, other: Floats, size: float) -> Iterable[tuple[Label, int]]:
     """Places on the rod's own line, from its end outwards."""
     outward = (end - other) / np.linalg.norm(end - other)
-    angle = float(np.arctan2(outward[1], outward[0]))
-    if not LOWEST < angle <= LOWEST + np.pi:
-        angle += np.pi if angle < 0 else -np.pi
+    angle = upright(float(np.arctan2(outward[1], outward[0])))
     first = (0.55 + 0.5 * LETTER * len(text)) * size
     for step in range(FAR):
         yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2), step
+
+
+def upright(angle: float) -> float:
+    """The angle [rad] of a text along a line, turned by pi where it would stand on its head."""
+    if LOWEST < angle <= LOWEST + np.pi:
+        return angle
+    return angle + (np.pi if angle < 0 else -np.pi)
 
 
 def boxes_meet(box: Floats, others: Floats) -> bool:

@@ -1,16 +1,17 @@
-"""Pictures of a shell: its rods in space, near ones over far ones, coloured by their gap to the target."""
+"""Pictures of a shape: its rods in space, near ones over far ones, coloured by gap or stress."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.errors import OutputError
-from gridshell.output.archive import GAPS, SHELLS, Archive
+from gridshell.output.archive import SHELLS, Archive
 from gridshell.output.colours import mixed
-from gridshell.output.rods import RodRecord, end_curve, rods_of
-from gridshell.output.scale import FINEST, Scale, colour_bar, scale_of
-from gridshell.output.svg import document, label, number, tag
+from gridshell.output.drawing import Drawing, Pen, Pencil
+from gridshell.output.rods import RodRecord, around, rods_of
+from gridshell.output.scale import FINEST, Colour, Scale, colour_bar, scale_of
+from gridshell.output.shapes import Shape, shape_of
+from gridshell.output.svg import picture_document
 from gridshell.output.view import View, ground_axes
 from gridshell.output.wording import MINUS
 
@@ -28,131 +29,145 @@ FADE = 0.42  # share of paper in the colour of the farthest rods
 
 @dataclass(frozen=True)
 class Pieces:
-    """Parts of rods between two drawn nodes, rod by rod: nodes (s, 2), rod index (s,)."""
+    """Parts of rods between two drawn nodes, rod by rod: entries (s, 2) of `rod_nodes`, rod index (s,)."""
 
-    nodes: Ints
+    entries: Ints
     rod: Ints
 
 
-def picture_svg(archive: Archive, state: str) -> str:
-    """A picture of "flat", "draped", "popped_pinned" or "popped_clamped" as a complete SVG.
+def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
+    """A picture of "flat", "draped", "popped_pinned", "popped_clamped" or "stage_1", ... as a complete SVG.
 
-    All states in space share one view and one colour scale, so that they can be compared.
+    All shapes in space share one view and one colour scale, so that they can be compared.
 
     Raises
     ------
     OutputError : the archive has no such state.
     """
-    known = [name for name in ("flat", *SHELLS) if name in archive.states]
-    if state not in known:
-        raise OutputError(f"no state {state!r} in this result: it has {', '.join(known) or 'none'}")
-    points, rods = np.asarray(archive.states[state], dtype=float), rods_of(archive)
-    seen = [state] if state == "flat" else [name for name in known if name != "flat"]
-    view = View.of(np.concatenate([archive.states[name] for name in seen]), WIDTH)
-    scale = None if state == "flat" else scale_of(archive, state)
+    return picture_document(picture(archive, state, colour))
+
+
+def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
+    """A picture as a drawing in units of about a pixel, y up, on a ground of paper."""
+    shape, rods = shape_of(archive, state), rods_of(archive)
+    points, view = shape.positions, _view(archive, shape)
+    scale = scale_of(archive, shape, colour)
+    pencil = Pencil()
     ends = np.array([rod.nodes[[0, -1]] for rod in rods if len(rod.nodes) > 1], dtype=np.intp).ravel()
     front = view.depth(points[ends]) > 0.5
-    layers, half = _layers(view, points, rods, scale), LAYERS // 2
-    width, height = view.size + (2 * SIDE, TOP + BELOW + (0.0 if scale is None else BAR))
-    return document(
-        (-SIDE, -TOP, width, height),
-        tag("rect", x=-SIDE, y=-TOP, width=width, height=height, fill=PAPER),
-        ground_axes(view, SOFT, 12.5),
-        _ground_curve(view, points[ends]),
-        *layers[:half],
-        _supports(view, points[ends[~front]], state, len(ends)),
-        *layers[half:],
-        _supports(view, points[ends[front]], state, len(ends)),
-        "" if scale is None or GAPS[state] not in archive.states else _largest(archive, state, view, scale),
-        "" if scale is None else colour_bar(scale, WIDTH, float(view.size[1]) + BELOW + BAR - 10, INK, SOFT),
-    )
+    ground_axes(pencil, view, SOFT, 12.5)
+    _ground_curve(pencil, view, points[ends])
+    _rods(pencil, view, shape, rods, scale, range(LAYERS // 2))
+    _supports(pencil, view, points[ends[~front]], state, len(ends))
+    _rods(pencil, view, shape, rods, scale, range(LAYERS // 2, LAYERS))
+    _supports(pencil, view, points[ends[front]], state, len(ends))
+    if colour == "gap" and shape.gap is not None and scale is not None:
+        _largest(pencil, archive, shape, view)
+    if scale is not None:
+        colour_bar(pencil, scale, WIDTH, -float(view.size[1]) - BELOW - BAR + 10)
+    width, height = view.size + (2 * SIDE, TOP + BELOW + (0.0 if shape.flat else BAR))
+    corners = [(-SIDE, TOP), (width - SIDE, TOP), (width - SIDE, TOP - height), (-SIDE, TOP - height)]
+    paper = Pencil()
+    paper.line(corners, "TITLE", closed=True, pen=Pen(PAPER, 0.0, fill=PAPER))
+    return paper.done(state, shape.caption, 12.5) + pencil.done("", "", 12.5)
+
+
+def _view(archive: Archive, shape: Shape) -> View:
+    """One view for all shapes in space, and one for the flat grid; stages spread further than the final shell."""
+    if shape.flat:
+        return View.of(shape.positions, WIDTH)
+    shells = [archive.states[name] for name in SHELLS if name in archive.states]
+    if shape.name not in SHELLS:
+        shells = [*shells, *archive.states["history"]]
+    return View.of(np.concatenate(shells), WIDTH)
 
 
 def _pieces(rods: list[RodRecord]) -> Pieces:
     """At most about SEGMENTS pieces: of finely divided rods, nodes are left out evenly."""
     stride = max(1, -(-sum(len(rod.nodes) for rod in rods) // SEGMENTS))
-    pairs, owner = [np.empty((0, 2), dtype=np.intp)], [np.empty(0, dtype=np.intp)]
+    pairs, owner, first = [np.empty((0, 2), dtype=np.intp)], [np.empty(0, dtype=np.intp)], 0
     for k, rod in enumerate(rods):
-        last = len(rod.nodes) - 1
-        nodes = rod.nodes[np.unique([*range(0, last, stride), last])] if last > 0 else rod.nodes
-        pairs.append(np.column_stack([nodes[:-1], nodes[1:]]))
+        last = max(len(rod.nodes) - 1, 0)
+        entries = first + np.unique([*range(0, last, stride), last])
+        pairs.append(np.column_stack([entries[:-1], entries[1:]]))
         owner.append(np.full(len(pairs[-1]), k))
+        first += len(rod.nodes)
     return Pieces(np.concatenate(pairs), np.concatenate(owner))
 
 
-def _layers(view: View, points: Floats, rods: list[RodRecord], scale: Scale | None) -> list[str]:
-    """The rods in LAYERS groups from far to near, each over a halo of paper that sets it off."""
-    pieces, plane = _pieces(rods), view.project(points)
-    nearness = view.depth(points)[pieces.nodes].mean(axis=1)
+def _rods(pencil: Pencil, view: View, shape: Shape, rods: list[RodRecord], scale: Scale | None, layers: range) -> None:
+    """The rods of some layers from far to near, each layer over a halo of paper that sets it off."""
+    nodes = np.concatenate([np.empty(0, dtype=np.intp), *(rod.nodes for rod in rods)])
+    pieces, plane = _pieces(rods), view.project(shape.positions)[nodes]
+    nearness = view.depth(shape.positions)[nodes[pieces.entries]].mean(axis=1)
     layer = np.minimum((nearness * LAYERS).astype(np.intp), LAYERS - 1)
     if scale is None:
         families = np.array([rod.family == "v" for rod in rods], dtype=np.intp)
-        colour, palette, fade = families[pieces.rod], list(FAMILIES), 0.0
+        colour, palette, fade = families[pieces.rod], list(FAMILIES), 0.0 if shape.flat else FADE
     else:
-        colour = np.rint(scale.bins[pieces.nodes].mean(axis=1)).astype(np.intp)
+        colour = np.rint(scale.bins[pieces.entries].mean(axis=1)).astype(np.intp)
         palette, fade = scale.palette, FADE
     pen = float(np.clip(0.12 * WIDTH / max(len(rods), 1), 0.45, 1.7))
-    groups = []
-    for depth in range(LAYERS):
+    for depth in layers:
         mine = np.flatnonzero(layer == depth)
         near = (depth + 0.5) / LAYERS
         width = pen * (0.75 + 0.4 * near)
-        parts = [tag("path", d=_path(plane, pieces, mine), stroke=PAPER, stroke_width=2.2 * width)]
+        for chain in _chains(pieces, mine):
+            pencil.line(plane[chain], "CUT", pen=Pen(PAPER, 2.2 * width))
         for shade in np.unique(colour[mine]):
             ink = mixed(palette[shade], PAPER, fade * (1 - near) ** 1.3)
-            line = _path(plane, pieces, mine[colour[mine] == shade])
-            parts.append(tag("path", d=line, stroke=ink, stroke_width=width, stroke_linecap="round"))
-        groups.append(tag("g", *parts, fill="none", stroke_linejoin="round") if len(mine) else "")
-    return groups
+            for chain in _chains(pieces, mine[colour[mine] == shade]):
+                pencil.line(plane[chain], "CUT", pen=Pen(ink, width))
 
 
-def _path(plane: Floats, pieces: Pieces, chosen: Ints) -> str:
-    """Path data of the chosen pieces; pieces that follow each other on a rod are one polyline."""
-    words, last = [], -2
-    for piece in chosen.tolist():
-        a, b = pieces.nodes[piece]
-        if piece != last + 1 or pieces.rod[piece] != pieces.rod[last]:
-            words.append(f"M{number(plane[a, 0], 1)} {number(plane[a, 1], 1)}")
-        words.append(f"L{number(plane[b, 0], 1)} {number(plane[b, 1], 1)}")
-        last = piece
-    return "".join(words)
+def _chains(pieces: Pieces, chosen: Ints) -> list[Ints]:
+    """Entries of the chosen pieces; pieces that follow each other on a rod are one polyline."""
+    if not len(chosen):
+        return []
+    apart = (np.diff(chosen) > 1) | (np.diff(pieces.rod[chosen]) != 0)
+    groups = np.split(chosen, np.flatnonzero(apart) + 1)
+    return [np.append(pieces.entries[group, 0], pieces.entries[group[-1], 1]) for group in groups]
 
 
-def _ground_curve(view: View, ends: Floats) -> str:
+def _ground_curve(pencil: Pencil, view: View, ends: Floats) -> None:
     """The boundary: the closed curve through the rods' ends."""
-    if len(ends) < 3:
-        return ""
-    outline = " ".join(f"{number(x, 1)},{number(y, 1)}" for x, y in view.project(end_curve(ends)))
-    return tag("polygon", points=outline, fill=GROUND, stroke=SOFT, stroke_width=1.0, stroke_linejoin="round")
+    if len(ends) > 2:
+        outline = view.project(ends[around(ends)])
+        pencil.line(outline, "BOUNDARY-FINAL", closed=True, pen=Pen(SOFT, 1.0, fill=GROUND))
 
 
-def _supports(view: View, ends: Floats, state: str, count: int) -> str:
+def _supports(pencil: Pencil, view: View, ends: Floats, state: str, count: int) -> None:
     """Some of a shell's `count` rod ends: rings where they turn freely, discs where they are clamped."""
-    if state not in ("popped_pinned", "popped_clamped") or not len(ends):
-        return ""
+    if state in ("flat", "draped"):
+        return
     radius = float(np.clip(200 / count, 0.6, 2.6))
     fill = INK if state == "popped_clamped" else PAPER
-    dots = [tag("circle", cx=x, cy=y, r=radius) for x, y in view.project(ends)]
-    return tag("g", *dots, fill=fill, stroke=INK, stroke_width=0.4 * radius)
+    for at in view.project(ends):
+        _dot(pencil, at, radius, Pen(INK, 0.4 * radius, fill=fill))
 
 
-def _largest(archive: Archive, state: str, view: View, scale: Scale) -> str:
+def _dot(pencil: Pencil, at: Floats, radius: float, pen: Pen) -> None:
+    """A disc as a path: marks come after all paths, and rods in front must cover it."""
+    angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    circle = at + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    pencil.line(circle, "MARK", closed=True, pen=pen)
+
+
+def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None:
     """A ring around the largest gap, and its size: the agreement's own, which also looks between the nodes."""
-    points, gaps = archive.states[state], np.nan_to_num(scale.values)
+    assert shape.gap is not None
+    points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
     place, gap = points[int(np.argmax(np.abs(gaps)))], float(gaps[int(np.argmax(np.abs(gaps)))])
-    found = (archive.result.get("agreement") or {}).get(state.removeprefix("popped_")) or {}
+    found = (archive.result.get("agreement") or {}).get(shape.name.removeprefix("popped_")) or {}
     if found.get("where") is not None and found.get("max") is not None:
         place = np.array(found["where"], dtype=float)
         nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
         gap = float(np.copysign(1e3 * found["max"], gaps[nearest]))
     if abs(gap) <= FINEST:
-        return ""
+        return
     x, y = view.project(place[None])[0]
-    side, anchor = (-1, "end") if x > view.size[0] / 2 else (1, "start")
+    side = -1 if x > view.size[0] / 2 else 1
     text = f"{gap:+.3g} mm".replace("-", MINUS)
-
-    def words(**paint: str) -> str:
-        return label(text, x + 9 * side, y - 7, 13, text_anchor=anchor, font_weight="600", **paint)
-
-    ring = tag("circle", cx=x, cy=y, r=6.0, fill="none", stroke=INK, stroke_width=1.1)
-    return ring + words(fill=PAPER, stroke=PAPER, stroke_width="4", stroke_linejoin="round") + words(fill=INK)
+    _dot(pencil, np.array([x, y]), 6.0, Pen(INK, 1.1))
+    anchor = "end" if side < 0 else "start"
+    pencil.write(text, (x + 9 * side, y + 7), 13.0, "TITLE", anchor=anchor, bold=True, halo=PAPER)

@@ -1,4 +1,4 @@
-"""The flat plan: what its drawings show, in millimetres."""
+"""The flat plan's content in millimetres, and round numbers for its axes."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.output.archive import Archive
-from gridshell.output.labels import Label, place
-from gridshell.output.rods import JointRecord, RodRecord, end_curve, joints_of, rods_of
+from gridshell.output.rods import JointRecord, RodRecord, around, joints_of, rods_of
 
 Floats = NDArray[np.float64]
 
@@ -22,16 +21,19 @@ class FlatPlan:
     Parameters
     ----------
     rods, joints : as in the result [m].
-    lines : (r, 2, 2) start and end of each rod [mm].
+    lines : (r, 2, 2) start and end of each rod on the footprint [mm].
+    cuts : (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
     marks : (c, 2) the joints, in the order of `joints` [mm].
     footprint : (f, 2) closed curve through the rod ends [mm].
-    boundary : (g, 3) closed curve through the final rod ends [mm]; empty if there is none.
+    boundary : (f, 3) closed curve through the final rod ends [mm], vertex by vertex those of `footprint`; empty if
+        there is none.
     """
 
     name: str
     rods: list[RodRecord]
     joints: list[JointRecord]
     lines: Floats
+    cuts: Floats
     marks: Floats
     footprint: Floats
     boundary: Floats
@@ -50,18 +52,14 @@ class FlatPlan:
         return float(1e3 * np.median(known)) if len(known) else self.extent / 10
 
     @cached_property
-    def text_size(self) -> float:
-        """Of the rods' labels [mm]: labels of neighbouring rods stand clear of each other."""
-        return min(0.5 * self.spacing, 0.02 * self.extent)
-
-    @cached_property
-    def labels(self) -> list[Label]:
-        return place([rod.id for rod in self.rods], self.lines, self.text_size)
+    def text(self) -> float:
+        """Size of the rods' labels at 1:1 [mm]: labels of neighbouring rods stand clear of each other."""
+        return min(0.4 * self.spacing, 0.015 * self.extent)
 
     @cached_property
     def summary(self) -> str:
         """The cut list in one line."""
-        lengths = [1e3 * rod.length for rod in self.rods]
+        lengths = [1e3 * rod.cut_length for rod in self.rods]
         return (
             f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths) / 1e3:.2f} m in total, "
             f"longest {max(lengths, default=0):.1f} mm"
@@ -73,13 +71,14 @@ def flat_plan(archive: Archive) -> FlatPlan:
     rods = rods_of(archive)
     joints = joints_of(rods)
     lines = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
+    cuts = np.array([[rod.point(-rod.allowance), rod.point(rod.length + rod.allowance)] for rod in rods])
     marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
     footprint = np.array(archive.result.get("footprint") or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
     boundary = np.array(archive.result.get("boundary") or [], dtype=float).reshape(-1, 3)
+    order = around(footprint)
     return FlatPlan(
-        archive.name, rods, joints, 1e3 * lines, 1e3 * marks,
-        1e3 * (end_curve(footprint) if len(footprint) else footprint),
-        1e3 * (end_curve(boundary) if len(boundary) else boundary),
+        archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks, 1e3 * footprint[order],
+        1e3 * boundary[order] if len(boundary) == len(footprint) else np.empty((0, 3)),
     )  # fmt: skip
 
 

@@ -1,23 +1,29 @@
 """The report: one page that needs nothing else, neither files nor a network."""
 
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
 from gridshell.output.archive import SHELLS, Archive
-from gridshell.output.figures import key_figures, levels_table, rods_table, supports_table
+from gridshell.output.drawing import Drawing
+from gridshell.output.figures import checks_table, key_figures, levels_table, supports_table
 from gridshell.output.pictures import picture_svg
 from gridshell.output.plan import NOTE, FlatPlan
-from gridshell.output.plansvg import plan_svg
-from gridshell.output.svg import inline
+from gridshell.output.schedules import Table, rods_table, stock_table
+from gridshell.output.schedules import joints_table as joints
+from gridshell.output.schedules import supports_table as supports
+from gridshell.output.shapes import CAPTIONS
+from gridshell.output.svg import drawing_svg, inline
 from gridshell.output.verdict import verdict
+from gridshell.output.viewer import viewer_json
 
-CAPTIONS = {
-    "flat": "Flat, as cut and laid out",
-    "draped": "Draped on the target",
-    "popped_pinned": "Popped up, pinned ends (free to turn)",
-    "popped_clamped": "Popped up, clamped ends (directions held)",
-}
+IN_PAGE = ("supports", "elevations", "erection")
+FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
+NOT_FOLLOWED = "The way up from flat was not followed: nothing is known between these shapes."
 
 
-def report_html(archive: Archive, plan: FlatPlan) -> str:
-    """The whole page; `plan` is the archive's."""
+def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing]) -> str:
+    """The whole page; `plan` and `drawings` are the archive's."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -28,8 +34,12 @@ def report_html(archive: Archive, plan: FlatPlan) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+
+    def shown(svg: str) -> Markup:
+        return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
+
     result = archive.result
-    shown = [state for state in CAPTIONS if state in archive.states]
+    states = [state for state in CAPTIONS if state in archive.states and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,
         note=NOTE,
@@ -37,15 +47,48 @@ def report_html(archive: Archive, plan: FlatPlan) -> str:
         warnings=[str(word) for word in result.get("warnings") or []],
         verdict=verdict(archive),
         dropped=result.get("dropped") or [],
+        view=_view(archive),
         supports=supports_table(result),
-        # the SVG is ours, its texts are escaped where it is made
-        pictures=[(CAPTIONS[state], Markup(inline(picture_svg(archive, state)))) for state in shown],
-        one_scale=sum(state in SHELLS for state in shown) > 1,
+        checks=checks_table(result),
+        pictures=[(CAPTIONS[state], shown(picture_svg(archive, state))) for state in states],
+        one_scale=sum(state in SHELLS for state in states) > 1,
         figures=key_figures(result, plan),
         levels=levels_table(result),
-        plan=Markup(inline(plan_svg(plan))),
-        rods=rods_table(plan),
+        plan=shown(drawing_svg(drawings["plan"])),
+        drawings=[(drawings[name].title, shown(drawing_svg(drawings[name]))) for name in IN_PAGE if name in drawings],
+        tables=_tables(archive),
         case=archive.case_toml,
         version=str(result.get("version_gridshell") or "unknown"),
+        versions=", ".join(f"{name} {number}" for name, number in (result.get("versions") or {}).items()),
         format_version=str(result.get("version") or "unknown"),
     )
+
+
+def _view(archive: Archive) -> dict[str, Any] | None:
+    """The 3D view's data and script; what they hold cannot end a script element."""
+    from markupsafe import Markup
+
+    data = viewer_json(archive)
+    if data is None:
+        return None
+    script = files("gridshell.output").joinpath("templates/view.js").read_text(encoding="utf-8")
+    return {
+        "data": Markup(data),
+        "script": Markup(script),
+        "frames": data.count('"places":'),
+        "colours": [kind for kind in ("stress", "gap") if f'"{kind}":{{' in data],
+        "note": FOLLOWED if "history" in archive.states else NOT_FOLLOWED,
+    }
+
+
+def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
+    """Title, table and note of the schedules in the page."""
+    tables = [
+        ("Rods", rods_table(archive, brief=True), "Where each joint is on its rods: schedule/rods.csv, joints.csv."),
+        ("Joints", joints(archive, brief=True), "Named by the rods that meet, a/b. Final: in the popped-up shell."),
+    ]
+    if archive.result.get("boundary"):
+        tables.append(("Supports", supports(archive, brief=True), "With reactions: schedule/supports.csv."))
+    if (archive.result.get("fabrication") or {}).get("stock"):
+        tables.append(("Stock", stock_table(archive), "First fit decreasing."))
+    return tables

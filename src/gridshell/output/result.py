@@ -1,7 +1,9 @@
 """From the stages of a job to what is kept of it: result.json and states.npz."""
 
+from dataclasses import asdict
 from importlib.metadata import version
 from math import degrees
+from platform import python_version
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 
 from gridshell.formfinding import Agreement, Footprint, FoundForm, Popped, PoppedTable
 from gridshell.formfinding.bound import shape_of_net
+from gridshell.joints import joint_parameters
 from gridshell.rods.section import Rod
 from gridshell.solve.report import SolveReport
 
@@ -32,6 +35,8 @@ def form_result(form: FoundForm) -> dict[str, Any]:
         "min_angle_at": list(draped.min_angle_at),
         "contact_pulls": draped.pulls,
     }
+    if draped.rest is not None:
+        drape["fall"] = asdict(draped.rest)
     if draped.own_ends is not None:
         drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
     return {
@@ -39,8 +44,10 @@ def form_result(form: FoundForm) -> dict[str, Any]:
         "target": {**form.target.parameters(), "reference_size": form.target.size},
         "layout": form.layout.parameters(),
         "rod": _rod(form.rod),
+        "joint": joint_parameters(form.joint),
         **({"net": shape_of_net(draped.net)} if draped.net is not None else {}),
         **_grid(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
+        "end_tangents": form.trimmed.boundary.tangents,
         "agreement": {ends: _agreement(gap) for ends, gap in form.agreement.items()},
         "drape": drape,
         "pop_up": {ends: _popped(shell) for ends, shell in form.popped.items()},
@@ -86,6 +93,7 @@ def _head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
         "version": 1,
         "units": "SI",
         "version_gridshell": version("gridshell"),
+        "versions": {"python": python_version(), **{name: version(name) for name in ("numpy", "scipy", "numba")}},
         "name": name,
         "status": status,
         "warnings": list(warnings),
@@ -120,10 +128,11 @@ def _grid(footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tu
 
 
 def _rod(rod: Rod) -> dict[str, Any]:
+    first, second = rod.bend_stiffnesses
     return {
         **rod.parameters(),
         "EA": rod.stretch_stiffness,
-        "EI": rod.bend_stiffness,
+        **({"EI": first} if first == second else {"EI1": first, "EI2": second}),
         "GJ": rod.twist_stiffness,
         "mass_per_length": rod.mass_per_length,
     }

@@ -1,6 +1,7 @@
 """The rods and joints of a result, with their flat geometry."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ class RodRecord:
     flat : (2, 2) x, y of its two ends in the flat state [m].
     nodes : (k,) its nodes in the states, from start to end; empty if the states do not hold them.
     joints : (id of the rod that is met, distance from the start [m]) of each joint.
+    more : what else the result says of it: cut_length, mass, layer, splices, min_radius, ...
     """
 
     id: str
@@ -31,6 +33,22 @@ class RodRecord:
     flat: Floats
     nodes: NDArray[np.intp]
     joints: tuple[tuple[str, float], ...]
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def cut_length(self) -> float:
+        """With its end allowances [m]."""
+        return float(self.more.get("cut_length", self.length))
+
+    @property
+    def allowance(self) -> float:
+        """By which it goes on past each end [m]."""
+        return 0.5 * (self.cut_length - self.length)
+
+    @property
+    def layer(self) -> int | None:
+        """1 the lowest; None where it is not known."""
+        return self.more.get("layer")
 
     def point(self, at: float) -> Floats:
         """x, y [m] of the flat point at the distance `at` from the start."""
@@ -45,6 +63,13 @@ class JointRecord:
     rods: tuple[int, int]
     at: tuple[float, float]
     id: str
+
+    def over(self, rods: list[RodRecord]) -> str:
+        """The id of the rod that lies above, or "" where the layers are not known."""
+        low, high = (rods[k] for k in self.rods)
+        if low.layer is None or high.layer is None:
+            return ""
+        return low.id if low.layer > high.layer else high.id
 
 
 def rods_of(archive: Archive) -> list[RodRecord]:
@@ -69,10 +94,24 @@ def joints_of(rods: list[RodRecord]) -> list[JointRecord]:
     ]
 
 
-def end_curve(points: Floats) -> Floats:
-    """The points (n, 2 or 3) in the order of their angle about the middle, seen from above."""
+def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
+    """Place (3,) [m] in a shape (n, 3) of each joint that has a node there, by its id."""
+    rods, flat = rods_of(archive), archive.states.get("flat")
+    places = dict[str, Floats]()
+    for joint in joints_of(rods):
+        rod, at = rods[joint.rods[0]], joint.at[0]
+        if flat is not None and len(rod.nodes):
+            stations = np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[0]], axis=1)
+            places[joint.id] = positions[rod.nodes[int(np.abs(stations - at).argmin())]]
+    return places
+
+
+def around(points: Floats) -> NDArray[np.intp]:
+    """The order (n,) of points (n, 2 or 3) by their angle about the middle, seen from above."""
+    if not len(points):
+        return np.empty(0, dtype=np.intp)
     x, y = (points[:, :2] - points[:, :2].mean(axis=0)).T
-    return np.asarray(points[np.argsort(np.arctan2(y, x), kind="stable")])
+    return np.argsort(np.arctan2(y, x), kind="stable")
 
 
 def _nodes(archive: Archive) -> list[NDArray[np.intp]]:
@@ -103,4 +142,5 @@ def _record(entry: dict[str, Any], nodes: NDArray[np.intp], flat: Floats | None)
         ends,
         nodes,
         joints,
+        entry,
     )

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from gridshell.output.wording import stress
+
 
 def summary_text(result: dict[str, Any]) -> str:
     """What was found, how good it is, and what to read first."""
@@ -29,11 +31,30 @@ def summary_text(result: dict[str, Any]) -> str:
             line += f"; gap max {_mm(gap['max'])} ({_percent(gap['max_relative'])}), "
             line += f"rms {_mm(gap['rms'])} ({_percent(gap['rms_relative'])})"
         lines.append(line)
+    lines += _checked(result)
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
     if len(result["dropped"]) > 6:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
     lines += [f"  WARNING   {warning}" for warning in result["warnings"]]
     return "\n".join(lines)
+
+
+def _checked(result: dict[str, Any]) -> list[str]:
+    """Bending and reactions, in a line each."""
+    lines = []
+    for place, bent in result.get("bending", {}).items():
+        if isinstance(bent, dict) and bent.get("min_radius") is not None:
+            name = "way up" if place == "pop_up" else place
+            line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}"
+            if bent.get("max_stress") is not None:
+                line += f", largest stress {stress(bent['max_stress'])}"
+            if bent.get("utilisation") is not None:
+                line += f", {_percent(bent['utilisation'])} of the strength"
+            lines.append(line)
+    for ends, held in result.get("reactions", {}).items():
+        sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
+        lines.append(f"  reactions {ends:<8}largest {held['largest_force']:.3g} N; sums of {sums}")
+    return lines
 
 
 def _mm(metres: float) -> str:

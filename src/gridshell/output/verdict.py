@@ -27,11 +27,14 @@ def verdict(archive: Archive) -> Verdict:
     """The verdict on an archive."""
     result = archive.result
     failed, unstable = _failed(result), _unstable(result)
-    sentences = [*failed, *unstable, *_gaps(result)]
+    used = _utilisation(result)
+    sentences = [*failed, *unstable, *_gaps(result), *_strength(result, used)]
     if failed:
         return Verdict("bad", "Not converged: do not build from these drawings", sentences)
     if unstable:
         return Verdict("caution", "Converged, but not stable with every kind of support", sentences)
+    if used is not None and used > 1:
+        return Verdict("bad", "Converged, but the rods would break", sentences)
     known = [entry.get("stable") for entry in entries(result, "pop_up").values()]
     if not known:
         return Verdict("caution", "Not checked: there is no pop-up in this result", sentences)
@@ -77,6 +80,26 @@ def _gaps(result: Mapping[str, Any]) -> list[str]:
         words.append(_advice(gaps["clamped"], gaps["pinned"]))
     elif shells and not result.get("target"):
         words.append("There is no target in this result, so there is no gap to tell.")
+    return words
+
+
+def _utilisation(result: Mapping[str, Any]) -> float | None:
+    """The largest of all shapes, the way up included; None where no strength was given."""
+    bent = (result.get("bending") or {}).values()
+    known = [entry["utilisation"] for entry in bent if isinstance(entry, dict) and entry.get("utilisation") is not None]
+    return max(known, default=None)
+
+
+def _strength(result: Mapping[str, Any], used: float | None) -> list[str]:
+    """How much of the strength is used, and whether the way up is smooth."""
+    words = []
+    if used is not None:
+        words.append(f"The rods use {percent(used)} of their strength at most, the way up included.")
+    elif result.get("bending"):
+        words.append("No strength was given, so it is not known whether the rods hold (checks.strength).")
+    way = result.get("deployment") or {}
+    if way and not way.get("snaps") and way.get("lost_at") is None:
+        words.append("On the way up from flat the shell moves smoothly, as far as its stages tell.")
     return words
 
 

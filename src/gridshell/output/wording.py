@@ -7,6 +7,7 @@ from typing import Any
 UNKNOWN = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
+PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of the case, by its key
     **dict.fromkeys(
         ("radius", "height", "base", "size", "reference_size", "a", "b", "c", "spacing", "length"), (1e3, "mm")
@@ -39,11 +40,23 @@ def millimetres(metres: float | None, digits: int = 3) -> str:
 
 def percent(share: float | None) -> str:
     """A share as a percentage with two significant digits."""
-    return UNKNOWN if share is None or not isfinite(share) else f"{100 * share:.2g} %"
+    if share is None or not isfinite(share):
+        return UNKNOWN
+    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
 def newtons(force: float) -> str:
-    return f"{force:.1e} N"
+    return f"{force:.3g} N"
+
+
+def newton_metres(moment: float) -> str:
+    return f"{moment:.3g} N m"
+
+
+def stress(pascals: float) -> str:
+    """A stress [Pa] in a unit of its size."""
+    unit, name = next((one for one in PRESSURES if abs(pascals) >= one[0]), PRESSURES[-1])
+    return f"{pascals / unit:.3g} {name}"
 
 
 def seconds(time: float) -> str:

@@ -1,0 +1,221 @@
+"""A drawing: paths, marks and texts on named layers, in mm, y up. DXF, SVG, PDF and PNG are written from it."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Anchor = Literal["start", "middle", "end"]
+
+INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
+LETTER = 0.62  # width of a capital or digit over the text size
+LINE = 0.95  # height of a line of text over its size, a little air included,
+BELOW = 0.2  # of which this much is below its baseline
+
+
+@dataclass(frozen=True)
+class Layer:
+    """How a layer looks: colour, pen [mm of paper], and AutoCAD's number of the colour."""
+
+    colour: str
+    pen: float
+    number: int
+    dash: tuple[float, ...] = ()
+
+
+LAYERS = {
+    "CUT": Layer(INK, 0.35, 7),
+    "MARK": Layer("#b3372c", 0.18, 1),
+    "LABEL": Layer(INK, 0.13, 3),
+    "BOUNDARY-FLAT": Layer("#8f8a7c", 0.25, 5, (3.0, 1.5)),
+    "BOUNDARY-FINAL": Layer("#1f5f8b", 0.25, 6),
+    "DIM": Layer(SOFT, 0.13, 8),
+    "TITLE": Layer(INK, 0.18, 7),
+}
+
+
+@dataclass(frozen=True)
+class Pen:
+    """A look of its own: colour, width [mm], dashes [mm], and a colour to fill the inside with."""
+
+    colour: str
+    width: float
+    dash: tuple[float, ...] = ()
+    fill: str = ""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A polyline (k, 2), or (k, 3) in space, which only DXF shows. `name` says what it is, `note` tells more."""
+
+    points: Floats
+    layer: str
+    closed: bool = False
+    pen: Pen | None = None
+    name: str = ""
+    note: str = ""
+
+    @property
+    def flat(self) -> bool:
+        return self.points.shape[1] == 2
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A circle around a place (2,)."""
+
+    at: Floats
+    radius: float
+    layer: str
+    pen: Pen | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Text:
+    """One line of text: its baseline starts, is centred or ends at a place (2,), turned by `angle` [rad].
+
+    A `halo` of another colour sets it off against lines behind it.
+    """
+
+    text: str
+    at: Floats
+    size: float
+    layer: str
+    anchor: Anchor = "start"
+    angle: float = 0.0
+    bold: bool = False
+    colour: str = ""
+    halo: str = ""
+
+    def box(self) -> Floats:
+        """(4, 2) corners of the room that it takes, by the width of a broad letter."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> Floats:
+        width = LETTER * self.size * len(self.text)
+        left = {"start": 0.0, "middle": -0.5, "end": -1.0}[self.anchor] * width
+        low, high = -BELOW * self.size, (LINE - BELOW) * self.size
+        corners = np.array([[left, low], [left + width, low], [left + width, high], [left, high]])
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        return np.asarray(self.at + corners @ np.array([[c, s], [-s, c]]))
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing.
+
+    Parameters
+    ----------
+    text : usual size of its texts [mm]; pens are as wide as on paper with texts of 2 mm.
+    """
+
+    name: str
+    title: str
+    text: float
+    paths: tuple[Path, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    texts: tuple[Text, ...] = ()
+
+    def pen(self, item: Path | Mark) -> Pen:
+        """The item's own pen, or that of its layer."""
+        layer, wide = LAYERS[item.layer], 0.5 * self.text
+        return item.pen or Pen(layer.colour, wide * layer.pen, tuple(wide * dash for dash in layer.dash))
+
+    def box(self) -> tuple[Floats, Floats]:
+        """Lowest and highest x and y of all that is in the plane (2,), (2,)."""
+        parts = [np.zeros((0, 2)), *(path.points for path in self.paths if path.flat)]
+        parts += [(mark.at + side * mark.radius)[None] for mark in self.marks for side in (-1.0, 1.0)]
+        parts += [text.box() for text in self.texts]
+        cloud = np.concatenate(parts)
+        return (cloud.min(axis=0), cloud.max(axis=0)) if len(cloud) else (np.zeros(2), np.ones(2))
+
+    def placed(self, scale: float, shift: Floats) -> "Drawing":
+        """Scaled about the origin, then shifted (2,); own pens and texts too. Paths in space are left out."""
+        return replace(
+            self,
+            text=scale * self.text,
+            paths=tuple(
+                replace(path, points=scale * path.points + shift, pen=_scaled(path.pen, scale))
+                for path in self.paths if path.flat
+            ),
+            marks=tuple(
+                replace(mark, at=scale * mark.at + shift, radius=scale * mark.radius, pen=_scaled(mark.pen, scale))
+                for mark in self.marks
+            ),
+            texts=tuple(replace(text, at=scale * text.at + shift, size=scale * text.size) for text in self.texts),
+        )  # fmt: skip
+
+    def clipped(self, low: Floats, high: Floats) -> "Drawing":
+        """What is inside a rectangle; marks and texts that cross its border are left out."""
+        paths = [
+            replace(path, points=part, closed=False)
+            for path in self.paths
+            for part in _inside(np.vstack([path.points, path.points[:1]]) if path.closed else path.points, low, high)
+        ]
+        marks = (m for m in self.marks if np.all(m.at - m.radius >= low) and np.all(m.at + m.radius <= high))
+        texts = (t for t in self.texts if np.all(t.box() >= low) and np.all(t.box() <= high))
+        return replace(self, paths=tuple(paths), marks=tuple(marks), texts=tuple(texts))
+
+    def __add__(self, other: "Drawing") -> "Drawing":
+        """This one with the other's content on top."""
+        return replace(
+            self, paths=self.paths + other.paths, marks=self.marks + other.marks, texts=self.texts + other.texts
+        )
+
+
+@dataclass
+class Pencil:
+    """Collects the parts of a drawing."""
+
+    paths: list[Path] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
+    texts: list[Text] = field(default_factory=list)
+
+    def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
+        self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
+
+    def mark(self, at: Iterable[float], radius: float, layer: str, **look: object) -> None:
+        self.marks.append(Mark(np.array(at, dtype=float), radius, layer, **look))  # type: ignore[arg-type]
+
+    def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
+        self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
+
+    def done(self, name: str, title: str, text: float) -> Drawing:
+        return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts))
+
+
+def _scaled(pen: Pen | None, scale: float) -> Pen | None:
+    return pen and replace(pen, width=scale * pen.width, dash=tuple(scale * dash for dash in pen.dash))
+
+
+def _inside(points: Floats, low: Floats, high: Floats) -> Iterator[Floats]:
+    """The pieces of a polyline (k, 2) inside a rectangle [Liang and Barsky 1984]."""
+    piece: list[Floats] = []
+    for a, b in pairwise(points):
+        enter, leave = 0.0, 1.0
+        for slope, room in zip(np.append(a - b, b - a), np.append(a - low, high - a), strict=True):
+            if slope == 0:
+                enter = enter if room >= 0 else 2.0
+            elif slope < 0:
+                enter = max(enter, room / slope)
+            else:
+                leave = min(leave, room / slope)
+        if enter > leave:
+            continue
+        if enter > 0 or not piece:
+            if len(piece) > 1:
+                yield np.array(piece)
+            piece = [a + enter * (b - a)]
+        piece.append(a + leave * (b - a))
+        if leave < 1:
+            yield np.array(piece)
+            piece = []
+    if len(piece) > 1:
+        yield np.array(piece)

@@ -1,0 +1,1 @@
+"""The shell in space for other programs: polylines, swept rods, time series. All in metres."""

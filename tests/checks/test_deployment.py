@@ -1,0 +1,107 @@
+"""The way up from flat: equilibria, found the other way round too, and snaps that are said."""
+
+import numpy as np
+import pytest
+from shells import ROD, dome, wave
+
+import gridshell as gs
+from gridshell.checks import Deployment, check, deploy
+from gridshell.checks import deployment as module
+from gridshell.checks.deployment import laid_out
+from gridshell.formfinding.trim import Boundary
+
+
+def deployed(form: gs.Form, stages: int = 4) -> Deployment:
+    shell = form.popped["pinned"]
+    return deploy(shell.shell, shell.state, shell.forces, stages=stages)
+
+
+def test_it_begins_flat_and_ends_in_the_popped_shell() -> None:
+    way, form = deployed(dome()), dome()
+    assert way.share.tolist() == [0.0, 0.0625, 0.25, 0.5625, 1.0]
+    assert way.snaps == ()
+    assert way.lost_at is None
+    np.testing.assert_allclose(way.positions[-1], form.popped["pinned"].positions, atol=1e-8)
+    assert np.ptp(way.positions[0][:, 2]) == 0
+    mesh = form.footprint.mesh
+    lengths = [np.linalg.norm(np.diff(one[mesh.edges], axis=1), axis=2).ravel() for one in way.positions]
+    np.testing.assert_allclose(lengths[0], mesh.edge_lengths, rtol=1e-12)
+    assert np.all(np.diff([np.ptp(one[:, 2]) for one in way.positions]) > 0)
+
+
+def test_ends_move_straight() -> None:
+    way = deployed(dome())
+    ends = way.positions[:, dome().footprint.mesh.ends.ravel()]
+    for share, places in zip(way.share, ends, strict=True):
+        np.testing.assert_allclose(places, (1 - share) * ends[0] + share * ends[-1], atol=1e-12)
+
+
+def test_a_stage_is_what_a_pop_up_from_flat_finds_there() -> None:
+    """The other way round, with another start: the ends stop halfway, the grid rises from an arch."""
+    way = deployed(dome())
+    share, stage = way.share[3], way.positions[3]
+    mesh = dome().footprint.mesh
+    points = stage[mesh.ends.ravel()]
+    risen = gs.pop_up(dome().footprint, Boundary(points, np.zeros_like(points)), ROD, ends="pinned", start="flat")
+    assert risen.report.converged
+    assert share == 0.5625
+    np.testing.assert_allclose(risen.positions, stage, atol=1e-6)  # two solves to a step of 1e-6 of the size
+
+
+def test_stages_do_not_depend_on_their_number() -> None:
+    few, many = deployed(dome(), 4), deployed(dome(), 8)
+    np.testing.assert_allclose(few.positions, many.positions[::2], atol=1e-7)
+
+
+def test_a_shell_that_snaps_is_said_to() -> None:
+    way = deployed(wave(), 8)
+    assert way.snaps
+    assert all(0 <= low < high <= 1 for low, high in way.snaps)
+    assert all("snaps" in word and "pushed" in word for word in way.warnings)
+
+
+def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    follow, calls = module.follow, []
+
+    def fails_later(*args: object, **kwargs: object) -> object:
+        calls.append(1)
+        found = follow(*args, **kwargs)  # type: ignore[arg-type]
+        if len(calls) > 3:  # settled, gone to 56 %, and up again to see whether the path folds there
+            from dataclasses import replace
+
+            from gridshell.solve.report import Status
+
+            return replace(found, report=replace(found.report, status=Status.STALLED))
+        return found
+
+    monkeypatch.setattr(module, "follow", fails_later)
+    way = deployed(dome())
+    assert way.share.tolist() == [0.0, 0.5625, 1.0]
+    assert len(way.positions) == 3
+    assert way.lost_at == 0.5625
+    assert way.warnings == ("the way from flat could not be followed below 56 %: stages are missing",)
+
+
+def test_the_worst_bend_may_be_on_the_way() -> None:
+    """The wave ends flatter than it is on its way: the final state alone would hide it."""
+    form = wave()
+    checks = check(form.popped, ROD, stages=8)
+    final = checks.bending["pinned"].curvature.max()
+    assert max(bent.curvature.max() for bent in checks.on_the_way) > 1.5 * final
+
+
+def test_no_stages_no_deployment() -> None:
+    form = dome()
+    checks = check(form.popped, ROD, stages=0)
+    assert checks.deployment is None
+    assert set(checks.bending) == {"pinned", "clamped"}
+
+
+def test_the_flat_grid_is_laid_under_the_shell_whichever_way_that_is_turned() -> None:
+    """A shell that is the flat grid itself, turned, moved and lifted, lies right over it."""
+    mesh, angle = dome().footprint.mesh, 0.7
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    there = mesh.flat @ turn.T + np.array([3.0, -2.0, 0.5])
+    np.testing.assert_allclose(laid_out(mesh.flat, mesh.ends.ravel(), there), there, atol=1e-12)
+    there[mesh.ends.ravel()[::2], 2] += 0.1  # starts higher than ends: the ground is at the lowest
+    np.testing.assert_allclose(laid_out(mesh.flat, mesh.ends.ravel(), there)[:, 2], 0.5, atol=1e-12)

@@ -1,0 +1,289 @@
+"""The drawing set: true to scale, on sheets that match, with labels that never cover each other."""
+
+import re
+import zlib
+from itertools import pairwise
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+from dxf_reader import read_dxf
+from forms import TARGETS, archive, wished
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from sample_archive import sample_archive, table_archive
+
+from gridshell.errors import InputError
+from gridshell.output import Archive
+from gridshell.output.archive import export
+from gridshell.output.drawing import Drawing, Pencil, Text
+from gridshell.output.drawing import Path as Line
+from gridshell.output.drawings import drawing_set, sheet_set
+from gridshell.output.drawings.flat import diagonals, flat_drawing
+from gridshell.output.drawings.sheets import OVERLAP, SCALES, TEXT, fitted, room, tiled
+from gridshell.output.labels import boxes_meet, spread
+from gridshell.output.plan import flat_plan
+from gridshell.output.schedules import rods_table
+from gridshell.output.takeaway import DrawingStyle, Takeaway
+
+PAPER = (420.0, 297.0)  # A3
+ARCHIVES = [*TARGETS, "wished", "sample", "table"]
+
+
+def named(name: str) -> Archive:
+    others = {"wished": wished, "sample": sample_archive, "table": table_archive}
+    return others[name]() if name in others else archive(name)
+
+
+def covered(drawing: Drawing) -> list[tuple[str, str]]:
+    """Pairs of texts of a drawing that cover each other."""
+    boxes = np.array([text.box() for text in drawing.texts]).reshape(-1, 4, 2)
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    found = []
+    for k, text in enumerate(drawing.texts):
+        near = k + 1 + np.flatnonzero(np.all((low[k + 1 :] < high[k]) & (high[k + 1 :] > low[k]), axis=1))
+        found += [
+            (text.text, drawing.texts[j].text)
+            for j in near
+            if boxes_meet(0.999 * boxes[k] + 0.001 * boxes[k].mean(0), boxes[j][None])
+        ]
+    return found
+
+
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
+    plan = flat_plan(named(name))
+    for drawing in drawing_set(named(name), plan).values():
+        assert covered(drawing) == [], drawing.name
+
+
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_labels_of_no_sheet_cover_each_other(name: str) -> None:
+    sheets, paper = sheet_set(named(name), flat_plan(named(name)))
+    for sheet in sheets:
+        assert covered(sheet) == [], sheet.title
+        low, high = sheet.box()
+        assert np.all(low >= 0)
+        assert np.all(high <= paper)
+
+
+def test_the_check_sees_labels_that_cover_each_other() -> None:
+    pencil = Pencil()
+    pencil.write("U01", (0, 0), 10, "LABEL")
+    pencil.write("V01", (12, 3), 10, "LABEL", angle=0.5)
+    pencil.write("V02", (12, 30), 10, "LABEL")
+    assert covered(pencil.done("", "", 10)) == [("U01", "V01")]
+
+
+@pytest.mark.parametrize("name", ["dome", "ridge"])
+def test_every_rod_and_joint_is_labelled_on_the_plan(name: str) -> None:
+    plan = flat_plan(archive(name))
+    texts = {text.text for text in flat_drawing(plan, plan.text).texts}
+    assert {rod.id for rod in plan.rods} | {joint.id for joint in plan.joints} <= texts
+
+
+def pdf_pages(data: bytes) -> list[str]:
+    """What each page draws."""
+    streams = re.findall(rb"/FlateDecode >>\nstream\n(.*?)\nendstream", data, re.DOTALL)
+    return [zlib.decompress(stream).decode("cp1252") for stream in streams]
+
+
+def test_pdf_is_true_to_scale(tmp_path: Path) -> None:
+    """The longest strip of the first strip sheet, in points of the page, is the rod over the sheet's scale."""
+    dome = archive("dome")
+    export(dome, tmp_path, ["pdf"])
+    data = (tmp_path / "drawings/drawings.pdf").read_bytes()
+    sheets, paper = sheet_set(dome, flat_plan(dome))
+    assert len(pdf_pages(data)) == len(sheets) == data.count(b"/Type /Page ")
+    box = re.search(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", data)
+    assert box is not None
+    np.testing.assert_allclose([float(side) / 72 * 25.4 for side in box.groups()], paper, atol=1e-3)
+    page = next(text for text in pdf_pages(data) if "Rod strips" in text)
+    scale = float(re.search(r"\(Scale 1:([\d.]+)\)", page)[1])  # type: ignore[index]
+    assert page.startswith("2.834646 0 0 2.834646 0 0 cm")  # so that what follows is in mm
+    lines = re.findall(r"^([\d.]+) ([\d.]+) m ([\d.]+) ([\d.]+) l S$", page, re.MULTILINE)
+    lengths = [float(x1) - float(x0) for x0, y0, x1, y1 in lines if y0 == y1]
+    for rod in flat_plan(dome).rods[:8]:
+        assert np.abs(np.array(lengths) - 1e3 * rod.cut_length / scale).min() < 2e-3  # mm of paper
+
+
+def test_pdf_opens_in_another_reader(tmp_path: Path) -> None:
+    pypdf = pytest.importorskip("pypdf", reason="pypdf reads the PDF where it is installed")
+    export(wished(), tmp_path, ["pdf"])
+    reader = pypdf.PdfReader(tmp_path / "drawings/drawings.pdf", strict=True)
+    assert reader.metadata.title == "hemisphere"
+    text = reader.pages[0].extract_text()
+    assert "Pavilion. Revision B. Tolerance 0.5 mm. Units mm." in text
+    assert "Design aid, not code compliance" in text
+    assert reader.outline[0].title == "Flat plan"
+
+
+def test_scale_is_the_largest_standard_one_that_fits() -> None:
+    plan = flat_plan(archive("dome"))
+    low, high = room(PAPER)
+    sheet = fitted(lambda text: flat_drawing(plan, text), PAPER)
+    bottom, top = sheet.content.box()
+    assert np.all(bottom >= low - 1e-9)
+    assert np.all(top <= high + 1e-9)
+    larger = SCALES[SCALES.index(sheet.scale) - 1]
+    whole = np.subtract(*flat_drawing(plan, TEXT * larger).box()[::-1])
+    assert np.any(whole / larger > high - low)
+
+
+def test_sheets_of_the_plan_meet_at_their_match_lines() -> None:
+    """Within the match lines of all sheets each rod is there once and whole; every sheet goes on beyond them."""
+    plan = flat_plan(archive("dome"))
+    low, high = room(PAPER)
+    sheets = list(tiled(lambda text: flat_drawing(plan, text), PAPER))
+    assert len(sheets) > 1
+    drawn = {rod.id: 0.0 for rod in plan.rods}
+    for sheet in sheets:
+        inner = sheet.content.clipped(low + OVERLAP, high - OVERLAP)
+        for path in inner.paths:
+            if path.name:
+                drawn[path.name] += float(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum())
+        whole = sum(np.linalg.norm(np.diff(path.points, axis=0)) for path in sheet.content.paths if path.name)
+        assert whole > sum(np.linalg.norm(np.diff(path.points, axis=0)) for path in inner.paths if path.name)
+    for rod in plan.rods:
+        assert drawn[rod.id] == pytest.approx(1e3 * rod.length, abs=1e-6)
+    words = {text.text for sheet in sheets for text in sheet.content.texts if "match line" in text.text}
+    assert words == {f"match line to part {row}{column}" for row in "ABC" for column in "12"}
+
+
+def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
+    """Row A is the top one; the line to the next row is at the bottom, that to the next column on the right."""
+    plan = flat_plan(archive("dome"))
+    sheets = {
+        sheet.title.split(" part ")[1][:2]: sheet for sheet in tiled(lambda text: flat_drawing(plan, text), PAPER)
+    }
+    assert list(sheets) == ["A1", "A2", "B1", "B2", "C1", "C2"]
+    rods = {part: {path.name for path in sheet.content.paths if path.name} for part, sheet in sheets.items()}
+    top = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "u" else -1.0).id
+    right = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "v" else -1.0).id
+    assert {part for part, drawn in rods.items() if top in drawn} == {"A1", "A2"}
+    assert {part[1] for part, drawn in rods.items() if right in drawn} == {"2"}
+    middle = 0.5 * np.sum(room(PAPER), axis=0)
+    lines = {text.text: text.at for text in sheets["B1"].content.texts if "match line" in text.text}
+    assert lines["match line to part A1"][1] > middle[1] > lines["match line to part C1"][1]
+    assert lines["match line to part B2"][0] > middle[0]
+
+
+@settings(max_examples=100, deadline=None)
+@given(arrays(float, (5, 2), elements=st.floats(-3, 3).map(lambda value: round(value, 3))))
+def test_clipping_keeps_what_is_inside(points: np.ndarray) -> None:
+    """Against many points along the polyline: inside the square they are on a piece that is kept, and no other is."""
+    drawing = Drawing("", "", 1.0, (Line(points, "CUT"),)).clipped(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    kept = sum(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum() for path in drawing.paths)
+    share = np.linspace(0, 1, 2001)[:, None]
+    inside = 0.0
+    for a, b in pairwise(points):
+        within = np.all(np.abs((1 - share) * a + share * b) <= 1, axis=1)
+        inside += np.linalg.norm(b - a) * within.mean()
+    assert kept == pytest.approx(inside, abs=0.02)
+    assert all(np.all(np.abs(path.points) <= 1 + 1e-9) for path in drawing.paths)
+
+
+@given(st.lists(st.floats(0, 100), max_size=12), st.floats(0.1, 20))
+def test_spread_keeps_the_order_and_the_gap_and_moves_least(places: list[float], gap: float) -> None:
+    """The least squares' own condition: no group of neighbours gains by moving as a whole."""
+    found = spread(places, gap)
+    order = np.argsort(places, kind="stable")
+    asked, put = np.array(places)[order], found[order]
+    assert np.all(np.diff(put) >= gap - 1e-9)
+    groups = np.split(np.arange(len(put)), np.flatnonzero(np.diff(put) > gap + 1e-9) + 1)
+    for group in groups:
+        moved = put[group] - asked[group]
+        assert abs(moved.sum()) < 1e-6
+        assert np.all(np.cumsum(moved) <= 1e-6)  # the left part of a group is pushed left, never right
+
+
+def test_diagonals_are_those_of_the_largest_rectangle() -> None:
+    plan = flat_plan(archive("dome"))
+    (a, b), (c, d) = diagonals(plan)
+    assert np.linalg.norm(b - a) == pytest.approx(np.linalg.norm(d - c))
+    marks = {tuple(np.round(mark, 6)) for mark in plan.marks}
+    assert {tuple(np.round(point, 6)) for point in (a, b, c, d)} <= marks
+    area = abs((b - a)[0] * (b - a)[1])
+    x, y = (np.unique(np.round(plan.marks[:, k], 6)) for k in (0, 1))
+    best = max(
+        (x1 - x0) * (y1 - y0)
+        for x0 in x for x1 in x for y0 in y for y1 in y
+        if x1 > x0 and y1 > y0 and {(x0, y0), (x1, y0), (x0, y1), (x1, y1)} <= marks
+    )  # fmt: skip
+    assert area == pytest.approx(best)
+
+
+def test_strips_show_the_schedule(tmp_path: Path) -> None:
+    """Marks of the strips lie at the distances of the schedule, plus the allowance; splices have theirs."""
+    export(wished(), tmp_path, ["dxf"])
+    entities = read_dxf(tmp_path / "drawings/strips.dxf")
+    columns, rows = rods_table(wished())
+    lines = sorted((one.points for one in entities if one.layer == "LASER"), key=lambda points: -points[0, 1])
+    marks = np.array([one.points[0] for one in entities if one.kind == "CIRCLE" and one.layer == "MARK"])
+    assert len(lines) == len(rows)
+    for row, line in zip(rows, lines, strict=True):
+        cells = dict(zip(columns, row, strict=True))
+        assert line[1, 0] - line[0, 0] == pytest.approx(float(cells["cut_length_mm"]), abs=1e-3)
+        at = sorted(float(word.split()[-1]) for word in cells["joints_at_mm"].split("; "))
+        mine = np.sort(marks[np.abs(marks[:, 1] - line[0, 1]) < 1e-6, 0])
+        np.testing.assert_allclose(mine, np.array(at) + 12.0, atol=1e-3)
+        ticks = [one.points for one in entities if one.kind == "LINE" and one.layer == "MARK"]
+        splices = [tick[0, 0] for tick in ticks if abs(tick.mean(axis=0)[1] - line[0, 1]) < 1e-6]
+        wanted = [float(word) for word in cells["splices_at_mm"].split("; ") if word]
+        np.testing.assert_allclose(sorted(splices), np.array(wanted) + 12.0, atol=1e-3)
+
+
+def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> None:
+    export(wished(), tmp_path, ["dxf"])
+    entities = read_dxf(tmp_path / "drawings/plan.dxf")
+    cuts = [one.points for one in entities if one.layer == "LASER"]
+    rods = wished().result["rods"]
+    for cut, rod in zip(cuts, rods, strict=True):
+        assert np.linalg.norm(cut[1] - cut[0]) == pytest.approx(1e3 * rod["length"] + 24.0, abs=1e-6)
+    (footprint,) = (one.points for one in entities if one.layer == "BOUNDARY-FLAT")
+    expected = {tuple(np.round(1e3 * np.array(point), 6)) for point in wished().result["footprint"]}
+    assert {tuple(np.round(point, 6)) for point in footprint} == expected
+
+
+@pytest.mark.parametrize("name", [*TARGETS, "wished"])
+def test_dxf_of_every_drawing_passes_the_audit(name: str, tmp_path: Path) -> None:
+    names = export(named(name), tmp_path, ["dxf"])
+    assert len(names) == 6
+    for file in names:
+        drawing = ezdxf.readfile(tmp_path / file)
+        audit = drawing.audit()
+        assert audit.errors == []
+        assert audit.fixes == []
+        assert drawing.header["$INSUNITS"] == 4  # mm
+        used = {entity.dxf.layer for entity in drawing.modelspace()}
+        assert used <= {layer.dxf.name for layer in drawing.layers}
+        assert ("LASER" in used, "CUT" in used) == ((True, False) if name == "wished" else (False, True))
+
+
+@pytest.mark.parametrize(
+    ("style", "reason"),
+    [({"paper": "A5"}, "use A4, A3"), ({"layers": {"CUTS": "x"}}, "there are CUT, MARK"),
+     ({"layers": {"CUT": "a*b"}}, "cannot be called"), ({"layers": {"CUT": " "}}, "cannot be called"),
+     ({"layers": {"CUT": "mark"}}, 'two layers would be called "MARK"')],
+)  # fmt: skip
+def test_styles_that_no_file_can_hold_are_refused(style: dict, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        DrawingStyle(**style)
+
+
+def test_takeaways_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(InputError, match="strength must be positive"):
+        Takeaway(strength=0.0)
+    with pytest.raises(InputError, match="0 to 1000 stages"):
+        Takeaway(stages=-1)
+
+
+def test_a_text_box_holds_its_text() -> None:
+    """Against the widths of Helvetica, for ids and numbers."""
+    from gridshell.output.pdf import _width
+
+    for words in ("U01/V12", "1234.56", "-0.07", "ends 14 % of the way", "R07.1"):
+        box = Text(words, np.zeros(2), 10.0, "LABEL").box()
+        assert np.ptp(box[:, 0]) >= 10 * _width(words)
