@@ -50,7 +50,9 @@ def gallery() -> dict[str, Piece]:
         "freeform, 3dm": Piece(gs.surface_from(DATA / "freeform.3dm"), 0.9, 0.0012, 0.0009),
         "ball below its equator": Piece(gs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), 0.6, 0.0145, 0.0003),
         "torus": Piece(gs.surface_from(DATA / "torus.obj", unit=MM), 0.7, 0.002, 0.0002),
-        "tent with an oculus": Piece(gs.surface_from(DATA / "tent.obj", unit=MM), 0.6, 0.002, 0.0015, anchor=(0.0, 0.0)),
+        "tent with an oculus": Piece(
+            gs.surface_from(DATA / "tent.obj", unit=MM), 0.6, 0.002, 0.0015, anchor=(0.0, 0.0)
+        ),
         "ridge": Piece(gs.HeightField(formula=ridge, domain=gs.Rectangle((10.0, 10.0))), 0.9, 0.021, 0.013),
     }
 

@@ -25,7 +25,7 @@ class AcceptanceCase:
         return gs.GridLayout.orthogonal(**{"spacing": 0.03, "edge": 0.005, **self.layout, **changes})
 
 
-def _ridge() -> str:
+def ridge_formula() -> str:
     c, s = cos(0.5), sin(0.5)
     p, q = f"({c}*(x - .02) + {s}*(y - .03))", f"({c}*(y - .03) - {s}*(x - .02))"
     return f".05 - .75*x^2 - .5*y^2 + .3*x*y + .06*exp(-({p}^2/.14^2 + {q}^2/.045^2)/2)"
@@ -64,7 +64,7 @@ FURTHER = (
     AcceptanceCase("paraboloid H = 2R", gs.Paraboloid(radius=R, height=2 * R)),
     AcceptanceCase("hypar", gs.HeightField(formula="(x^2 - y^2)/0.8", domain=DISC)),
     AcceptanceCase("two bumps", gs.HeightField(formula=TWO_BUMPS, domain=DISC)),
-    AcceptanceCase("ridge", gs.HeightField(formula=_ridge(), domain=DISC)),
+    AcceptanceCase("ridge", gs.HeightField(formula=ridge_formula(), domain=DISC)),
 )
 BEYOND = AcceptanceCase("cap with base -0.18", gs.Cap(radius=R, base=-0.18))
 SHARP = AcceptanceCase("gaussian", gs.HeightField(formula=".3*exp(-(x^2 + y^2)/(2*.05^2))", domain=DISC))

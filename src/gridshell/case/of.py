@@ -3,6 +3,7 @@
 from typing import Any
 
 from gridshell.case.schema import Case
+from gridshell.formfinding import Fall
 from gridshell.joints import Joint, joint_parameters
 from gridshell.layout import GridLayout
 from gridshell.output.takeaway import Takeaway
@@ -19,6 +20,7 @@ def case_text(
     method: str,
     anchor: tuple[float, float] | None,
     gravity: float,
+    fall: Fall | None = None,
     takeaway: Takeaway | None = None,
 ) -> str:
     """A case file that gives these objects again; of a target that is a Python function, a note that says so."""
@@ -29,7 +31,7 @@ def case_text(
         return (
             f"# the target was a mesh of {shape['vertices']} vertices made in Python: no case file can give it again\n"
         )
-    drape: dict[str, Any] = {"method": method, "gravity": gravity}
+    drape: dict[str, Any] = {"method": method, "gravity": gravity, **(fall.parameters() if fall else {})}
     if anchor is not None:
         drape["anchor"] = anchor
     case = Case.model_validate(

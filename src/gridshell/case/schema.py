@@ -11,19 +11,27 @@ from gridshell.case.values import (
     Angle,
     AngleOrAuto,
     Angles,
+    AngleStiffness,
+    BendingStiffness,
     Coordinate,
     Corners,
     Counts,
     Density,
     Distance,
+    Duration,
     Factor,
+    Force,
+    InertiaPerLength,
     Length,
     LengthOrAuto,
     LengthsOrAuto,
+    MassPerLength,
+    NodeStiffness,
     Point,
     Point3,
     PointOrAuto,
     PoissonRatio,
+    Share,
     Size,
     Stiffness,
     Stress,
@@ -32,9 +40,11 @@ from gridshell.case.values import (
 )
 
 if TYPE_CHECKING:
+    from gridshell.formfinding.fall import Fall
     from gridshell.joints import Joint
     from gridshell.layout import GridLayout
-    from gridshell.rods.section import Rod, Section
+    from gridshell.output.takeaway import Takeaway
+    from gridshell.rods.section import GivenSection, Rod, Section
     from gridshell.targets import Target
 
 
@@ -175,16 +185,16 @@ class LayoutTable(Table):
     )
     length: LengthOrAuto = Field(default="auto", description='length of every rod before trimming, or "auto"')
     edge: LengthOrAuto = Field(default=0.005, description='longest edge of the mesh, or "auto"')
-    rotate: AngleOrAuto = Field(
-        default=0.0, description='turn of the grid about the vertical through the anchor, or "auto": the best found'
-    )
+    rotate: AngleOrAuto = Field(default=0.0, description='turn of the grid seen from above, or "auto": the best found')
     offset: Point = Field(default=(0.0, 0.0), description="shift x,y of the lattice against the axes")
 
-    def build(self, size: float) -> "GridLayout":
-        """The layout on a target of this size [m]: "auto" stands for some 17 rods each way and six edges a span."""
+    def build(self, target: "Target | None" = None) -> "GridLayout":
+        """The layout; "auto" stands for some 17 rods each way over the target, and six edges a span."""
         from gridshell.layout import GridLayout
 
-        spacing = (_round(size / 8),) * 2 if self.spacing == "auto" else self.spacing
+        spacing = self.spacing
+        if spacing == "auto":
+            spacing = (_round((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
         edge = min(spacing) / 6 if self.edge == "auto" else self.edge
         return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "edge": edge, "rotate": rotate})
@@ -211,20 +221,81 @@ class TubeTable(Table):
         return Tube(radius=self.radius, thickness=self.thickness)
 
 
+class EllipseTable(Table):
+    kind: Literal["ellipse"] = "ellipse"
+    a: Length = Field(description="half-axis along the grid's normal; of a target: along x")
+    b: Length = Field(description="half-axis within the grid; of a target: along y")
+
+    def build(self) -> "Section":
+        from gridshell.rods.section import Ellipse
+
+        return Ellipse(a=self.a, b=self.b)
+
+
+class RectangleTable(Table):
+    kind: Literal["rectangle"] = "rectangle"
+    width: Length = Field(description="side along the grid's normal: of a flat lath its thickness")
+    height: Length = Field(description="side within the grid: of a flat lath its breadth")
+
+    def build(self) -> "Section":
+        from gridshell.rods.section import RectangularSection
+
+        return RectangularSection(width=self.width, height=self.height)
+
+
+class GivenTable(Table):
+    kind: Literal["given"] = "given"
+    EA: Force = Field(description="stretch stiffness")
+    EI1: BendingStiffness = Field(description="stiffness against bends out of the grid")
+    EI2: BendingStiffness = Field(description="stiffness against bends within the grid")
+    GJ: BendingStiffness = Field(description="twist stiffness")
+    mass: MassPerLength = Field(default=0.0, description="mass per length")
+    rotary_inertia: InertiaPerLength = Field(default=0.0, description="rotary inertia about the rod's line, per length")
+
+    def build(self) -> "GivenSection":
+        from gridshell.rods.section import GivenSection
+
+        return GivenSection(**self.model_dump(exclude={"kind"}))
+
+
 class MaterialTable(Table):
     youngs_modulus: Stress = Field(default=1e6, description="Young's modulus")
-    poisson_ratio: PoissonRatio = Field(default=0.5, description="Poisson's ratio")
+    poisson_ratio: PoissonRatio | None = Field(default=None, description="Poisson's ratio; default 0.5")
+    shear: Stress | None = Field(default=None, description="shear modulus, in place of Poisson's ratio: timber")
     density: Density = Field(default=1000.0, description="density")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_of_two(cls, given: dict[str, Any]) -> dict[str, Any]:
+        if "shear" not in given:
+            return {"poisson_ratio": 0.5, **given}
+        if "poisson_ratio" in given:
+            raise ValueError("rod.material.shear stands in place of poisson_ratio: leave one of them out")
+        return given
 
 
 class RodTable(Table):
-    section: CircleTable | TubeTable = Field(default=CircleTable(), discriminator="kind")
-    material: MaterialTable = MaterialTable()
+    section: CircleTable | TubeTable | EllipseTable | RectangleTable | GivenTable = Field(
+        default=CircleTable(), discriminator="kind"
+    )
+    material: MaterialTable | None = MaterialTable()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _given_needs_no_material(cls, given: dict[str, Any]) -> dict[str, Any]:
+        section = given.get("section")
+        if not (isinstance(section, dict) and section.get("kind") == "given"):
+            return given
+        if given.get("material"):
+            raise ValueError("rod.material: a given section says all stiffnesses and masses itself; leave it out")
+        return {**given, "material": None}
 
     def build(self) -> "Rod":
         from gridshell.rods.section import Material, Rod
 
-        return Rod(section=self.section.build(), material=Material(**self.material.model_dump()))
+        if self.material is None:
+            return Rod(section=self.section.build())
+        return Rod(section=self.section.build(), material=Material(**self.material.model_dump(exclude_none=True)))
 
 
 class JointTable(Table):
@@ -236,7 +307,7 @@ class JointTable(Table):
         kinds = {"ball": joints.Ball, "pin": joints.Pin, "spring": joints.Spring, "rigid": joints.Rigid}
         given = self.model_dump(exclude={"kind"}, exclude_none=True)
         given = {name: inf if value == "rigid" else value for name, value in given.items()}
-        return (kinds | {"linker": joints.Linker})[self.kind](**given)  # type: ignore[attr-defined,no-any-return]
+        return (kinds | {"linker": joints.Linker})[self.kind](**given)  # type: ignore[attr-defined]
 
 
 class BallTable(JointTable):
@@ -266,15 +337,41 @@ class LinkerTable(JointTable):
 
 
 class DrapeTable(Table):
-    method: Literal["bound", "gravity"] = Field(default="bound", description="slide on the target, or fall on it")
+    method: Literal["bound", "gravity", "paper"] = Field(
+        default="bound", description="slide on the target, hang on it at rest, or fall on it in time"
+    )
     anchor: PointOrAuto | None = Field(
-        default=None, description='point x,y where the axes cross; default: the highest; "auto": the best found'
+        default=None, description='point x,y where the axes cross; default: the highest; or "auto"'
     )
     objective: Literal["shear", "curvature", "gap"] = Field(
         default="shear", description='what an "auto" anchor or rotate makes smallest'
     )
-    gravity: Acceleration = Field(default=9.81, description="acceleration of gravity, for method gravity")
-    height: Length = Field(default=0.05, description="height of a fall; an equilibrium does not depend on it")
+    gravity: Acceleration = Field(default=9.81, description="acceleration of gravity, for methods gravity and paper")
+    height: Length = Field(default=0.05, description="of a fall (paper); an equilibrium does not depend on it")
+    coupling: Literal["shared", "implicit", "explicit"] = Field(
+        default="shared", description="how falling rods hold together: one node at a joint, or springs"
+    )
+    C1: NodeStiffness | None = Field(default=None, description="of the springs between nodes; default from the rods")
+    C2: AngleStiffness | None = Field(default=None, description="of the springs between twist angles; default as C1")
+    time_step: Duration | None = Field(default=None, description="of a fall; default 10 ms, or what springs bear")
+    duration: Duration | None = Field(default=None, description="longest fall; default 6 s at a size of 0.2 m")
+    friction: Share = Field(default=0.0, description="Coulomb's coefficient between falling rods and target")
+    drag: Share = Field(default=0.0, description="rate in 1/s at which falling rods lose velocity to the air")
+    frames: str | None = Field(default=None, description="folder for the frames of a fall; default: none are kept")
+
+    def fall(self) -> "Fall":
+        """How the paper's method falls."""
+        from gridshell.formfinding.fall import Fall
+        from gridshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
+
+        coupling: Coupling = SharedDofs()
+        if self.coupling != "shared":
+            penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
+            coupling = penalty(C1=self.C1, C2=self.C2)
+        return Fall(
+            coupling=coupling, height=self.height, time_step=self.time_step, duration=self.duration,
+            friction=self.friction, drag=self.drag, stream=self.frames,
+        )  # fmt: skip
 
 
 class PopUpTable(Table):
@@ -381,10 +478,11 @@ class Case(Table):
         ends = ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
         drape = self.drape
         anchor = None if drape.anchor == "auto" else drape.anchor
-        options = {"method": drape.method, "anchor": anchor, "gravity": drape.gravity, "ends": ends}
+        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "gravity": drape.gravity, "ends": ends}
+        options["fall"] = drape.fall() if drape.method == "paper" else None
         options["joint"] = self.joint.build()
         target = self.target.build()
-        return Built(target, self.layout.build(target.size), self.rod.build(), options)
+        return Built(target, self.layout.build(target), self.rod.build(), options)
 
     def takeaway(self) -> "Takeaway":
         """What checks, workshop and drawings are told.

@@ -12,10 +12,7 @@ from pydantic_core import ErrorDetails
 from gridshell.case.keys import BY_KIND, CaseKey, case_keys, case_tables
 from gridshell.units import shown
 
-NOT_YET = {
-    "rod.section.kind": ("rectangle", "ellipse", "given"),
-    "drape.method": ("paper",),
-}
+NOT_YET: dict[str, tuple[str, ...]] = {}
 
 
 def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
@@ -33,7 +30,7 @@ def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
             return _not_a_choice(case_keys()[f"{path}.kind"], value["kind"])
         case "value_error":
             reason = str(row["ctx"]["error"])
-            return reason if path in BY_KIND else f"{path} = {shown(value)}: {reason}"
+            return reason if path in case_tables() else f"{path} = {shown(value)}: {reason}"
         case "string_type":
             return f"{path} = {shown(value)}: must be text, the {case_keys()[path].help}"
     return f"{path} = {shown(value)}: {row['msg']}"
@@ -72,6 +69,8 @@ def _nearest(path: str, keys: Mapping[str, CaseKey]) -> str | None:
     """The known key or table whose name looks most like this one: in the same table, else anywhere."""
     table, _, name = path.rpartition(".")
     everywhere = {key.name: key.path for key in reversed(list(keys.values()))} | {top: top for top in _inside("")}
+    if len(name) < 3:  # one letter from too many names
+        everywhere = {}
     for candidates in ({inner: f"{table}.{inner}" for inner in _inside(table)} if table else {}, everywhere):
         if close := get_close_matches(name, candidates, n=1):
             return candidates[close[0]]

@@ -113,7 +113,7 @@ def stiffness(value: object) -> float | str:
 def corners(value: object) -> int:
     """Of a crossing: 2 or 4."""
     if value in (2, 4) or (isinstance(value, str) and value.strip() in ("2", "4")):
-        return int(value)  # type: ignore[call-overload,no-any-return]
+        return int(value)
     raise ValueError("give 2, opposite corners as in the paper, or 4")
 
 
@@ -167,7 +167,15 @@ Distance = Annotated[float, BeforeValidator(not_negative("length"))]
 Angle = Annotated[float, BeforeValidator(quantity("angle"))]
 AngleOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(quantity("angle")))]
 PointOrAuto = Annotated[tuple[float, float] | Auto, BeforeValidator(or_auto(pair(quantity("length"))))]
+Force = Annotated[float, BeforeValidator(positive("force"))]
+BendingStiffness = Annotated[float, BeforeValidator(positive("bending stiffness"))]
+MassPerLength = Annotated[float, BeforeValidator(not_negative("mass per length"))]
+InertiaPerLength = Annotated[float, BeforeValidator(not_negative("inertia per length"))]
 Stress = Annotated[float, BeforeValidator(positive("stress"))]
+Duration = Annotated[float, BeforeValidator(positive("time"))]
+NodeStiffness = Annotated[float, BeforeValidator(positive("stiffness"))]
+AngleStiffness = Annotated[float, BeforeValidator(positive("rotational stiffness"))]
+Share = Annotated[float, BeforeValidator(not_negative("number"))]
 Density = Annotated[float, BeforeValidator(positive("density"))]
 Acceleration = Annotated[float, BeforeValidator(positive("acceleration"))]
 PoissonRatio = Annotated[float, BeforeValidator(poisson_ratio)]

@@ -13,6 +13,8 @@ from gridshell.errors import GridshellError, InputError
 COMMANDS = {
     "form": "From a target to the flat grid that pops up into it.",
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
+    "export": "Write drawings, schedules, models or the report of an earlier result again.",
+    "paper": "Make a figure of the paper again, with its errors.",
 }
 
 

@@ -1,14 +1,26 @@
 """`gridshell form`: the main job. Its options are the keys of the case file."""
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import click
 
 from gridshell.case import BUILT_IN, Case, CaseKey, case_keys, load_case
-from gridshell.cli.outcome import deliver, output_folder
+from gridshell.cli.outcome import Kept, deliver, output_folder, wanted_kinds
 from gridshell.cli.progress import Progress, announce_compilation
+
+if TYPE_CHECKING:
+    from gridshell.formfinding.search import Search
+    from gridshell.layout import GridLayout
+    from gridshell.rods.section import Rod
+    from gridshell.targets import Target
 
 ALIASES = {
     "target.radius": "--radius",
     "target.formula": "--formula",
+    "target.unit": "--unit",
+    "target.base": "--base",
+    "target.boundary": "--boundary",
     "layout.rods": "--rods",
     "layout.spacing": "--spacing",
     "layout.length": "--length",
@@ -16,6 +28,7 @@ ALIASES = {
     "layout.rotate": "--rotate",
     "drape.anchor": "--anchor",
     "drape.method": "--method",
+    "drape.objective": "--objective",
 }
 
 
@@ -31,7 +44,7 @@ class CaseOption(click.Option):
         self.key = key
         names = [f"--{key.path}", *filter(None, [ALIASES.get(key.path)]), _parameter(key.path)]
         text = key.help + (f" ({', '.join(key.kinds)})" if key.kinds and not key.choices else "")
-        super().__init__(names, metavar="|".join(key.choices) or "VALUE", help=text)
+        super().__init__(names, metavar="|".join(map(str, key.choices)) or "VALUE", help=text)
 
 
 class CaseCommand(click.Command):
@@ -53,31 +66,63 @@ class CaseCommand(click.Command):
     params=[CaseOption(key) for key in case_keys().values()],
     epilog='Lengths and so on take a unit, "200 mm", "45 deg", "25 GPa"; a plain number is in SI.',
 )
-@click.argument("name", metavar="NAME|CASE.toml")
+@click.argument("name", metavar="NAME|CASE.toml|SURFACE")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME.")
+@click.option("--only", metavar="KINDS", help="Files beside the archive, such as dxf,csv; see gridshell export --help.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs.")
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-def command(name: str, out: str | None, as_json: bool, quiet: bool, **values: str | None) -> int:
+def command(name: str, out: str | None, only: str | None, as_json: bool, quiet: bool, **values: str | None) -> int:
     """From a target to the flat grid that pops up into it: drape, trim, map back, pop up, compare.
 
-    NAME is a built-in case, {names}; CASE.toml a case file. Each of its keys is an option too.
+    NAME is a built-in case, {names}; CASE.toml a case file; SURFACE a mesh (OBJ, STL, PLY, OFF,
+    glTF), a Rhino file (3dm), or heights (CSV, PNG). Each key of a case is an option too.
     """
     overrides = {path: value for path in case_keys() if (value := values[_parameter(path)]) is not None}
     case = load_case(name, overrides)
-    return run(case, name, out=out, as_json=as_json, quiet=quiet)
+    return run(case, name, out=out, only=only, as_json=as_json, quiet=quiet)
 
 
 assert command.help is not None
 command.help = command.help.format(names=", ".join(BUILT_IN))
 
 
-def run(case: Case, name: str, *, out: str | None, as_json: bool, quiet: bool) -> int:
+def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bool, quiet: bool) -> int:
     """Find the form of a case and write it; the exit code."""
     folder = output_folder(out, name)
     target, layout, rod, options = case.build()
+    takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
     from gridshell.form import find_form
 
     with Progress(quiet=quiet) as progress:
+        found = None
+        if case.undecided:
+            found = _search(case, target, layout, rod, progress)
+            layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
+            case = case.decided(found.best.anchor, found.best.heading)
         form = find_form(target, layout, rod, progress=progress, **options)
-    return deliver(form, lambda where: form.save(where, case_toml=case.to_toml()), folder, as_json=as_json, quiet=quiet)
+        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
+    if found and not (quiet or as_json):
+        click.echo(found.table())
+    code = deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
+    if found:
+        (folder / "search.svg").write_text(_picture(found), encoding="utf-8")
+    return code
+
+
+def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: Progress) -> "Search":
+    """Try anchors and headings for those of the two that are "auto"."""
+    from gridshell.formfinding.search import search
+
+    anchor, heading = case.drape.anchor, case.layout.rotate
+    return search(
+        target, layout, rod, objective=case.drape.objective, progress=progress,
+        anchors="auto" if anchor == "auto" else [anchor or target.summit],
+        headings="auto" if heading == "auto" else [heading],
+    )  # fmt: skip
+
+
+def _picture(found: "Search") -> str:
+    from gridshell.output.searchmap import search_svg
+
+    return search_svg(f"{found.title} by anchor and heading", found.trials, found.best)

@@ -2,10 +2,14 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import click
+
+if TYPE_CHECKING:
+    from gridshell.output import Archive
 
 CONVERGED, NOT_CONVERGED = 0, 3
 
@@ -24,6 +28,27 @@ class Result(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Kept:
+    """An archive as a result; `kinds` of files are written with it (None: all)."""
+
+    archive: "Archive"
+    kinds: list[str] | None = None
+
+    @property
+    def status(self) -> str:
+        return str(self.archive.result["status"])
+
+    def summary(self) -> str:
+        return self.archive.summary()
+
+    def result(self) -> dict[str, Any]:
+        return self.archive.result
+
+    def save(self, folder: Path) -> Path:
+        return self.archive.save(folder, self.kinds)
+
+
 def output_folder(out: str | None, name: str) -> Path:
     """The folder for a result, by default out/NAME; asked for before the job starts.
 
@@ -34,6 +59,18 @@ def output_folder(out: str | None, name: str) -> Path:
     from gridshell.output.folder import check_folder
 
     return check_folder(out or Path("out") / Path(name).stem)
+
+
+def wanted_kinds(only: str | None) -> list[str] | None:
+    """The kinds of files that --only names.
+
+    Raises
+    ------
+    InputError : there is no such kind.
+    """
+    from gridshell.output.files import read_kinds
+
+    return None if only is None else read_kinds(only)
 
 
 def deliver(result: Result, save: Callable[[Path], object], folder: Path, *, as_json: bool, quiet: bool) -> int:

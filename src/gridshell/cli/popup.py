@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gridshell.cli.outcome import deliver, output_folder
+from gridshell.cli.outcome import Kept, deliver, output_folder
 from gridshell.cli.progress import Progress, announce_compilation
 from gridshell.errors import InputError
 
 if TYPE_CHECKING:
     from gridshell.cli.rodends import RodEnds
+    from gridshell.output.takeaway import Takeaway
     from gridshell.rods.section import Rod
 
 PAPER_ROD_LENGTH = pi * 0.2  # of the hemisphere's middle rod [HQK section 3.1], which the default rod belongs to
@@ -30,7 +31,7 @@ def command(source: str, unit: str | None, out: str | None, as_json: bool, quiet
     final_z0, final_x1, final_y1, final_z1 and, if you like, id. DIR is an earlier result.
     """
     path = Path(source)
-    ends, rod = _rods_and_material(path, unit)
+    ends, rod, takeaway = _rods_and_the_rest(path, unit)
     folder = output_folder(out, f"{path.resolve().stem}-popup")
     if folder == path.resolve():
         raise InputError(f"--out {folder} is the result that is read: give another folder")
@@ -40,12 +41,14 @@ def command(source: str, unit: str | None, out: str | None, as_json: bool, quiet
 
     grid = straight_rods(ends.flat, names=ends.names)
     with Progress(quiet=quiet) as progress:
-        popped = pop_up_table(grid, ends.final, rod, progress=progress)
-    return deliver(popped, popped.save, folder, as_json=as_json, quiet=quiet)
+        kept = Kept(
+            pop_up_table(grid, ends.final, rod, progress=progress).archive(takeaway=takeaway, progress=progress)
+        )
+    return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
 
 
-def _rods_and_material(path: Path, unit: str | None) -> "tuple[RodEnds, Rod]":
-    """A table takes the default rod at the table's scale; a result keeps the rod that it was found with."""
+def _rods_and_the_rest(path: Path, unit: str | None) -> "tuple[RodEnds, Rod, Takeaway | None]":
+    """A table takes the default rod at the table's scale; a result keeps its rod, and what its drawings were told."""
     from gridshell.case import load_case
     from gridshell.cli.rodends import read_result, read_table
 
@@ -54,10 +57,11 @@ def _rods_and_material(path: Path, unit: str | None) -> "tuple[RodEnds, Rod]":
             raise InputError(f'--unit = "{unit}": {path} is a result, which is in SI; leave --unit out')
         ends = read_result(path)
         if (path / "case.toml").is_file():
-            return ends, load_case(path / "case.toml").rod.build()
+            case = load_case(path / "case.toml")
+            return ends, case.rod.build(), case.takeaway()
     elif unit is None:
         raise InputError("--unit is missing: give the unit of the table's coordinates, such as --unit m")
     else:
         ends = read_table(path, unit)
     radius = 0.001 * ends.longest / PAPER_ROD_LENGTH
-    return ends, load_case("hemisphere", {"rod.section.radius": radius}).rod.build()
+    return ends, load_case("hemisphere", {"rod.section.radius": radius}).rod.build(), None

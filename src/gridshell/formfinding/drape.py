@@ -5,7 +5,8 @@ from typing import Literal
 from gridshell.errors import InputError
 from gridshell.formfinding.bound import bound_drape
 from gridshell.formfinding.draped import Draped
-from gridshell.formfinding.falling import Fall, falling_drape
+from gridshell.formfinding.fall import Fall
+from gridshell.formfinding.falling import falling_drape
 from gridshell.formfinding.gravity import gravity_drape
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.joints import Joint

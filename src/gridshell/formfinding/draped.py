@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gridshell.formfinding.fall import Fall
 from gridshell.formfinding.rest import Rest
 from gridshell.geometry.vectors import cross, dot, unit
 from gridshell.layout import FlatRod, GridLayout, GridMesh
@@ -33,7 +34,7 @@ class Draped:
         would give it [m]; None where they are the same.
     anchor : x, y of the anchor as it was given [m], or None; gravity : [m/s2].
     net : the net that the drape started from; None where it started from the flat grid.
-    rest : how it came to rest, where it fell in time (paper).
+    rest, fall : how it came to rest, and how it fell, where it fell in time (paper).
     """
 
     method: str
@@ -55,6 +56,7 @@ class Draped:
     dropped: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
     rest: Rest | None = None
+    fall: Fall | None = None
 
     @property
     def report(self) -> SolveReport:

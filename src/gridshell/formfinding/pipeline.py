@@ -10,6 +10,7 @@ from gridshell.errors import InputError
 from gridshell.formfinding.agreement import Agreement, agreement
 from gridshell.formfinding.drape import Method, drape
 from gridshell.formfinding.draped import Draped
+from gridshell.formfinding.fall import Fall
 from gridshell.formfinding.popup import Ends, Popped, pop_up
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.formfinding.trim import (
@@ -94,12 +95,16 @@ def find_stages(
     anchor: tuple[float, float] | None = None,
     gravity: float = 9.81,
     joint: Joint | None = None,
+    fall: Fall | None = None,
     ends: Sequence[Ends] = ("pinned", "clamped"),
     progress: Progress = silent,
 ) -> FoundForm:
     """Drape, trim, map back, pop up and compare; see `gridshell.find_form`."""
     joint = joint or Ball()
-    draped = drape(layout, rod, target, method=method, anchor=anchor, gravity=gravity, joint=joint, progress=progress)
+    draped = drape(
+        layout, rod, target,
+        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, progress=progress,
+    )  # fmt: skip
     trimmed = trim(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
     footprint = map_back(trimmed)
     popped: dict[Ends, Popped] = {}

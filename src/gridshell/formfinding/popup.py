@@ -145,14 +145,14 @@ class _PopUp:
         """Pinned, from the flat grid: the ends go straight to the boundary while the grid rises."""
         mesh, boundary = self.footprint.mesh, self.boundary
         shell = self.shell("pinned")
-        flat = _aligned(mesh.flat, mesh.flat[mesh.ends.ravel()], boundary.points)
+        flat = aligned(mesh.flat, mesh.flat[mesh.ends.ravel()], boundary.points)
         first, up = flat[mesh.ends.ravel()], UP
         if boundary.draped is not None:
             up = node_normals(mesh, boundary.draped)[mesh.ends.ravel()]
         last = boundary.points + shell.lift[shell.ends] * up
         found = follow(
             lambda t: self.problem(shell, (1 - t) * (first + shell.lift[shell.ends] * UP) + t * last),
-            self.upright(shell, _arched(self.footprint, flat, first, boundary)),
+            self.upright(shell, arched(self.footprint, flat, first, boundary)),
             np.zeros(len(mesh.edges)),
             first_step=FIRST_RISE,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
@@ -186,7 +186,7 @@ class _PopUp:
         return shell, replace(found, report=found.report.after(pinned.report))
 
 
-def _aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
+def aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
     """The flat grid (n, 3) turned and moved in its plane, and lifted, to lie best over the boundary."""
     centre, there = ends.mean(axis=0), points.mean(axis=0)
     a, b = (ends - centre)[:, :2], (points - there)[:, :2]
@@ -198,7 +198,7 @@ def _aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
     return result
 
 
-def _arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:
+def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:
     """The flat grid raised to arches of about the rods' lengths over their ends at the first step.
 
     A flat grid under compression is in equilibrium, only not a stable one: the arch chooses the side. A rod

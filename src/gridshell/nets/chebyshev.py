@@ -9,6 +9,7 @@ built still shape the net: they are kept as virtual rods.
 from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, degrees, sin
+from string import ascii_lowercase
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +22,14 @@ from gridshell.layout.flatgrid import Family
 from gridshell.layout.gridlayout import rod_name
 from gridshell.layout.mesh import edge_count
 from gridshell.nets.compass import Net, march
-from gridshell.nets.cuts import Cut, cut_lines, inside_nodes
+from gridshell.nets.cuts import Cut, cut_lines, extrapolated, inside_nodes
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
 
 MARGIN = 2.3  # spacings marched past the end of the target: a cut is interpolated between nodes on both sides
 SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
+GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count
 MOST_NODES = 4_000_000
 
 
@@ -93,7 +95,7 @@ def chebyshev_net(target: Target, layout: GridLayout, *, anchor: tuple[float, fl
     angle, where = _smallest_angle(target, fine, inside)
     if degrees(angle) < SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
-    ends, error = _extrapolate(target, lines, (coarse, fine), inside)
+    ends, error = _extrapolate(target, lines, (coarse, fine), inside, GRAZING * min(layout.spacing))
     rods, dropped, warnings = _name_rods(layout, lines, ends)
     _require_length(layout, rods)
     return ChebyshevNet(
@@ -105,7 +107,7 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
     """The anchor lifted vertically onto the target, and the tangent that points along the heading in plan."""
     x, y = anchor if anchor is not None else target.summit
     point = target.lift(np.array([[x, y]]))
-    if target.margin(point)[0] <= 0:
+    if not target.carries(point)[0]:
         raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim")
     n = target.on_surface(point).normal[0]
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])
@@ -190,7 +192,7 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
     x, y, z = where
     return NetLimitError(
         f"no inextensible net covers this target: near ({x:.4g}, {y:.4g}, {z:.4g}) m {what}; "
-        "use a smaller part of the target (a higher base), or another anchor or heading"
+        "use a smaller part of the target (a higher base), or another anchor or heading; a larger spacing does not help"
     )
 
 
@@ -207,14 +209,14 @@ def _smallest_angle(target: Target, net: Net, inside: NDArray[np.bool_]) -> tupl
 
 @dataclass(frozen=True)
 class _Ends:
-    """Cuts of the lines of both families, extrapolated."""
+    """Pieces of the lines of both families, extrapolated."""
 
-    u: list[Cut | None]
-    v: list[Cut | None]
+    u: list[list[Cut]]
+    v: list[list[Cut]]
 
 
 def _extrapolate(
-    target: Target, lines: _Lines, nets: tuple[Net, Net], inside_fine: NDArray[np.bool_]
+    target: Target, lines: _Lines, nets: tuple[Net, Net], inside_fine: NDArray[np.bool_], depth: float
 ) -> tuple[_Ends, float]:
     cuts = []
     for net in nets:
@@ -222,26 +224,17 @@ def _extrapolate(
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
         cuts.append(
             (
-                cut_lines(target, net.u, net.points[:, column].transpose(1, 0, 2), inside[:, column].T),
-                cut_lines(target, net.v, net.points[row], inside[row]),
+                cut_lines(target, net.u, net.points[:, column].transpose(1, 0, 2), inside[:, column].T, depth=depth),
+                cut_lines(target, net.v, net.points[row], inside[row], depth=depth),
             )
         )
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
     error = 0.0
-    families = list[list[Cut | None]]()
+    families = list[list[list[Cut]]]()
     for coarse, fine in zip(cuts[0], cuts[1], strict=True):
-        family = list[Cut | None]()
-        for rough, exact in zip(coarse, fine, strict=True):
-            if rough is None or exact is None:
-                family.append(exact)
-                continue
-            change = np.array([exact.start - rough.start, exact.end - rough.end]) / 3
-            if 3 * np.abs(change).max() > step:  # each march has cut another piece of the line
-                family.append(exact)
-                continue
-            error = max(error, float(np.abs(change).max()))
-            family.append(Cut(exact.start + change[0], exact.end + change[1], exact.pieces))
-        families.append(family)
+        both = [extrapolated(rough, exact, step) for rough, exact in zip(coarse, fine, strict=True)]
+        families.append([pieces for pieces, _ in both])
+        error = max([error, *(missed for _, missed in both)])
     return _Ends(*families), error
 
 
@@ -250,10 +243,10 @@ def _name_rods(
 ) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
     """Rods from the lines: those of the layout get their labels, all other lines are virtual."""
     rods, dropped, warnings = list[FlatRod](), list[tuple[str, str]](), list[str]()
-    families: tuple[tuple[Family, Floats, list[Cut | None]], ...] = (("u", lines.v, ends.u), ("v", lines.u, ends.v))
+    families: tuple[tuple[Family, Floats, list[list[Cut]]], ...] = (("u", lines.v, ends.u), ("v", lines.u, ends.v))
     for family, offsets, cuts in families:
         make = FlatRod.u if family == "u" else FlatRod.v
-        touching = {float(c): cut for c, cut in zip(offsets, cuts, strict=True) if cut is not None}
+        touching = {float(c): cut for c, cut in zip(offsets, cuts, strict=True) if cut}
         built = layout.offsets(family)
         if built is None:
             phase, spacing = layout.phase(family), layout.spacing[0 if family == "u" else 1]
@@ -264,15 +257,19 @@ def _name_rods(
             if abs(here - c) > 1e-9 * max(layout.spacing):
                 dropped.append((name, "it never touches the target"))
                 continue
-            cut = touching.pop(here)
-            rods.append(make(name, here, cut.start, cut.end))
-            if cut.pieces > 1:
-                warnings.append(f"rod {name} meets the target in {cut.pieces} pieces; only the longest is kept")
-        rods += [
-            make(f"virtual {family.upper()} {c:+.4f}", c, cut.start, cut.end, virtual=True)
-            for c, cut in touching.items()
-        ]
+            pieces = touching.pop(here)
+            rods += [make(label, here, *cut) for label, cut in zip(piece_names(name, len(pieces)), pieces, strict=True)]
+            if len(pieces) > 1:
+                warnings.append(f"rod {name} meets the target in {len(pieces)} pieces, each with ends of its own")
+        for c, pieces in touching.items():
+            labels = piece_names(f"virtual {family.upper()} {c:+.4f}", len(pieces))
+            rods += [make(label, c, *cut, virtual=True) for label, cut in zip(labels, pieces, strict=True)]
     return tuple(rods), dropped, warnings
+
+
+def piece_names(rod: str, count: int) -> list[str]:
+    """U07, or U07a, U07b, ... where a line meets the target more than once."""
+    return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 
 
 def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:

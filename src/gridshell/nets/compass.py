@@ -98,12 +98,12 @@ def geodesics(target: Target, start: Floats, direction: Floats, steps: list[Floa
         if len(going) == 0:
             break
         here, h = point[going], chords[step, going]
-        normal = unit(target.implicit(here).gradient)
+        normal = unit(target.level(here)[1])
         flat = unit(tangent[going] - dot(tangent[going], normal)[:, None] * normal)
         turn, change = np.zeros(len(going)), np.full(len(going), np.inf)  # angle of the chord out of the tangent plane
         chord, swing = flat.copy(), normal.copy()
         for _ in range(NEWTON_STEPS):
-            value, gradient, _ = target.implicit(here + h[:, None] * chord)
+            value, gradient = target.level(here + h[:, None] * chord)
             if not _turned(flat, normal, value, gradient, h, turn, change, chord, swing):
                 break
         lost = ~(np.abs(turn) < 1.2) | ~(np.abs(change) < 1e-9)
@@ -178,7 +178,7 @@ def _compass(target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, fr
     p = a + b - d
     change = np.empty(len(p))
     for _ in range(NEWTON_STEPS):
-        value, gradient, _ = target.implicit(p)
+        value, gradient = target.level(p)
         if not _towards(p, a, b, from_a, from_b, value, gradient, change):
             break
     sine = dot(cross(p - b, p - a), gradient) * side

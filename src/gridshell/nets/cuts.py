@@ -14,22 +14,29 @@ Mask = NDArray[np.bool_]
 
 
 class Cut(NamedTuple):
-    """The part of one line that lies on the target: material coordinates of its two ends [m]."""
+    """A part of one line that lies on the target: material coordinates of its two ends [m]."""
 
     start: float
     end: float
-    pieces: int  # how often the line meets the target; the longest piece is the one given
 
 
 def inside_nodes(target: Target, net: Net) -> Mask:
-    """(nu, nv) nodes inside the target's end and connected with the anchor through inside nodes."""
+    """(nu, nv) nodes inside the target's end and connected with the anchor through inside nodes.
+
+    Where the anchor lies in an opening, with the first inside nodes along the axes.
+    """
     flat = net.points.reshape(-1, 3)
     inside = np.zeros(len(flat), dtype=bool)
     known = np.flatnonzero(np.isfinite(flat[:, 0]))
     inside[known] = target.margin(flat[known]) > 0
     region = inside.reshape(net.points.shape[:2])
     reached = np.zeros_like(region)
-    reached[net.origin] = region[net.origin]
+    i, j = net.origin
+    reached[i, j] = region[i, j]
+    if not region[i, j]:
+        for axis, seeds in ((region[i:, j], reached[i:, j]), (region[i::-1, j], reached[i::-1, j]),
+                            (region[i, j:], reached[i, j:]), (region[i, j::-1], reached[i, j::-1])):  # fmt: skip
+            seeds[np.argmax(axis)] = axis.any()
     while True:  # whole runs at a time, along rows and columns in turn: a few sweeps suffice
         grown = _fill_runs(region.T, _fill_runs(region, reached).T).T
         if np.array_equal(grown, reached):
@@ -49,32 +56,54 @@ def _fill_runs(region: Mask, seeds: Mask) -> Mask:
     return np.asarray((seeded[run].reshape(fenced.shape) & fenced)[:, :-1])
 
 
-def cut_lines(target: Target, s: Floats, lines: Floats, inside: Mask) -> list[Cut | None]:
+def cut_lines(target: Target, s: Floats, lines: Floats, inside: Mask, *, depth: float = 0.0) -> list[list[Cut]]:
     """Cut lines of a net at the target's end, to fourth order between nodes.
 
     Parameters
     ----------
     s : (n,) material coordinates along the lines [m].
     lines : (m, n, 3) points of each line, NaN where there are none; inside : (m, n).
+    depth : pieces that lie nowhere further inside than this [m] only graze the end and do not count.
 
     Returns
     -------
-    m cuts; None for a line without inside nodes.
+    m lists of the pieces of each line, in its direction; empty for a line without inside nodes.
     """
-    found, windows = list[tuple[int, int, int, int]](), list[tuple[int, int, int]]()
+    margin = np.zeros(inside.shape)
+    margin[inside] = target.margin(lines[inside])
+    windows = list[tuple[int, int, int]]()
     for k, mask in enumerate(inside):
         steps = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
-        first, last = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1) - 1
-        if len(first) == 0:
-            continue
-        longest = int(np.argmax(s[last] - s[first]))
-        found.append((k, int(first[longest]), int(last[longest]), len(first)))
-        windows += [(k, int(first[longest]) - 1, -1), (k, int(last[longest]), 1)]
+        for first, last in zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1) - 1, strict=True):
+            if margin[k, first : last + 1].max() > depth:
+                windows += [(k, int(first) - 1, -1), (k, int(last), 1)]
     ends = _roots(target, s, lines, windows)
-    cuts: list[Cut | None] = [None] * len(lines)
-    for (k, _, _, pieces), (start, end) in zip(found, ends.reshape(-1, 2), strict=True):
-        cuts[k] = Cut(float(start), float(end), pieces)
+    cuts: list[list[Cut]] = [[] for _ in lines]
+    for (k, _, _), (start, end) in zip(windows[::2], ends.reshape(-1, 2).tolist(), strict=True):
+        cuts[k].append(Cut(start, end))
     return cuts
+
+
+def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[Cut], float]:
+    """The cuts of one line from two marches, by Richardson; and a bound of the finer one's error [m].
+
+    Each end is matched with the nearest of its kind in the coarse march, within a `step` [m]: where a line grazes
+    the end, the marches may find different pieces. An end that only one of them finds stays where it is; its
+    error is at most about half the gap or piece that the other march does not see.
+    """
+    ends, error = np.array(fine).ravel(), 0.0
+    better = ends.copy()
+    for k, end in enumerate(ends):
+        rough = np.array([cut[k % 2] for cut in coarse])
+        change = float(end - rough[np.argmin(np.abs(rough - end))]) if len(rough) else np.inf
+        if abs(change) <= step:
+            better[k] = end + change / 3
+            error = max(error, abs(change) / 3)
+        else:
+            error = max(error, 0.5 * float(np.abs(np.delete(ends, k) - end).min()))
+    if not np.all(np.diff(better) > 0):
+        return fine, max(error, step)
+    return [Cut(float(start), float(end)) for start, end in better.reshape(-1, 2)], error
 
 
 def _roots(target: Target, s: Floats, lines: Floats, windows: list[tuple[int, int, int]]) -> Floats:

@@ -22,6 +22,7 @@ from gridshell.errors import InputError
 Floats = NDArray[np.float64]
 
 LIMIT = 1.8616  # f vanishes first at this sigma: the net folds
+KNOWN = 1.95  # f is integrated to this sigma
 
 
 @lru_cache
@@ -33,7 +34,7 @@ def _crossing_angle() -> "OdeSolution":
     first = [pi / 2 - s + s**3 / 18 - 7 * s**5 / 1800, -1 + s**2 / 6 - 7 * s**4 / 360]
     solution = solve_ivp(
         lambda sigma, f: [f[1], -(f[1] + np.sin(f[0])) / sigma],
-        (s, 1.95), first, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True,
+        (s, KNOWN), first, method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True,
     )  # fmt: skip
     assert solution.sol is not None
     return solution.sol
@@ -55,10 +56,15 @@ def sphere_net_rod(radius: float, offset: float, length: float, base: float | No
     The anchor is the north pole (0, 0, radius); the rod crosses the great circle x = 0 at arc length `offset`
     and starts along x. The result's `sol(s / radius)` is the position over the radius (3) and the unit
     tangent (3); `t_events` holds s / radius where the base is met.
+
+    Raises
+    ------
+    InputError : the rod would go on far past the limit of the net, where its equation is not solved.
     """
     from scipy.integrate import solve_ivp
 
     a = offset / radius
+    known = radius * KNOWN / abs(a) if a else np.inf
     start = np.array([0.0, np.sin(a), np.cos(a), 1.0, 0.0, 0.0])
 
     def frenet(s: float, y: Floats) -> Floats:
@@ -70,8 +76,14 @@ def sphere_net_rod(radius: float, offset: float, length: float, base: float | No
         return float(y[2] - base / radius) if base is not None else 1.0
 
     reach.terminal = True  # type: ignore[attr-defined]
-    return solve_ivp(frenet, (0.0, length / radius), start, method="DOP853", rtol=1e-12, atol=1e-13,
+    path = solve_ivp(frenet, (0.0, min(length, known) / radius), start, method="DOP853", rtol=1e-12, atol=1e-13,
                      events=reach, dense_output=True)  # fmt: skip
+    if length > known and path.t[-1] >= known / radius:
+        raise InputError(
+            f"the net of the sphere folds before the rod at offset {offset:g} m is {length:g} m long: "
+            f"ask for at most {known:.4g} m"
+        )
+    return path
 
 
 def sphere_net_end(radius: float, offset: float, base: float = 0.0) -> float:

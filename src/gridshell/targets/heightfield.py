@@ -13,7 +13,8 @@ from gridshell.targets.formula import parse_formula
 from gridshell.targets.heights import Heights
 from gridshell.targets.jet import Jet
 from gridshell.targets.soundness import climb, relative_radius, require_smooth, sample, trusted_region
-from gridshell.targets.target import Floats, Implicit, Target
+from gridshell.targets.standing import Standing
+from gridshell.targets.target import Floats, Implicit
 from gridshell.units import shown
 
 TIE = 1e-6  # of the size: peaks that are equally high
@@ -21,7 +22,7 @@ SAME = 1e-3  # of the size: refined peaks this close are one
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeightField(Target):
+class HeightField(Standing):
     """z = f(x, y), ending at the edge of its domain.
 
     The formula goes on past the edge. Where it stops being finite or turns steep (slope 4, or twice the

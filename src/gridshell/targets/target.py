@@ -2,14 +2,12 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError
-from gridshell.targets.domain import Domain
 
 Floats = NDArray[np.float64]
 
@@ -35,10 +33,10 @@ class Gap(NamedTuple):
 
 @dataclass(frozen=True)
 class Target(ABC):
-    """A surface F(x) = 0 that ends at a base plane or at the edge of its domain.
+    """A surface F(x) = 0 that ends somewhere.
 
     The surface itself is continued smoothly past that end: the net is marched there, and a rod is cut where
-    it crosses. For draping under gravity the body is closed by a wall straight down from its rim.
+    it crosses.
     """
 
     @property
@@ -47,17 +45,27 @@ class Target(ABC):
 
     @property
     @abstractmethod
-    def plan(self) -> Domain:
-        """The region enclosed by the rim, seen from above."""
+    def size(self) -> float:
+        """Half the largest width of the shell [m]: the length by which gaps are made relative."""
 
     @property
     def base(self) -> float | None:
-        """z of the base plane [m]; None where the target ends at the edge of its plan."""
+        """z of the base plane [m]; None where the target ends elsewhere."""
         return None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read about the target itself."""
+        return ()
 
     @abstractmethod
     def implicit(self, x: Floats) -> Implicit:
         """The implicit function at the points (n, 3) [m], also past the end."""
+
+    def level(self, x: Floats) -> tuple[Floats, Floats]:
+        """F (n,) and its gradient (n, 3) alone, where second derivatives would cost more."""
+        value, gradient, _ = self.implicit(x)
+        return value, gradient
 
     @abstractmethod
     def height(self, xy: Floats) -> Floats:
@@ -72,21 +80,18 @@ class Target(ABC):
     def parameters(self) -> dict[str, object]:
         """The target's kind and numbers in SI, as they stand in a case file."""
 
-    @cached_property
-    def size(self) -> float:
-        """Half the larger width of the plan [m]: the length by which gaps are made relative."""
-        return max(self.plan.half_extent)
-
+    @abstractmethod
     def margin(self, x: Floats) -> Floats:
         """(n,) how far inside the end the points (n, 3) are [m]; the shell is cut where this vanishes."""
-        if self.base is not None:
-            return x[:, 2] - self.base
-        return -self.plan.distance(x[:, :2])[0]
+
+    def carries(self, x: Floats) -> NDArray[np.bool_]:
+        """(n,) whether a net may start at the points (n, 3) of the surface: inside the end, or in an opening."""
+        return self.margin(x) > 0
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
         """Points (n, 3) moved onto the surface along its gradient (near the closest point for small gaps)."""
         for _ in range(steps):
-            value, gradient, _ = self.implicit(x)
+            value, gradient = self.level(x)
             x = x - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
             if np.max(np.abs(value), initial=0.0) <= 1e-15 * self.size:
                 break
@@ -154,54 +159,16 @@ class Target(ABC):
         y = self.closest(x)
         _, n, shape = self.on_surface(y)
         distance = np.einsum("ij,ij->i", x - y, n)
-        return Gap(distance, n, _offset_shape(shape, distance))
+        return Gap(distance, n, offset_shape(shape, distance))
 
     def contact(self, x: Floats) -> Gap:
-        """Signed distance (n,) to the body that a falling grid meets: surface, and wall below its rim."""
-        y = self.closest(x)
-        _, n, shape = self.on_surface(y)
-        distance = np.einsum("ij,ij->i", x - y, n)
-        hessian = _offset_shape(shape, distance)
-        ended = ~(self.margin(y) >= 0)
-        # beside the wall, which stands under the base or the rim, the nearer of surface and wall counts
-        low = np.flatnonzero(distance < 0 if self.base is None else x[:, 2] < self.base)
-        across, from_surface = self.plan.distance(x[low, :2])[0], distance[low]
-        ended[low] |= np.where(from_surface < 0, across > from_surface, across < from_surface)
-        if ended.any():
-            distance[ended], n[ended], hessian[ended] = self._wall(x[ended], ~(distance[ended] <= 0))
-        return Gap(distance, n, hessian)
+        """Signed distance (n,) to the body that a falling grid meets.
 
-    def _wall(self, x: Floats, over: NDArray[np.bool_]) -> Gap:
-        """The wall under the rim, or its upper corner; `over`: above the continued surface."""
-        across, normal, bend = self.plan.distance(x[:, :2])
-        foot = x[:, :2] - across[:, None] * normal
-        rim = np.full(len(x), self.base) if self.base is not None else self.height(foot)
-        n = np.column_stack([normal, np.zeros(len(x))])
-        hessian = np.zeros((len(x), 3, 3))
-        hessian[:, :2, :2] = bend
-        above = np.where(across > 0, x[:, 2] > rim, over & (self.base is None))
-        if above.any():  # a corner that a node slides over has no curvature
-            apart = x[above] - self._nearest_of_rim(x[above], foot[above])
-            far = np.linalg.norm(apart, axis=1)
-            across[above], n[above], hessian[above] = far, apart / np.maximum(far, 1e-300)[:, None], 0.0
-        return Gap(across, n, hessian)
-
-    def _nearest_of_rim(self, x: Floats, foot: Floats) -> Floats:
-        """Points (n, 3) of the rim closest to x; `foot` (n, 2) is closest in plan, which a level rim keeps."""
-        if self.base is not None:
-            return np.column_stack([foot, np.full(len(x), self.base)])
-        for _ in range(12):  # Gauss-Newton along the rim: an error shrinks by distance over radius
-            normal = self.plan.distance(foot)[1]
-            along = np.column_stack([-normal[:, 1], normal[:, 0]])
-            on_rim = np.column_stack([foot, self.height(foot)])
-            gradient = self.implicit(on_rim).gradient
-            rise = -np.einsum("ij,ij->i", gradient[:, :2], along) / gradient[:, 2]
-            tangent = np.column_stack([along, rise])
-            slide = np.einsum("ij,ij->i", x - on_rim, tangent) / (1.0 + rise**2)
-            foot = foot + slide[:, None] * along
-            across, normal, _ = self.plan.distance(foot)
-            foot = foot - across[:, None] * normal
-        return np.column_stack([foot, self.height(foot)])
+        Raises
+        ------
+        InputError : the target is no such body.
+        """
+        raise InputError(f'a grid cannot fall on a target of kind "{self.name}": use drape method "bound"')
 
     def lift(self, xy: Floats) -> Floats:
         """Points (n, 3) of the surface over the plan points (n, 2).
@@ -217,7 +184,7 @@ class Target(ABC):
         return np.column_stack([xy, z])
 
 
-def _offset_shape(shape: Floats, distance: Floats) -> Floats:
+def offset_shape(shape: Floats, distance: Floats) -> Floats:
     """Hessian of the distance at a point `distance` away: S (I + d S)^-1."""
     return np.asarray(shape @ np.linalg.inv(np.eye(3) + distance[:, None, None] * shape))
 

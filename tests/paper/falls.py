@@ -1,0 +1,64 @@
+"""Falls small enough for tests: single particles with closed forms, and coarse grids."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gridshell as gs
+from gridshell.contact.modified_mass import ModifiedMass, Stopped
+from gridshell.model import Freedom
+from gridshell.rods.elements import Elements
+from gridshell.solve.constraint import Supports
+from gridshell.solve.contact_euler import ContactEuler
+from gridshell.solve.forces import Gravity
+from gridshell.solve.implicit_euler import MakeMatrix, Motion, Step
+from gridshell.solve.summed import narrow_or_sparse
+
+Floats = NDArray[np.float64]
+
+G, STEP, MASS, RADIUS = 9.81, 0.01, 1e-4, 0.2
+PAPER_ROD = gs.Rod(gs.Circle(radius=1e-3), gs.Material(1e6, 1e3))
+HEMISPHERE = gs.Hemisphere(RADIUS)
+TARGETS: dict[str, gs.Target] = {
+    "hemisphere": HEMISPHERE,
+    "paraboloid": gs.Paraboloid(0.2, 0.12),
+    "ellipsoid": gs.Ellipsoid(0.2, 0.15, 0.12),
+    "hollow": gs.HeightField(formula="0.1 + x**2 + 0.5*y**2", domain=gs.Disc(RADIUS)),
+}
+
+
+def slope(tangent: float) -> gs.Target:
+    """A plane that falls along x by `tangent`."""
+    return gs.HeightField(formula=f"0.3 - {tangent}*x", domain=gs.Disc(RADIUS))
+
+
+class Particles:
+    """Nodes (n, 3) and, if given, elements between them, moved one step at a time."""
+
+    def __init__(
+        self,
+        target: gs.Target,
+        positions: Floats,
+        *,
+        elements: tuple[Elements, ...] = (),
+        free: Freedom | None = None,
+        stopped: Stopped = "wholly",
+        friction: float = 0.0,
+        matrix: MakeMatrix = narrow_or_sparse,
+    ) -> None:
+        self.state = np.array(positions, dtype=float)
+        self.velocity = np.zeros_like(self.state)
+        nodes = np.arange(len(self.state))
+        mass = np.full_like(self.state, MASS)
+        self.motion = Motion(elements, mass, Supports(free or Freedom.free(len(nodes))), (Gravity(nodes),))
+        self.stepper = ContactEuler(ModifiedMass(target, nodes, stopped, friction), matrix)
+
+    def step(self, times: int = 1) -> Step:
+        for _ in range(times):
+            taken = self.stepper.take(self.motion, self.state, self.velocity, time=0.0, step=STEP)
+            assert isinstance(taken, Step), taken
+            self.state, self.velocity = taken.state, taken.velocity
+        return taken
+
+
+def coarse_layout() -> gs.GridLayout:
+    return gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)

@@ -1,0 +1,140 @@
+"""The paper's drape in time against gravity statics, which shares only the energies with it."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gridshell as gs
+from gridshell.errors import InputError, StabilityError
+from gridshell.formfinding.draped import Draped
+from gridshell.formfinding.fall import Fall
+from gridshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
+from gridshell.solve.report import Status
+from gridshell.solve.time_series import TimeSeries
+from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
+
+TENTH = 0.1e-3  # [m]
+DRAG = 5.0  # 1/s: the hanging tails, pendulums of 0.3 m, stop swinging within two seconds
+FALLS = {
+    "shared": Fall(coupling=SharedDofs(), drag=DRAG),
+    "along the normal": Fall(coupling=SharedDofs(), drag=DRAG, stopped="along the normal"),
+    "implicit": Fall(coupling=ImplicitPenalty(), drag=DRAG),
+}
+
+
+@cache
+def fallen(name: str) -> Draped:
+    return gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=FALLS[name])
+
+
+@cache
+def at_rest_by_statics() -> Draped:
+    return gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="gravity")
+
+
+def apart(one: Draped, other: Draped) -> float:
+    """Largest distance of nodes on the target [m]: tails that hang may still swing."""
+    on = HEMISPHERE.margin(other.positions) > 0
+    return float(np.linalg.norm(one.positions - other.positions, axis=1)[on].max())
+
+
+@pytest.mark.parametrize("name", list(FALLS))
+def test_the_fall_comes_to_rest_where_statics_does(name: str) -> None:
+    draped = fallen(name)
+    assert draped.converged
+    assert draped.rest is not None
+    assert draped.rest.at_rest
+    assert apart(draped, at_rest_by_statics()) < TENTH
+    assert draped.max_gap < 1e-9  # nodes are on the planes of their closest points, which lie outside a sphere
+
+
+def test_stiff_springs_part_by_little_and_shared_unknowns_by_nothing() -> None:
+    shared, implicit = fallen("shared").rest, fallen("implicit").rest
+    assert shared is not None
+    assert implicit is not None
+    assert shared.joint_gap == 0.0
+    assert 0.0 < implicit.joint_gap < 1e-6
+
+
+def test_explicit_springs_part_by_the_force_over_their_stiffness() -> None:
+    """Half as stiff, twice the gap: the forces at the joints are the same to first order."""
+    gaps = []
+    for stiffness in (1.0, 2.0):
+        fall = Fall(coupling=ExplicitPenalty(C1=stiffness), drag=DRAG)
+        rest = gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall).rest
+        assert rest is not None
+        assert rest.at_rest
+        gaps.append(rest.joint_gap)
+    assert abs(gaps[0] / gaps[1] - 2.0) < 0.05
+
+
+def test_the_rest_without_friction_is_unstable_sideways_and_says_so() -> None:
+    draped = fallen("shared")
+    assert draped.rest is not None
+    growth = np.array(draped.rest.growth)
+    assert np.all(np.diff(growth) >= 0)
+    assert abs(growth[1] / growth[0] - 1) < 1e-3  # along x and along y alike
+    assert 3.0 < draped.rest.fastest_growth < 8.0  # a rope over a pulley: sqrt(g / length) is 5 to 6 per second
+    assert any("unstable sideways" in warning for warning in draped.warnings)
+
+
+def test_a_fall_that_is_cut_short_says_that_it_is_not_at_rest() -> None:
+    draped = gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=Fall(duration=0.3))
+    assert not draped.converged
+    assert draped.report.status is Status.MOVING
+    assert "NOT AT REST after 0.3 s" in draped.warnings[0]
+
+
+def test_beyond_the_step_limit_of_explicit_springs_a_fall_is_refused() -> None:
+    fall = Fall(coupling=ExplicitPenalty(C1=100.0), time_step=0.02)
+    with pytest.raises(StabilityError, match=r"unstable at a time step of 0\.02 s \(limit 0\.00"):
+        gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+
+
+def test_without_a_time_step_explicit_springs_take_one_that_they_bear() -> None:
+    fall = Fall(coupling=ExplicitPenalty(C1=100.0), duration=0.05)
+    draped = gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+    assert draped.rest is not None
+    assert draped.rest.steps >= 6
+
+
+def test_linkers_fall_alike_with_shared_unknowns_and_with_springs() -> None:
+    """Up to the first contact; later single nodes of each rod touch, and the chiral grid slides."""
+    layout = gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.08, edge=0.04, length=0.9)
+    ends = []
+    for coupling in (SharedDofs(), ImplicitPenalty()):
+        fall = Fall(coupling=coupling, drag=DRAG, duration=0.15)
+        draped = gs.drape(layout, PAPER_ROD, HEMISPHERE, method="paper", fall=fall, joint=Linker())
+        ends.append(draped.positions)
+    assert np.linalg.norm(ends[0] - ends[1], axis=1).max() < 1e-3 * RADIUS
+
+
+def test_frames_stream_to_disk(tmp_path: Path) -> None:
+    fall = Fall(duration=0.1, stream=tmp_path / "frames", every=2)
+    draped = gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+    series = TimeSeries.load(tmp_path / "frames")
+    np.testing.assert_allclose(series.times, np.arange(6) * 0.02, atol=1e-12)
+    nodes = len(draped.positions)
+    np.testing.assert_allclose(series.states[0, :nodes, 2], RADIUS + 0.05, atol=1e-12)
+    np.testing.assert_allclose(series.states[-1, :nodes], draped.positions, atol=1e-12)
+
+
+def test_friction_holds_what_else_slides_off() -> None:
+    """Started 1 mm off the middle: with friction it stays, without it the offset grows."""
+    offsets = {}
+    for friction in (0.0, 0.2):
+        layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)
+        fall = Fall(friction=friction, drag=DRAG, stopped="along the normal", duration=2.0)
+        draped = gs.drape(layout, PAPER_ROD, HEMISPHERE, method="paper", anchor=(1e-3, 0.0), fall=fall)
+        middle = draped.positions[np.argmin(np.linalg.norm(draped.mesh.flat, axis=1))]
+        offsets[friction] = abs(float(middle[0]))
+    assert offsets[0.2] < 1.5e-3
+    assert offsets[0.0] > 10e-3
+
+
+@pytest.mark.parametrize("name", ["height", "time_step", "duration"])
+def test_a_fall_refuses_what_is_not_positive(name: str) -> None:
+    with pytest.raises(InputError, match=f"the fall's {name} must be positive, not -1"):
+        Fall(**{name: -1.0})

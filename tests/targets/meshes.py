@@ -1,0 +1,95 @@
+"""Meshes that the tests make."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Mesh = tuple[Floats, Ints]
+
+
+def lattice(x: Floats, y: Floats, z: Floats) -> Mesh:
+    """Triangles between the points (n, m) of a lattice, in counter-clockwise order seen against x, y."""
+    rows, columns = x.shape
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    a, b, c, d = corner, corner + columns, corner + columns + 1, corner + 1
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    return points, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+def sheet(height: Callable[[Floats, Floats], Floats], half: float, count: int) -> Mesh:
+    """A square of a height field."""
+    x, y = np.meshgrid(np.linspace(-half, half, count), np.linspace(-half, half, count), indexing="ij")
+    return lattice(x, y, height(x, y) + 0 * x)
+
+
+def strewn(
+    height: Callable[[Floats, Floats], Floats], half: float, count: int, *, seed: int = 0, crowd: float = 1.0
+) -> Mesh:
+    """The same with vertices strewn at random, but for the edge, and faces in no order.
+
+    With `crowd` > 1 most lie near the middle: their distance grows towards the edge.
+    """
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(seed)
+    t = np.linspace(-1, 1, int(2 * np.sqrt(count)), endpoint=False)
+    one = np.ones_like(t)
+    inner = rng.uniform(-1.0, 1.0, (count, 2))
+    plan = np.vstack(
+        [
+            0.98 * np.sign(inner) * np.abs(inner) ** crowd,
+            *(np.column_stack(p) for p in ((t, -one), (one, t), (-t, one), (-one, -t))),
+        ]
+    )
+    faces = rng.permutation(Delaunay(plan).simplices)
+    p = plan[faces]
+    turn = np.sum((p[:, 1] - p[:, 0]) * (p[:, 2] - p[:, 0])[:, ::-1] * [1, -1], axis=1)
+    faces = np.where(turn[:, None] > 0, faces, faces[:, ::-1])[np.abs(turn) > 1e-9]
+    plan = half * plan
+    return np.column_stack([plan, height(*plan.T)]), faces
+
+
+def capped_sphere(rows: int, opening: float) -> Mesh:
+    """The part of the unit sphere within the polar angle `opening`; rings of six points more than the last."""
+    points, faces = [[0.0, 0.0, 1.0]], list[list[int]]()
+    rings = [[0]]
+    for i in range(1, rows + 1):
+        polar, count = opening * i / rows, 6 * i
+        ring = list(range(len(points), len(points) + count))
+        for angle in 2 * np.pi * np.arange(count) / count:
+            points.append([np.sin(polar) * np.cos(angle), np.sin(polar) * np.sin(angle), np.cos(polar)])
+        for side in range(6):
+            for j in range(i):
+                inner = rings[-1][(side * (i - 1) + j) % len(rings[-1])]
+                first, second = ring[side * i + j], ring[(side * i + j + 1) % count]
+                faces.append([inner, first, second])
+                if j < i - 1:
+                    faces.append([inner, second, rings[-1][(side * (i - 1) + j + 1) % len(rings[-1])]])
+        rings.append(ring)
+    return np.array(points), np.array(faces)
+
+
+def disc(height: Callable[[Floats, Floats], Floats], radius: float, rows: int) -> Mesh:
+    """A round piece of a height field."""
+    x, faces = capped_sphere(rows, np.pi / 2)
+    polar, angle = np.arccos(np.clip(x[:, 2], -1, 1)), np.arctan2(x[:, 1], x[:, 0])
+    plan = radius * polar / (np.pi / 2) * np.stack([np.cos(angle), np.sin(angle)])
+    return np.column_stack([*plan, height(*plan)]), faces
+
+
+def torus_piece() -> Mesh:
+    """Outer half of a ring's tube, a third of the ring round: curvature of both signs, and no height field."""
+    a, t = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1.9, 1.9, 40), indexing="ij")
+    r = 1.0 + 0.4 * np.sin(t)
+    return lattice(r * np.sin(a), r * np.cos(a), 0.4 * np.cos(t))
+
+
+PARTS: dict[str, Callable[[], Mesh]] = {
+    "saddle": lambda: sheet(lambda x, y: (x**2 - y**2) / 0.8, 0.2, 40),
+    "bowl": lambda: sheet(lambda x, y: 0.1 - x**2 - 0.5 * y**2 + 0.2 * x * y, 0.2, 40),
+    "ball": lambda: capped_sphere(20, 2.0),
+    "torus": torus_piece,
+}

@@ -1,0 +1,149 @@
+"""Targets from files: every format gives the same surface, and the command line takes the file alone."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gridshell as gs
+from gridshell.case import load_case
+from gridshell.cli import main
+from gridshell.targets import Freeform
+from tests.acceptance.targets_broken import WRITERS, broken_files, called
+from tests.targets.meshes import PARTS, Mesh
+
+MM = 1e-3
+
+
+@pytest.fixture(scope="module")
+def bowl() -> Mesh:
+    x, faces = PARTS["bowl"]()
+    return 1e3 * x, faces
+
+
+def write_glb(path: Path, mesh: Mesh) -> None:
+    import trimesh
+
+    trimesh.Trimesh(*mesh, process=False).export(path)
+
+
+@pytest.mark.parametrize("kind", [*WRITERS, "glb"])
+def test_every_format_gives_the_same_surface(kind, bowl, tmp_path):
+    path = tmp_path / f"bowl.{kind}"
+    if kind == "glb":
+        write_glb(path, bowl)
+    else:
+        path.write_bytes(WRITERS[kind](*bowl))
+    target = gs.surface_from(path, unit=MM)
+    assert target.size == pytest.approx(0.2, rel=1e-5)
+    points = bowl[0][::7] * MM
+    assert np.abs(target.implicit(points).value).max() < 5e-6
+    assert target.parameters() == {"kind": "mesh", "unit": MM, "file": str(path)}
+
+
+def test_gltf_is_in_metres_and_others_must_say_their_unit(bowl, tmp_path):
+    write_glb(tmp_path / "bowl.glb", (MM * bowl[0], bowl[1]))
+    assert gs.surface_from(tmp_path / "bowl.glb").size == pytest.approx(0.2, rel=1e-5)
+    (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
+    with pytest.raises(gs.InputError, match=r"its unit \(it is 400 x 400 x [0-9.]+ units wide\).* --unit mm"):
+        gs.surface_from(tmp_path / "bowl.obj")
+
+
+def test_of_several_objects_one_is_chosen_by_its_name(bowl, tmp_path):
+    import trimesh
+
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.Trimesh(MM * bowl[0], bowl[1], process=False), geom_name="roof")
+    scene.add_geometry(trimesh.Trimesh(MM * bowl[0] + 2, bowl[1], process=False), geom_name="wall")
+    scene.export(tmp_path / "house.glb")
+    with pytest.raises(gs.InputError, match="2 separate pieces"):
+        gs.surface_from(tmp_path / "house.glb")
+    with pytest.raises(gs.InputError, match=r'no object named "door": it holds "(roof|wall)", "(roof|wall)"'):
+        gs.surface_from(tmp_path / "house.glb", name="door")
+    assert gs.surface_from(tmp_path / "house.glb", name="wall").summit == pytest.approx((2.0, 2.0), abs=1e-3)
+
+
+def test_a_table_of_heights_is_its_surface(tmp_path):
+    """The first row is that of the largest y; an empty cell is a hole at the corner of four others."""
+
+    def height(x, y):
+        return 0.1 - x**2 - 0.6 * y**2 + 0.3 * x * y + 0.05 * x
+
+    x, y = np.linspace(-0.2, 0.2, 41), np.linspace(0.15, -0.15, 31)
+    table = height(x[None], y[:, None])
+    np.savetxt(tmp_path / "roof.csv", 1e3 * table, delimiter=";")
+    target = gs.heights_from(tmp_path / "roof.csv", size=(0.4, 0.3), height=MM)
+    px, py = np.random.default_rng(0).uniform(-0.14, 0.14, (2, 200))
+    assert target.height(np.column_stack([px, py])) == pytest.approx(height(px, py), abs=1e-6)
+    rows = [",".join(f"{z:.6f}" for z in row) for row in table]
+    rows[15] = ",".join("" if k == 20 else cell for k, cell in enumerate(rows[15].split(",")))
+    (tmp_path / "holed.csv").write_text("\n".join(rows))
+    holed = gs.heights_from(tmp_path / "holed.csv", size=(0.4, 0.3))
+    assert len(holed.surface.loops) == 2
+    assert np.sign(holed.margin(np.array([[0.0, 0.0, 0.1], [0.05, 0.0, 0.1]]))).tolist() == [-1.0, 1.0]
+
+
+def test_a_grey_image_is_heights_between_black_and_white(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    x, y = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(1, -1, 40))
+    share = 0.9 - 0.4 * x**2 - 0.3 * y**2 + 0.1 * x
+    image.fromarray(np.rint(65535 * share).astype(np.uint16)).save(tmp_path / "roof.png")
+    target = gs.heights_from(tmp_path / "roof.png", size=(0.6, 0.4), height=0.2)
+    assert target.height(np.array([[0.15, 0.1], [-0.15, -0.1]])) == pytest.approx(
+        0.2 * (0.9 - 0.1 - 0.075 + 0.05 * np.array([1, -1])), abs=2e-5
+    )
+
+
+def test_a_nurbs_patch_is_met_and_its_trim_bounds_it(tmp_path):
+    """A plane trimmed to a circle, and the same plane whole: the surface of both goes on past the trim."""
+    rhino3dm = pytest.importorskip("rhino3dm")
+    circle = rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 150.0).ToNurbsCurve()
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+    named = rhino3dm.ObjectAttributes()
+    named.Name = "round"
+    model.Objects.AddBrep(rhino3dm.Brep.CreateTrimmedPlane(rhino3dm.Plane.WorldXY(), circle), named)
+    model.Objects.AddBrep(rhino3dm.Sphere(rhino3dm.Point3d(0, 0, 0), 200.0).ToBrep(), rhino3dm.ObjectAttributes())
+    model.Write(str(tmp_path / "two.3dm"), 7)
+    with pytest.raises(gs.InputError, match="2 surfaces: choose one"):
+        gs.surface_from(tmp_path / "two.3dm")
+    target = gs.surface_from(tmp_path / "two.3dm", name="round")
+    angle = np.linspace(0, 6, 40)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    assert target.margin(0.1 * ring) == pytest.approx(0.05, rel=1e-3)
+    assert target.margin(0.17 * ring) == pytest.approx(-0.02, rel=1e-3)
+
+
+def test_the_command_line_takes_a_mesh_and_writes_a_case_that_gives_it_again(bowl, tmp_path, capsys):
+    (tmp_path / "roof.obj").write_bytes(WRITERS["obj"](20 * bowl[0], bowl[1]))
+    out = tmp_path / "out"
+    arguments = ["form", str(tmp_path / "roof.obj"), "--unit", "mm", "--spacing", "1000mm", "--out", str(out)]
+    assert main([*arguments, "--json", "--quiet"]) == 0
+    assert json.loads(capsys.readouterr().out)["status"] == "converged"
+    first = json.loads((out / "result.json").read_text())
+    assert first["target"]["kind"] == "mesh"
+    assert first["layout"]["edge"] == pytest.approx(1 / 6)
+    case = load_case(out / "case.toml")
+    assert case.target.kind == "mesh"
+    assert main(["form", str(out / "case.toml"), "--out", str(tmp_path / "again"), "--quiet"]) == 0
+    again = json.loads((tmp_path / "again" / "result.json").read_text())
+    assert again["footprint"] == first["footprint"]
+
+
+def test_a_case_names_files_from_its_own_folder(bowl, tmp_path, monkeypatch):
+    (tmp_path / "roof.off").write_bytes(WRITERS["off"](*bowl))
+    (tmp_path / "case.toml").write_text(
+        '[target]\nkind = "mesh"\nfile = "roof.off"\nunit = "mm"\nmove = [0, 0, "1 m"]\n'
+    )
+    monkeypatch.chdir("/")
+    target = load_case(tmp_path / "case.toml").build().target
+    assert isinstance(target, Freeform)
+    assert target.height(np.zeros((1, 2)))[0] == pytest.approx(1.1, abs=1e-4)
+
+
+def test_broken_files_are_refused_in_one_sentence(tmp_path):
+    """A tenth of those that `make accept-targets` tries, every kind of fault among them in some format."""
+    for what, arguments in list(broken_files(tmp_path))[3::10]:
+        result = called(what, arguments, tmp_path / "out")
+        assert not result.wrong, (what, result)
