@@ -21,6 +21,8 @@ Kind = Literal[
     "bending stiffness",
     "mass per length",
     "inertia per length",
+    "time",
+    "stiffness",
     "number",
 ]
 
@@ -75,6 +77,8 @@ _KINDS: dict[Kind, _Units] = {
             "6894757.293168361 ksi",
         ),
     ),
+    "time": _Units("a time", '"10 ms"', _factors("1 s second seconds", "0.001 ms")),
+    "stiffness": _Units("a stiffness", '"0.8 N/m"', _factors("1 N/m", "1e3 N/mm kN/m")),
     "density": _Units(
         "a density",
         '"1000 kg/m3"',

@@ -167,7 +167,12 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ("target.kind = 3", "target.kind = 3: use"),
         ("target.kind = []", "target.kind = []: use"),
         ('target.file = "dome.obj"', 'a target of kind "hemisphere" has no file'),
-        ('joint.kind = "pin"', 'joint.kind = "pin": not yet: use "ball"'),
+        ('joint.kind = "glue"', 'joint.kind = "glue": use "ball", "pin", "spring", "linker" or "rigid"'),
+        ("joint.shear = 1", 'a joint of kind "ball" has no shear: leave it out, or set joint.kind to "spring"'),
+        ('joint = { kind = "spring", shear = -1 }', "joint.shear = -1: must not be negative"),
+        ('joint = { kind = "spring", twist = "2 mm" }', "mm is a unit of length"),
+        ('joint = { kind = "linker", corners = 3 }', "joint.corners = 3: give 2, opposite corners"),
+        ('joint = { kind = "pin", eccentricity = "-1 mm" }', "must not be negative"),
         ('drape.method = "magic"', 'drape.method = "magic": use "bound", "gravity" or "paper"'),
         ("drape.anchor = 1", "drape.anchor = 1: needs two values"),
         ("drape.gravity = -9.81", "drape.gravity = -9.81: must be larger than zero"),
@@ -244,6 +249,7 @@ def test_a_built_target_has_the_numbers_of_its_case(name: str) -> None:
 
 
 def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
+    from gridshell.joints import Ball, Pin
     from gridshell.layout import GridLayout
     from gridshell.rods.section import Circle, Material, Rod, Tube
 
@@ -258,11 +264,15 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
         "anchor": (0.1, 0.0),
         "gravity": 9.81,
         "ends": ("pinned", "clamped"),
+        "fall": None,
+        "joint": Ball(),
     }
     tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
+    tube |= {"joint.kind": "pin", "joint.eccentricity": "2 mm"}
     built = load_case("hemisphere", tube).build()
     assert built.rod.section == Tube(0.001, 0.0001)
     assert built.drape_options["ends"] == ("pinned",)
+    assert built.drape_options["joint"] == Pin(eccentricity=0.002)
     assert built.drape_options["anchor"] is None
 
 

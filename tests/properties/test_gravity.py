@@ -151,8 +151,9 @@ def test_a_grid_that_slid_off_advises_the_bound_drape():
 
 
 def test_a_saddle_is_reported_with_its_negative_modes():
-    """Across an ellipsoid's long top the grid sits like a rope over a pulley."""
-    layout = gs.GridLayout.orthogonal(spacing=0.04, edge=0.04 / 3)
+    """Across an ellipsoid's long top the grid sits like a rope over a pulley. (On finer meshes round-off decides
+    whether the descent ends there or slides off.)"""
+    layout = gs.GridLayout.orthogonal(spacing=0.04, edge=0.04)
     draped = gs.drape(layout, rod_of(), gs.Ellipsoid(0.2, 0.15, 0.12), method="gravity")
     assert draped.converged
     assert draped.report.negative_modes == 1
