@@ -18,8 +18,8 @@ from threadpoolctl import threadpool_limits
 
 import gridshell as gs
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import _Step as Newton
 from gridshell.solve.mixed_newton import Problem
+from gridshell.solve.mixed_newton import _Step as Newton
 from gridshell.solve.multifrontal import Multifrontal
 
 PATIENCE = 20.0
