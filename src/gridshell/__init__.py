@@ -30,13 +30,17 @@ if TYPE_CHECKING:
         Agreement,
         Boundary,
         Draped,
+        Fall,
         Footprint,
         Popped,
+        Rise,
+        Risen,
         Trimmed,
         agreement,
         drape,
         map_back,
         pop_up,
+        pop_up_in_time,
         trim,
     )
     from gridshell.joints import (
@@ -82,8 +86,8 @@ _HOMES = {
     "gridshell.fabrication": ("Fabrication",),
     "gridshell.form": ("Form", "PoppedUp", "find_form", "pop_up_table"),
     "gridshell.formfinding": (
-        "Agreement", "Boundary", "Draped", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
-        "pop_up", "trim",
+        "Agreement", "Boundary", "Draped", "Fall", "Footprint", "Popped", "Rise", "Risen", "Trimmed", "agreement",
+        "drape", "map_back", "pop_up", "pop_up_in_time", "trim",
     ),
     "gridshell.joints": (
         "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
@@ -110,15 +114,15 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Agreement", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping", "Disc", "Draped",
-    "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication",
+    "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall",
     "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity", "GridLayout", "GridMesh",
     "GridshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError",
     "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutputError", "Paraboloid", "Pin", "Placement",
-    "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rod", "RodShape", "RodStrains",
-    "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube",
-    "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
-    "pop_up_table", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from",
-    "trim",
+    "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape",
+    "RodStrains", "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed",
+    "Tube", "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
+    "pop_up_in_time", "pop_up_table", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods",
+    "surface_from", "trim",
 ]  # fmt: skip
 
 

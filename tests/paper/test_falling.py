@@ -101,7 +101,7 @@ def test_without_a_time_step_explicit_springs_take_one_that_they_bear() -> None:
 
 
 def test_linkers_fall_alike_with_shared_unknowns_and_with_springs() -> None:
-    """Up to the first contact; later single nodes of each rod touch, and the chiral grid slides."""
+    """Just past the first impact, where linkers that did not land would go on; later the chiral grid slides."""
     layout = gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.08, edge=0.04, length=0.9)
     ends = []
     for coupling in (SharedDofs(), ImplicitPenalty()):

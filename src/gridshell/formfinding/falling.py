@@ -103,15 +103,14 @@ class _Falling:
     """The motion, and what is asked of it on the way and at its end."""
 
     def __init__(self, target: Target, shell: Shell, gravity: float, fall: Fall, progress: Progress) -> None:
-        nodes = np.arange(shell.node_count)
-        massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # linkers with nodes of their own, too
+        massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # linkers' own nodes, too: they fall and land
         pull = Gravity(massive, (0.0, 0.0, -gravity))
         self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
         self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
         self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)
         self._heaviest = float(-self.load[:, 2].min())
         self._weight = float(-self.load[:, 2].sum())
-        law = ModifiedMass(target, nodes, fall.stopped, fall.friction)
+        law = ModifiedMass(target, massive, fall.stopped, fall.friction)
         self.stepper = ContactEuler(law, narrow_or_dissected(shell.places))
 
     def run(self, positions: Floats) -> TimeSeries:

@@ -87,13 +87,18 @@ def _projected(points: Floats) -> Floats:
 
 
 def _dome(target: Target) -> Floats:
-    """(n, 3) points of the target inside its end."""
+    """(n, 3) points of the target inside its end, and of the ground that it covers."""
     half = target.size
-    grid = np.linspace(-half, half, 81)
+    grid = np.linspace(-half, half, 161)
     xy = np.column_stack([one.ravel() for one in np.meshgrid(grid, grid)])
     points = np.column_stack([xy, target.height(xy)])
     points = points[np.isfinite(points[:, 2])]
-    return points[target.margin(points) >= 0]
+    points = points[target.margin(points) >= 0]
+    if target.base is None:
+        return points
+    ground = points.copy()
+    ground[:, 2] = target.base
+    return np.vstack([points, ground])
 
 
 def _rods(mesh: GridMesh, at: Floats) -> Iterable[str]:

@@ -78,7 +78,9 @@ class Drape:
             return f"after {rest.time:.1f} s; " + (f"unstable sideways, {growth:.1f} per s" if growth else "stable")
         if not self.draped.converged:
             return self.draped.report.status.value.upper()
-        return "stable" if self.draped.report.stable else f"{self.draped.report.negative_modes} negative modes"
+        held = ", one joint and its heading held" if self.method == "gravity" else ""
+        modes = self.draped.report.negative_modes
+        return ("stable" if modes == 0 else f"{modes} negative modes") + held
 
     def row(self) -> tuple[str, ...]:
         """Of the table."""

@@ -73,9 +73,9 @@ def simulate(
     """
     velocity = np.zeros_like(state) if velocity is None else velocity
     _check(motion, state, velocity, until - start, step, every, halvings)
-    begun = clock.perf_counter()
     count = max(1, ceil((until - start) / step - 1e-9))
     refuse_unstable(motion, state, (until - start) / count)
+    begun = clock.perf_counter()
     grid = _Grid(start, (until - start) / count)
     stepper = stepper or ImplicitEuler(matrix)
     recorder = Recorder(1 + count // every, state.shape, stream)
