@@ -33,16 +33,14 @@ if TYPE_CHECKING:
         Fall,
         Footprint,
         Popped,
-        Rise,
-        Risen,
         Trimmed,
         agreement,
         drape,
         map_back,
         pop_up,
-        pop_up_in_time,
         trim,
     )
+    from gridshell.formfinding.rising import Rise, Risen, pop_up_in_time
     from gridshell.joints import (
         Ball,
         ExplicitPenalty,
@@ -86,9 +84,10 @@ _HOMES = {
     "gridshell.fabrication": ("Fabrication",),
     "gridshell.form": ("Form", "PoppedUp", "find_form", "pop_up_table"),
     "gridshell.formfinding": (
-        "Agreement", "Boundary", "Draped", "Fall", "Footprint", "Popped", "Rise", "Risen", "Trimmed", "agreement",
-        "drape", "map_back", "pop_up", "pop_up_in_time", "trim",
+        "Agreement", "Boundary", "Draped", "Fall", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
+        "pop_up", "trim",
     ),
+    "gridshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
     "gridshell.joints": (
         "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
     ),

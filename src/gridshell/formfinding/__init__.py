@@ -6,10 +6,9 @@ from gridshell.formfinding.draped import Draped
 from gridshell.formfinding.fall import Fall
 from gridshell.formfinding.pipeline import FoundForm, PoppedTable, find_stages, pop_up_stages
 from gridshell.formfinding.popup import Popped, pop_up
-from gridshell.formfinding.rising import Rise, Risen, pop_up_in_time
 from gridshell.formfinding.trim import Boundary, Footprint, Trimmed, map_back, trim
 
 __all__ = [
-    "Agreement", "Boundary", "Draped", "Fall", "Footprint", "FoundForm", "Popped", "PoppedTable", "Rise", "Risen",
-    "Trimmed", "agreement", "drape", "find_stages", "map_back", "pop_up", "pop_up_in_time", "pop_up_stages", "trim",
+    "Agreement", "Boundary", "Draped", "Fall", "Footprint", "FoundForm", "Popped", "PoppedTable", "Trimmed",
+    "agreement", "drape", "find_stages", "map_back", "pop_up", "pop_up_stages", "trim",
 ]  # fmt: skip

@@ -6,7 +6,6 @@ from gridshell.errors import InputError
 from gridshell.formfinding.bound import bound_drape
 from gridshell.formfinding.draped import Draped
 from gridshell.formfinding.fall import Fall
-from gridshell.formfinding.falling import falling_drape
 from gridshell.formfinding.gravity import gravity_drape
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.joints import Joint
@@ -51,6 +50,8 @@ def drape(
     if method == "gravity":
         return gravity_drape(target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, progress=progress)
     if method == "paper":
+        from gridshell.formfinding.falling import falling_drape  # with the dynamics
+
         return falling_drape(
             target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, fall=fall, progress=progress
         )

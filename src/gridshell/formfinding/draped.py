@@ -1,18 +1,21 @@
 """The draped grid: what both ways of draping return."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.formfinding.fall import Fall
-from gridshell.formfinding.rest import Rest
 from gridshell.geometry.vectors import cross, dot, unit
 from gridshell.layout import FlatRod, GridLayout, GridMesh
 from gridshell.nets import ChebyshevNet
 from gridshell.rods.section import Rod
 from gridshell.solve.report import SolveReport, Status
 from gridshell.targets import Target
+
+if TYPE_CHECKING:
+    from gridshell.formfinding.rest import Rest
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +58,7 @@ class Draped:
     net: ChebyshevNet | None
     dropped: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
-    rest: Rest | None = None
+    rest: "Rest | None" = None
     fall: Fall | None = None
 
     @property

@@ -22,7 +22,6 @@ from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Equilibrium, Problem, find_stable
 from gridshell.solve.path import follow
-from gridshell.solve.relax import relax
 from gridshell.solve.report import SolveReport
 
 Floats = NDArray[np.float64]
@@ -134,6 +133,8 @@ class _PopUp:
         )
         if at_once.report.stable:
             return shell, at_once
+        from gridshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
+
         slid = relax(
             self.problem(shell),
             state,

@@ -63,7 +63,7 @@ def _image(path: Path) -> Floats:
     try:
         from PIL import Image
     except ImportError:
-        raise InputError(f'{path}: cannot be read as an image: give a PNG or a CSV') from None
+        raise InputError(f"{path}: cannot be read as an image: give a PNG or a CSV") from None
     try:
         with Image.open(path) as image:
             image.load()
