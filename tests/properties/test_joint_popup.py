@@ -144,3 +144,11 @@ def test_a_gravity_drape_with_pins_ends_where_one_with_balls_does():
         assert fallen.converged
         lengths.append([rod.length for rod in gs.trim(fallen).mesh.grid.rods])
     assert np.abs(np.subtract(*lengths)).max() < 2e-3 * 0.2
+
+
+def test_three_rods_at_one_node_have_one_kind_of_joint():
+    grid = gs.straight_rods([[[-1, 0], [1, 0]], [[0, -1], [0, 1]], [[-1, -1], [1, 1]]])
+    mesh = gs.mesh_grid(grid, 0.25)
+    for other in (gs.Linker(), gs.Ball(), gs.Rigid()):
+        with pytest.raises(gs.InputError, match="give all of them one kind"):
+            gs.Shell.of(mesh, ROD, joint=[gs.Pin(), gs.Pin(), other])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gridshell.errors import InputError
 from gridshell.joints.crossings import Places
-from gridshell.joints.joint import Elastic
+from gridshell.joints.joint import Elastic, Joint
 from gridshell.joints.relative_rotation import RelativeRotation
 from gridshell.joints.sections import stencils
 from gridshell.rods.elements import Floats, Ints
@@ -35,7 +35,6 @@ def elastic_joints(
     crossings : (m,) which of the grid's; joints : what is there.
     of_rods : (rods, 3) EI1, EI2 and GJ of each rod [N m2].
     """
-    _refuse_mixtures(places.mesh.joint_nodes[crossings], joints)
     stiff = np.array([joint.shear + joint.out_of_plane + joint.twist > 0 for joint in joints], dtype=bool)
     crossings, joints = crossings[stiff], [joint for joint, kept in zip(joints, stiff, strict=True) if kept]
     if not joints:
@@ -155,8 +154,9 @@ def _bisectors(places: Places, met: Ints, directions: Floats) -> tuple[Floats, n
     return np.column_stack([path, np.zeros(len(met))]), corner
 
 
-def _refuse_mixtures(node: Ints, joints: Sequence[Elastic]) -> None:
-    first: dict[int, Elastic] = {}
+def refuse_mixtures(node: Ints, joints: Sequence[Joint]) -> None:
+    """Three rods or more that meet at one node (c,) are tied by one kind of joint."""
+    first: dict[int, Joint] = {}
     for where, joint in zip(node.tolist(), joints, strict=True):
         if first.setdefault(where, joint) != joint:
             raise InputError(

@@ -20,7 +20,7 @@ from gridshell.geometry.frames import adapted, parallel_transport, signed_angle
 from gridshell.geometry.vectors import unit
 from gridshell.joints import Ball, Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, SharedDofs, Ties
 from gridshell.joints.crossings import Places
-from gridshell.joints.elastic import elastic_joints
+from gridshell.joints.elastic import elastic_joints, refuse_mixtures
 from gridshell.joints.linkers import Corners, LinkerBend
 from gridshell.joints.offset_tie import layers, offset_ties
 from gridshell.layout import GridMesh
@@ -202,6 +202,8 @@ class _Builder:
         self.mesh, self.coupling = mesh, coupling
         self.rods = _one_each(rod, Rod, len(mesh.grid.rods), "rods")
         self.joints = _one_each(joint or Ball(), None, len(mesh.grid.crossings), "crossings")
+        if isinstance(joint, Sequence):
+            refuse_mixtures(mesh.joint_nodes, self.joints)
         self.stiffness = np.array([(*one.bend_stiffnesses, one.twist_stiffness) for one in self.rods])
         self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
         needed = not self.isotropic or any(one.turns_frames for one in self.joints)
