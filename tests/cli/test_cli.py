@@ -134,7 +134,8 @@ def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
         assert f"--{key}, {alias} " in shown
 
 
-WORDS = [key for key in case_keys() if key.startswith(("drawings.layers.", "drawings.project", "drawings.revision"))]
+ANY_WORDS = ("drawings.layers.", "drawings.project", "drawings.revision", "drape.frames")
+WORDS = [key for key in case_keys() if key.startswith(ANY_WORDS)]
 
 
 @pytest.mark.parametrize("key", [key for key in case_keys() if key not in WORDS])

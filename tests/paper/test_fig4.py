@@ -92,4 +92,5 @@ def test_figure_is_written_with_its_tables(tmp_path):
 
 def test_a_figure_that_is_not_there_is_refused(capsys):
     assert main(["paper", "fig5"]) == 2
-    assert capsys.readouterr().err == "gridshell: error: there is no figure fig5 here: the figures are fig4\n"
+    refused = "gridshell: error: there is no figure fig5 here: the figures are fig4, fig6, fig7, fig8\n"
+    assert capsys.readouterr().err == refused
