@@ -19,6 +19,7 @@ angles of a motion are hence measured from frames that travel with the rod, and 
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
+from math import isfinite
 from typing import Protocol, Self
 
 import numba as nb
@@ -108,9 +109,8 @@ class Motion:
 
     def refreshed(self, state: Floats) -> Self:
         """The same motion with its source frames at `state`."""
-        elements, explicit = (
-            tuple(element.refreshed(state) for element in some) for some in (self.elements, self.explicit)
-        )
+        elements = tuple([element.refreshed(state) for element in self.elements])
+        explicit = tuple([element.refreshed(state) for element in self.explicit])
         return type(self)(elements, self.mass, self.constraint, self.forces, explicit)
 
     def in_parts(self, most: int = PART) -> Self:
@@ -149,21 +149,20 @@ class ImplicitEuler:
         end = time + step
         constraint = motion.constraint_at(end)
         free = constraint.freedom(state)
-        implicit = tuple(force for force in motion.forces if isinstance(force, ImplicitForce))
-        held, inertia = np.zeros_like(state), motion.mass / step**2
-        for element in motion.explicit:
-            element.evaluate(state, held)
-        np.negative(held, out=held)
+        implicit = tuple([force for force in motion.forces if isinstance(force, ImplicitForce)])
+        held, inertia = motion.mass * velocity, motion.mass / step**2
+        held /= step
         for force in motion.forces:
             given = force.held(end, state, velocity, motion.mass)
             if given is not None:
                 held += given
             if isinstance(force, Damping):
                 inertia += force.drag(motion.mass) / step
-        if not np.isfinite(held).all():
+        if motion.explicit:
+            held -= _gradient(motion.explicit, state)
+        if not isfinite(float(held.sum())):
             raise InputError(f"an external force is not finite at t = {end:.6g} s: check its parameters")
         self._plan(motion, implicit, free)
-        held += motion.mass * velocity / step
         return _Newton(self, motion, constraint, implicit, inertia, held, state, velocity, end, step).solve()
 
     def _plan(self, motion: Motion, implicit: tuple[ImplicitForce, ...], free: Freedom) -> None:
@@ -178,6 +177,13 @@ class ImplicitEuler:
         self.matrix = self._make_matrix(blocks, free)
         widths = {3 * b.shape[1]: max(len(c) for c in blocks if c.shape[1] == b.shape[1]) for b in blocks}
         self.buffers = {width: np.zeros((count, width, width)) for width, count in widths.items()}
+
+
+def _gradient(elements: tuple[Elements, ...], state: Floats) -> Floats:
+    gradient = np.zeros_like(state)
+    for element in elements:
+        element.evaluate(state, gradient)
+    return gradient
 
 
 @dataclass
@@ -216,7 +222,7 @@ class _Newton:
             newton = self.plan.matrix.solve(total, free)
             length, share = self._size(newton), 1.0
             while True:
-                state, trial = self._retracted(moved - share * newton)
+                state, trial = self._retracted(moved - (newton if share == 1.0 else share * newton))
                 simplified, reactions = self._simplified(state, trial)
                 left = self._size(simplified)
                 if left <= (1.0 - 0.25 * share) * length or left <= floor:
