@@ -9,7 +9,7 @@ import numpy as np
 import gridshell as gs
 from gridshell.paper.two_rods import Demonstration, run, run_statics
 from gridshell.solve.step_limit import step_limit
-from tests.acceptance.rows import Row
+from tests.acceptance.rows import Row, print_table
 from tests.analytic import coupling_problems as couplings
 from tests.analytic import joint_problems as joints
 from tests.analytic.rod_problems import order
@@ -130,14 +130,5 @@ def all_rows() -> Iterator[Row]:
     yield from demonstration_rows()
 
 
-def main() -> int:
-    missed = 0
-    for row in all_rows():
-        print(row, flush=True)
-        missed += not row.reached
-    print(f"{missed} figures missed" if missed else "every figure reached")
-    return 1 if missed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(print_table(all_rows()))

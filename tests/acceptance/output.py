@@ -22,7 +22,7 @@ from gridshell.output import Archive
 from gridshell.output.archive import export
 from gridshell.output.files import DEFAULT
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
-from tests.acceptance.rows import Row
+from tests.acceptance.rows import Row, print_table
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "files"))  # the readers and samples of the tests of files
 from dxf_reader import read_dxf, rods_of_dxf
@@ -206,14 +206,5 @@ def all_rows() -> Iterator[Row]:
     yield from time_rows()
 
 
-def main() -> int:
-    missed = 0
-    for row in all_rows():
-        print(row, flush=True)
-        missed += not row.reached
-    print(f"{missed} figures missed" if missed else "every figure reached")
-    return 1 if missed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(print_table(all_rows()))

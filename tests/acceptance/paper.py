@@ -17,7 +17,7 @@ from gridshell.formfinding.draped import Draped
 from gridshell.formfinding.fall import Fall
 from gridshell.formfinding.rising import Rise, pop_up_in_time
 from gridshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
-from tests.acceptance.rows import Row
+from tests.acceptance.rows import Row, print_table
 from tests.paper.falls import TARGETS, Particles
 
 ROD = gs.Rod(gs.Circle(radius=1e-3), gs.Material(1e6, 1e3))
@@ -201,13 +201,9 @@ ROWS: tuple[Callable[[], Iterator[Row]], ...] = (
 
 
 def main() -> int:
+    """All groups of rows, or those that are named: `python -m tests.acceptance.paper tail explicit`."""
     chosen = [rows for rows in ROWS if not sys.argv[1:] or rows.__name__.removesuffix("_rows") in sys.argv[1:]]
-    missed = 0
-    for rows in chosen:
-        for row in rows():
-            print(row, flush=True)
-            missed += not row.reached
-    return 1 if missed else 0
+    return print_table(row for rows in chosen for row in rows())
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from math import radians
 import numpy as np
 
 from gridshell.rods.bend_twist import BendTwist
-from tests.acceptance.rows import Row
+from tests.acceptance.rows import Row, print_table
 from tests.analytic import rod_problems as exact
 from tests.derivatives import test_elements as elements
 
@@ -103,14 +103,5 @@ def all_rows() -> Iterator[Row]:
     yield from holonomy_rows()
 
 
-def main() -> int:
-    missed = 0
-    for row in all_rows():
-        print(row, flush=True)
-        missed += not row.reached
-    print(f"{missed} figures missed" if missed else "every figure reached")
-    return 1 if missed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(print_table(all_rows()))

@@ -1,6 +1,6 @@
 """The acceptance table, row by row: what was measured, and the figure that it must reach."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,16 @@ class Row:
         verdict = "ok  " if self.reached else "MISS"
         figure = f"{self.measured:9.3g} <= {self.bound:<7.3g}{self.unit:<6}"
         return f"{verdict} {self.case:<36} {self.what:<38} {figure} {self.note}"
+
+
+def print_table(rows: Iterable[Row]) -> int:
+    """Print rows as they come; 1 where a figure is missed, for `sys.exit`."""
+    missed = 0
+    for row in rows:
+        print(row, flush=True)
+        missed += not row.reached
+    print(f"{missed} figures missed" if missed else "every figure reached")
+    return 1 if missed else 0
 
 
 _FORMS: dict[str, gs.Form] = {}

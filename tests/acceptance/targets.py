@@ -12,7 +12,7 @@ import numpy as np
 import gridshell as gs
 from examples.gallery import LATH, gallery
 from tests.acceptance.cases import ROD
-from tests.acceptance.rows import Row
+from tests.acceptance.rows import Row, print_table
 from tests.acceptance.targets_broken import broken_files, called
 from tests.acceptance.targets_random import outcome
 from tests.targets.meshes import Mesh, capped_sphere, disc, sheet, strewn
@@ -248,14 +248,5 @@ def all_rows() -> Iterator[Row]:
     yield from broken_rows()
 
 
-def main() -> int:
-    missed = 0
-    for row in all_rows():
-        print(row, flush=True)
-        missed += not row.reached
-    print(f"{missed} figures missed" if missed else "every figure reached")
-    return 1 if missed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(print_table(all_rows()))

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gridshell as gs
-from gridshell.fabrication import Fabrication, diagonals, fabricate, layers, nest, splices
+from gridshell.fabrication import Fabrication, diagonals, fabricate, nest, splices
 from gridshell.layout import FlatGrid, mesh_grid, straight_rods
 from gridshell.layout.gridlayout import GridLayout
+from gridshell.layout.layers import layers
 
 ROD = gs.Rod(gs.Circle(radius=1e-3), gs.Material(youngs_modulus=1e6, density=1e3))
 

@@ -152,3 +152,9 @@ def test_three_rods_at_one_node_have_one_kind_of_joint():
     for other in (gs.Linker(), gs.Ball(), gs.Rigid()):
         with pytest.raises(gs.InputError, match="give all of them one kind"):
             gs.Shell.of(mesh, ROD, joint=[gs.Pin(), gs.Pin(), other])
+
+
+def test_eccentric_joints_refuse_rods_that_need_three_layers():
+    grid = gs.straight_rods([[[-1, 0], [1, 0]], [[0.3, -1], [0.3, 1]], [[-1, -0.8], [1, 1.0]]])
+    with pytest.raises(gs.InputError, match="two layers of rods, but R03 crosses rods of both"):
+        gs.Shell.of(gs.mesh_grid(grid, 0.25), ROD, joint=gs.Pin(eccentricity=1e-3))

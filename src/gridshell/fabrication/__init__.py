@@ -2,7 +2,6 @@
 
 from gridshell.fabrication.bracing import Diagonal, diagonals
 from gridshell.fabrication.fabricate import Fabricated, fabricate
-from gridshell.fabrication.layers import layers
 from gridshell.fabrication.nesting import Bar, Nesting, nest
 from gridshell.fabrication.options import Fabrication
 from gridshell.fabrication.splices import splices
@@ -15,7 +14,6 @@ __all__ = [
     "Nesting",
     "diagonals",
     "fabricate",
-    "layers",
     "nest",
     "splices",
 ]

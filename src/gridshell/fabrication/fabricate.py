@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.fabrication.bracing import Diagonal, diagonals
-from gridshell.fabrication.layers import layers
 from gridshell.fabrication.nesting import Nesting, nest
 from gridshell.fabrication.options import Fabrication
 from gridshell.fabrication.splices import splices
 from gridshell.layout import GridMesh
+from gridshell.layout.layers import layers
 from gridshell.rods.section import Rod
 
 Floats = NDArray[np.float64]

@@ -6,18 +6,18 @@ A tie with a lever arm cannot be an equal index, so it is a stiff spring with ev
 rod A lies above rod B.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numba as nb
 import numpy as np
 
 from gridshell.errors import InputError
-from gridshell.geometry.frames import adapted, parallel_transport
+from gridshell.geometry.frames import adapted
 from gridshell.joints.crossings import Places
-from gridshell.joints.sections import by_edge, edge_tangents, frame, of_edge, spread, stencils
+from gridshell.joints.sections import by_edge, carried, edge_tangents, frame, of_edge, spread, stencils
 from gridshell.layout import FlatGrid
+from gridshell.layout.layers import layers
 from gridshell.rods.elements import NO_HESSIANS, Floats, Ints
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -52,9 +52,7 @@ class OffsetTie:
         )  # fmt: skip
 
     def refreshed(self, state: Floats) -> Self:
-        tangents = edge_tangents(state, self.blocks, self.legs)
-        carried = parallel_transport(self.source_directors, self.source_tangents, tangents)
-        return replace(self, source_tangents=tangents, source_directors=adapted(carried, tangents))
+        return carried(self, state)
 
 
 def offset_ties(places: Places, eccentricity: Floats, stiffness: float, size: int) -> list[OffsetTie]:
@@ -63,7 +61,7 @@ def offset_ties(places: Places, eccentricity: Floats, stiffness: float, size: in
     if len(which) == 0:
         return []
     met, flat = places.of_crossings[which], places.flat(size)
-    layer = layers(places.mesh.grid)[places.rods[met]]
+    layer = sides(places.mesh.grid)[places.rods[met]]
     offsets = 0.5 * eccentricity[which] * (layer[:, 1] - layer[:, 0])
     sets = []
     for mine, blocks, legs, middles, weights in stencils(places, met):
@@ -74,39 +72,20 @@ def offset_ties(places: Places, eccentricity: Floats, stiffness: float, size: in
     return sets
 
 
-def layers(grid: FlatGrid) -> Floats:
-    """(m,) -1 for rods of the lower layer and 1 for those of the upper; the first rod of each patch lies below.
+def sides(grid: FlatGrid) -> Floats:
+    """(m,) -1 for rods of the lower layer and 1 for those of the upper.
 
     Raises
     ------
     InputError : rods cannot be laid in two layers, such as three that cross each other.
     """
-    layer = np.zeros(len(grid.rods))
-    neighbours: list[list[int]] = [[] for _ in grid.rods]
-    for a, b in grid.crossings.rods.tolist():
-        neighbours[a].append(b)
-        neighbours[b].append(a)
-    for first in range(len(grid.rods)):
-        if layer[first] == 0.0:
-            layer[first] = -1.0
-            _lay(first, layer, neighbours, [rod.name for rod in grid.rods])
-    return layer
-
-
-def _lay(first: int, layer: Floats, neighbours: Sequence[Sequence[int]], names: Sequence[str]) -> None:
-    """Alternate the layers along crossings, from one rod on."""
-    waiting = [first]
-    while waiting:
-        rod = waiting.pop()
-        for other in neighbours[rod]:
-            if layer[other] == layer[rod]:
-                raise InputError(
-                    f"eccentric joints need two layers of rods, but {names[rod]} and {names[other]} cross and would "
-                    "lie in the same one: set the eccentricity to 0"
-                )
-            if layer[other] == 0.0:
-                layer[other] = -layer[rod]
-                waiting.append(other)
+    layer = layers(len(grid.rods), grid.crossings.rods.tolist())
+    if layer.max(initial=0) > 2:
+        rod = grid.rods[int(np.argmax(layer))].name
+        raise InputError(
+            f"eccentric joints need two layers of rods, but {rod} crosses rods of both: set the eccentricity to 0"
+        )
+    return np.where(layer == 1, -1.0, 1.0)
 
 
 @nb.njit(cache=True, error_model="numpy")

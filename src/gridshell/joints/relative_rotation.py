@@ -22,7 +22,7 @@ Why not elements from edge to edge, as the paper's linkers are: those also stiff
 by an amount that depends on the mesh. Frames, spin and sources are those of `rods.bend_twist`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 from typing import Self
 
@@ -30,10 +30,10 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.geometry.frames import adapted, parallel_transport
+from gridshell.geometry.frames import adapted
 from gridshell.geometry.vectors import cross, dot
 from gridshell.joints.section_strains import curvatures, respond, strains_by
-from gridshell.joints.sections import by_edge, edge_tangents, frame, of_edge, spread
+from gridshell.joints.sections import by_edge, carried, edge_tangents, frame, of_edge, spread
 from gridshell.rods.elements import NO_HESSIANS, Floats, Ints
 
 
@@ -94,9 +94,7 @@ class RelativeRotation:
         )  # fmt: skip
 
     def refreshed(self, state: Floats) -> Self:
-        tangents = edge_tangents(state, self.blocks, self.legs)
-        carried = parallel_transport(self.source_directors, self.source_tangents, tangents)
-        return replace(self, source_tangents=tangents, source_directors=adapted(carried, tangents))
+        return carried(self, state)
 
     def sections(self, state: Floats) -> Floats:
         """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B."""

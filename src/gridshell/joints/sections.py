@@ -7,19 +7,45 @@ here serves every energy of sections. An edge's unknowns are its vector e and it
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Protocol, TypeVar
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from gridshell.geometry.frames import adapted, parallel_transport
 from gridshell.geometry.vectors import unit
 from gridshell.joints.crossings import Places
 from gridshell.rods.elements import Floats, Ints
 
 
+class OfSections(Protocol):
+    """What every energy of sections has; see `RelativeRotation`."""
+
+    @property
+    def blocks(self) -> Ints: ...
+    @property
+    def legs(self) -> Ints: ...
+    @property
+    def source_tangents(self) -> Floats: ...
+    @property
+    def source_directors(self) -> Floats: ...
+
+
+T = TypeVar("T", bound=OfSections)
+
+
 def edge_tangents(state: Floats, blocks: Ints, legs: Ints) -> Floats:
     """(m, l, 3) unit tangents of the edges `legs` of each joint."""
     return unit(state[blocks[:, legs[:, 1]]] - state[blocks[:, legs[:, 0]]])
+
+
+def carried(element: T, state: Floats) -> T:
+    """An energy of sections with its source frames moved to `state`."""
+    tangents = edge_tangents(state, element.blocks, element.legs)
+    directors = parallel_transport(element.source_directors, element.source_tangents, tangents)
+    return replace(element, source_tangents=tangents, source_directors=adapted(directors, tangents))  # type: ignore[type-var]
 
 
 def stencils(places: Places, met: Ints) -> Iterator[tuple[NDArray[np.bool_], Ints, Ints, Ints, Floats]]:

@@ -22,7 +22,7 @@ from gridshell.joints import Ball, Coupling, ExplicitPenalty, ImplicitPenalty, J
 from gridshell.joints.crossings import Places
 from gridshell.joints.elastic import elastic_joints, refuse_mixtures
 from gridshell.joints.linkers import Corners, LinkerBend
-from gridshell.joints.offset_tie import layers, offset_ties
+from gridshell.joints.offset_tie import offset_ties, sides
 from gridshell.layout import GridMesh
 from gridshell.model.freedom import Freedom
 from gridshell.rods.bend_twist import BendTwist
@@ -353,7 +353,7 @@ class _Builder:
         lift = np.zeros((self.size, 1))
         eccentric = max((one.eccentricity for one in self.joints), default=0.0)
         if eccentric:
-            lift[self.places.blocks, 0] = 0.5 * eccentric * layers(self.mesh.grid)[self.places.rods]
+            lift[self.places.blocks, 0] = 0.5 * eccentric * sides(self.mesh.grid)[self.places.rods]
         return lift
 
 
