@@ -1,5 +1,6 @@
 """Where the lines of a net leave a target: runs of inside nodes, and cuts between nodes."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from gridshell.nets.compass import Net
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 
@@ -120,9 +122,35 @@ def _roots(target: Target, s: Floats, lines: Floats, windows: list[tuple[int, in
         first = np.where(lost, np.clip(i - 1 + shift, 0, len(s) - 4), first)
     nodes = first[:, None] + np.arange(4)
     points, knots = lines[row[:, None], nodes], s[nodes]
-    outer, inner = s[i + (side > 0)], s[i + (side < 0)]
-    for _ in range(52):
-        middle = 0.5 * (outer + inner)
-        inside = target.margin(lagrange(knots, points, middle)) > 0
-        outer, inner = np.where(inside, outer, middle), np.where(inside, middle, inner)
-    return np.asarray(0.5 * (outer + inner))
+    return _bracketed(
+        lambda at, which: target.margin(lagrange(knots[which], points[which], at)), s[i + (side > 0)], s[i + (side < 0)]
+    )
+
+
+def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: Floats) -> Floats:
+    """Roots (n,) of functions that are positive at `inner` (n,) and not at `outer`, to their rounding.
+
+    `margin(at, which)` takes places (k,) and whose functions they are asked of. By false position (Illinois): an end
+    that stays twice counts half at the next step. Each root is left alone once it is found.
+    """
+    which = np.arange(len(inner))
+    below, above = np.minimum(margin(outer, which), 0.0), margin(inner, which)
+    tiny = 1e-15 * (np.abs(outer) + np.abs(inner))
+    side = np.zeros(len(inner))  # which end moved last: 1 the inner, -1 the outer one
+    found, at = inner.copy(), inner
+    for _ in range(100):
+        share = above / (above - below)
+        before, at = at, inner + np.where(np.isfinite(share), share, 0.5) * (outer - inner)
+        value = margin(at, which)
+        found[which] = at
+        inside = value > 0
+        below = np.where(inside, np.where(side > 0, 0.5, 1.0) * below, value)
+        above = np.where(inside, value, np.where(side < 0, 0.5, 1.0) * above)
+        outer, inner, side = np.where(inside, outer, at), np.where(inside, at, inner), np.where(inside, 1.0, -1.0)
+        left = (np.abs(at - before) > tiny) & (np.abs(outer - inner) > tiny) & (value != 0.0)
+        if not left.any():
+            break
+        which, at, outer, inner, below, above, side, tiny = (
+            array[left] for array in (which, at, outer, inner, below, above, side, tiny)
+        )
+    return found

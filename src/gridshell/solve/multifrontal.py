@@ -2,29 +2,31 @@
 
 The columns of the factor fall into *supernodes* with one row structure. Each has a dense *front*: its own
 columns, summed with the update matrices of its children in the elimination tree; its pivots are eliminated,
-what remains is the update matrix for its parent (Duff and Reid 1983). Dense work on contiguous blocks, the
-order of elimination from where the unknowns lie (`ordering`), the symbolic phase once per pattern (`symbolic`).
+what remains is the update matrix for its parent (Duff and Reid 1983). Dense work on contiguous blocks, most of
+it by BLAS (`dense`), the order of elimination from where the unknowns lie (`ordering`), the symbolic phase once
+per pattern (`symbolic`).
 """
 
 from contextlib import nullcontext
-from functools import lru_cache
 
 import numba as nb
 import numpy as np
 import qdldl
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
-from threadpoolctl import ThreadpoolController
 
+from gridshell.solve.dense import blas, dgemm, subtract_product
 from gridshell.solve.linear import SingularError
 from gridshell.solve.ordering import dissect
-from gridshell.solve.symbolic import plan_of
+from gridshell.solve.symbolic import Blocks, blocks_of, plan_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BLOCK = 48  # pivots eliminated together in a large front
-LARGE = 128  # rows from which on a front's updates go to BLAS
+BLOCK = 32  # pivots eliminated together
+STRIP = 64  # rows of an update matrix that are made together: of its lower triangle only their own square is wasted
+ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
+LARGE = 128  # rows from which on BLAS would use threads for a front
 
 
 class Multifrontal:
@@ -38,9 +40,12 @@ class Multifrontal:
     def __init__(self, indptr: NDArray[np.int64], indices: NDArray[np.int64], places: Floats | None = None) -> None:
         self._indptr, self._indices = indptr, indices
         size = len(indptr) - 1
-        order = _minimum_degree(indptr, indices) if places is None else _dissected(indptr, indices, places)
-        self._plan = plan_of(indptr, indices, order)
+        blocks = blocks_of(indptr, indices, np.arange(size + 1) if places is None else _first_of_places(places))
+        order = _minimum_degree(indptr, indices) if places is None else _dissected(places, blocks)
+        self._plan = plan_of(indptr, indices, blocks, order)
         self._panels = np.empty(int(self._plan.panel_start[-1]))
+        self._unscaled = np.empty(self._plan.largest_panel)
+        self._stacks = np.empty(self._plan.stack_size)
         self._pivots = np.empty(size)
 
     @property
@@ -49,13 +54,12 @@ class Multifrontal:
         return len(self._panels)
 
     def factor(self, data: Floats) -> int:
-        plan, size = self._plan, len(self._pivots)
-        self._matrix = csc_matrix((data, self._indices, self._indptr), shape=(size, size))
-        with _blas().limit(limits=1) if plan.largest_front >= LARGE else nullcontext():
+        plan, self._data = self._plan, data
+        with blas().limit(limits=1) if plan.largest_front >= LARGE else nullcontext():
             ok = _numeric(
-                data, plan.first, plan.row_start, plan.rows, plan.relative, plan.child_start, plan.children,
-                plan.entry_start, plan.entry_source, plan.entry_place, plan.panel_start, plan.stack_size,
-                plan.largest_front, self._panels, self._pivots,
+                dgemm(), data, plan.first, plan.row_start, plan.relative, plan.child_start, plan.children,
+                plan.entry_start, plan.entry_source, plan.entry_place, plan.panel_start, plan.update_start,
+                self._stacks, self._unscaled, self._panels, self._pivots,
             )  # fmt: skip
         if not ok:
             raise SingularError("a pivot of the factorisation vanishes")
@@ -63,65 +67,31 @@ class Multifrontal:
 
     def solve(self, right: Floats) -> Floats:
         x = self._substitute(right)
-        residual = right - self._matrix @ x - self._matrix.T @ x + self._matrix.diagonal() * x
-        return x + self._substitute(residual)
+        residual, size = _residual(self._indptr, self._indices, self._data, x, right)
+        if np.abs(residual).max(initial=0.0) > ACCURATE * size:
+            x += self._substitute(residual)
+        return x
 
     def _substitute(self, right: Floats) -> Floats:
         plan = self._plan
         x = right[plan.order]
-        _solve(x, plan.first, plan.row_start, plan.rows, plan.panel_start, self._panels, self._pivots)
+        _solve(
+            x, plan.first, plan.row_start, plan.rows, plan.panel_start, self._panels, self._pivots, plan.largest_front
+        )
         result = np.empty_like(x)
         result[plan.order] = x
         return result
 
 
-@lru_cache
-def _blas() -> ThreadpoolController:
-    """The BLAS that Numba calls. Its threads are kept to one: on fronts of a few hundred rows they only wait."""
-    import scipy.linalg  # noqa: F401  loads that BLAS, so that it is found
-
-    return ThreadpoolController().select(user_api="blas")
+def _dissected(places: Floats, blocks: Blocks) -> Ints:
+    """Blocks in the order of a nested dissection of their places."""
+    return dissect(places[blocks.begin[:-1]], blocks.start, blocks.neighbours)
 
 
-def _dissected(indptr: NDArray[np.int64], indices: NDArray[np.int64], places: Floats) -> Ints:
-    """Unknowns that lie at one place stay together; the places are dissected."""
-    same = np.zeros(len(places), dtype=bool)  # as the unknown before: the directions of one node follow each other
-    same[1:] = (places[1:] == places[:-1]).all(axis=1)
-    block = np.cumsum(~same) - 1
-    begin = np.append(np.flatnonzero(~same), len(places))
-    start, neighbours = _coupled(indptr, indices, block, begin)
-    order = dissect(places[~same], start, neighbours)
-    first = begin[order]
-    size = begin[order + 1] - first
-    return np.asarray(np.repeat(first - np.cumsum(size) + size, size) + np.arange(len(places)))
-
-
-@nb.njit(cache=True)
-def _coupled(indptr, indices, block, begin):  # type: ignore[no-untyped-def]
-    """The other blocks to which each block of unknowns is coupled, as start and neighbours."""
-    n = len(begin) - 1
-    mark, count = np.full(n, -1, dtype=np.int64), np.zeros(n + 1, dtype=np.int64)
-    start, neighbours, place = count, np.empty(0, dtype=np.int64), count
-    for sweep in range(2):  # count, then fill
-        mark[:] = -1
-        for b in range(n):
-            for j in range(begin[b], begin[b + 1]):
-                for e in range(indptr[j], indptr[j + 1]):
-                    a = block[indices[e]]
-                    if a != b and mark[a] != b:
-                        mark[a] = b
-                        if sweep == 0:
-                            count[a + 1] += 1
-                            count[b + 1] += 1
-                        else:
-                            neighbours[place[a]], neighbours[place[b]] = b, a
-                            place[a] += 1
-                            place[b] += 1
-        if sweep == 0:
-            start = np.cumsum(count)
-            place = start.copy()
-            neighbours = np.empty(start[n], dtype=np.int64)
-    return start, neighbours
+def _first_of_places(places: Floats) -> Ints:
+    """Where blocks begin: unknowns in a row that lie at one place, such as the directions of a node; and their end."""
+    other = (places[1:] != places[:-1]).any(axis=1)
+    return np.concatenate([[0], 1 + np.flatnonzero(other), [len(places)]])
 
 
 def _minimum_degree(indptr: NDArray[np.int64], indices: NDArray[np.int64]) -> NDArray[np.intp]:
@@ -135,113 +105,156 @@ def _minimum_degree(indptr: NDArray[np.int64], indices: NDArray[np.int64]) -> ND
 
 @nb.njit(cache=True, error_model="numpy")
 def _numeric(  # type: ignore[no-untyped-def]
-    data, first, row_start, rows, relative, child_start, children, entry_start, entry_source, entry_place,
-    panel_start, stack_size, largest, panels, pivots,
+    dgemm, data, first, row_start, relative, child_start, children, entry_start, entry_source, entry_place,
+    panel_start, update_start, stacks, unscaled, panels, pivots,
 ):  # fmt: skip
-    """Factorise front by front; False where a pivot vanishes or is not finite."""
-    stack = np.empty(max(1, stack_size))
-    work = np.empty(largest * largest)
-    columns = np.empty((4, largest))
-    top = 0
+    """Factorise front by front; False where a pivot vanishes or is not finite.
+
+    A front of `size` rows and `own` pivots is kept as its pivots' rows (own, size), in `unscaled` while it is
+    eliminated, then divided by the pivots in `panels`; and as its update matrix, upper triangle, in `stacks`.
+    """
+    integers, numbers = np.empty(6, dtype=np.int32), np.empty(2)
     for s in range(len(first) - 1):
         size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
-        front = work[: size * size].reshape(size, size)
-        front[:] = 0.0
-        flat = work[: size * size]
-        for e in range(entry_start[s], entry_start[s + 1]):
-            flat[entry_place[e]] += data[entry_source[e]]
-        for e in range(child_start[s + 1] - 1, child_start[s] - 1, -1):  # the last child lies on top
-            c = children[e]
-            begin = row_start[c] + first[c + 1] - first[c]
-            m = row_start[c + 1] - begin
-            top -= m * m
-            update = stack[top : top + m * m].reshape(m, m)
-            for a in range(m):
-                i = relative[begin + a]
-                for b in range(a + 1):
-                    front[i, relative[begin + b]] += update[a, b]
-        if not _eliminate(front, own, columns, pivots[first[s] : first[s + 1]]):
-            return False
-        panels[panel_start[s] : panel_start[s + 1]] = front[:, :own].copy().ravel()
         m = size - own
-        update = stack[top : top + m * m].reshape(m, m)
-        for a in range(m):
-            for b in range(a + 1):
-                update[a, b] = front[own + a, own + b]
-        top += m * m
+        rows = unscaled[: own * size].reshape(own, size)
+        rows[:] = 0.0
+        for e in range(entry_start[s], entry_start[s + 1]):
+            unscaled[entry_place[e]] += data[entry_source[e]]
+        for e in range(child_start[s], child_start[s + 1]):
+            into, update = _child(children[e], first, row_start, relative, update_start, stacks)
+            _add_rows(rows, update, into, own)
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(own, size)
+        if not _eliminate(dgemm, integers, numbers, rows, panel, pivots[first[s] : first[s + 1]]):
+            return False
+        update = stacks[update_start[s] : update_start[s] + m * m].reshape(m, m)
+        for a in range(0, m, STRIP):
+            b = min(a + STRIP, m)
+            subtract_product(
+                dgemm, integers, numbers, b - a, m - a, own, panel.ctypes.data + 8 * (own + a), size,
+                rows.ctypes.data + 8 * (own + a), size, 0.0, update.ctypes.data + 8 * (a * m + a), m,
+            )  # fmt: skip
+        for e in range(child_start[s], child_start[s + 1]):
+            into, other = _child(children[e], first, row_start, relative, update_start, stacks)
+            _add_updates(update, other, into, own)
     return True
-
-
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _eliminate(front, own, columns, pivots):  # type: ignore[no-untyped-def]
-    """Eliminate the first `own` pivots of the lower triangle: L in the columns, the Schur complement after them.
-
-    Four pivots at a time, so that each row behind them is read and written once for all four. Of a large front the
-    columns past the block follow by BLAS.
-    """
-    size = front.shape[0]
-    block = own if size < LARGE else BLOCK
-    for begin in range(0, own, block):
-        end = min(begin + block, own)
-        reach = size if block == own else end  # columns updated at once
-        for k in range(begin, end, 4):
-            after = min(k + 4, end)
-            for p in range(k, after):
-                d = front[p, p]
-                if not np.isfinite(d) or d == 0.0:
-                    return False
-                pivots[p] = d
-                column = columns[p - k]
-                for i in range(p + 1, size):
-                    column[i] = front[i, p]
-                    front[i, p] /= d
-                for i in range(p + 1, size):
-                    for q in range(p + 1, min(i + 1, after)):
-                        front[i, q] -= front[i, p] * column[q]
-            for i in range(after, size):
-                last = min(i + 1, reach)
-                if after == k + 4:
-                    _subtract_four(front[i, after:last], columns[:, after:last], front[i, k:after])
-                else:
-                    for p in range(k, after):
-                        factor, column = front[i, p], columns[p - k]
-                        for j in range(after, last):
-                            front[i, j] -= factor * column[j]
-        if reach < size and end < size:
-            below = front[end:, begin:end].copy()
-            scaled = below * pivots[begin:end]
-            for a in range(0, size - end, 256):
-                b = min(a + 256, size - end)
-                front[end + a : end + b, end : end + b] -= np.dot(below[a:b], scaled[:b].T)
-    return True
-
-
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _subtract_four(row, columns, factors):  # type: ignore[no-untyped-def]
-    f0, f1, f2, f3 = factors[0], factors[1], factors[2], factors[3]
-    c0, c1, c2, c3 = columns[0], columns[1], columns[2], columns[3]
-    for j in range(len(row)):
-        row[j] -= f0 * c0[j] + f1 * c1[j] + f2 * c2[j] + f3 * c3[j]
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _solve(x, first, row_start, rows, panel_start, panels, pivots):  # type: ignore[no-untyped-def]
+def _child(c, first, row_start, relative, update_start, stacks):  # type: ignore[no-untyped-def]
+    """Where the rows of a child's update matrix go in its parent's front, and that matrix."""
+    into = relative[row_start[c] + first[c + 1] - first[c] : row_start[c + 1]]
+    m = len(into)
+    return into, stacks[update_start[c] : update_start[c] + m * m].reshape(m, m)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _add_rows(rows, update, into, own):  # type: ignore[no-untyped-def]
+    """Add to the rows of a front's pivots what a child's update matrix has for them."""
+    for b in range(len(into)):
+        if into[b] >= own:
+            break
+        row, source = rows[into[b]], update[b]
+        for a in range(b, len(into)):
+            row[into[a]] += source[a]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _add_updates(target, update, into, own):  # type: ignore[no-untyped-def]
+    """Add a child's update matrix to its parent's, but for what `_add_rows` has added."""
+    first = np.searchsorted(into, own)
+    for b in range(first, len(into)):
+        row, source = target[into[b] - own], update[b]
+        for a in range(b, len(into)):
+            row[into[a] - own] += source[a]
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _eliminate(dgemm, integers, numbers, rows, panel, pivots):  # type: ignore[no-untyped-def]
+    """Eliminate the pivots of a front: D L^T in `rows` (own, size), L^T in `panel`, D in `pivots`."""
+    own, size = rows.shape
+    for begin in range(0, own, BLOCK):
+        end = min(begin + BLOCK, own)
+        for k in range(begin, end):
+            row = rows[k, k:]
+            after = begin + (k - begin) // 4 * 4
+            for q in range(begin, after, 4):
+                _subtract_four(
+                    row, rows[q, k:], rows[q + 1, k:], rows[q + 2, k:], rows[q + 3, k:],
+                    panel[q, k], panel[q + 1, k], panel[q + 2, k], panel[q + 3, k],
+                )  # fmt: skip
+            for q in range(after, k):
+                factor, other = panel[q, k], rows[q, k:]
+                for j in range(len(row)):
+                    row[j] -= factor * other[j]
+            d = row[0]
+            if not np.isfinite(d) or d == 0.0:
+                return False
+            pivots[k] = d
+            inverse, scaled = 1.0 / d, panel[k, k:]
+            for j in range(len(row)):
+                scaled[j] = inverse * row[j]
+        if end < own:
+            corner = 8 * (begin * size + end)
+            subtract_product(
+                dgemm, integers, numbers, own - end, size - end, end - begin, panel.ctypes.data + corner, size,
+                rows.ctypes.data + corner, size, 1.0, rows.ctypes.data + 8 * (end * size + end), size,
+            )  # fmt: skip
+    return True
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _subtract_four(row, r0, r1, r2, r3, f0, f1, f2, f3):  # type: ignore[no-untyped-def]
+    for j in range(len(row)):
+        row[j] -= f0 * r0[j] + f1 * r1[j] + f2 * r2[j] + f3 * r3[j]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
+    """right - A x of a matrix stored by its upper triangle, and the largest entry of |A| |x|."""
+    residual, size = right.copy(), np.zeros(len(x))
+    for j in range(len(x)):
+        for e in range(indptr[j], indptr[j + 1]):
+            i = indices[e]
+            product = data[e] * x[j]
+            residual[i] -= product
+            size[i] += abs(product)
+            if i != j:
+                product = data[e] * x[i]
+                residual[j] -= product
+                size[j] += abs(product)
+    return residual, size.max() if len(x) else 0.0
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _solve(x, first, row_start, rows, panel_start, panels, pivots, largest):  # type: ignore[no-untyped-def]
     """Forward and backward substitution in place, supernode by supernode."""
     supers = len(first) - 1
+    local = np.empty(largest)
     for s in range(supers):
-        size, own, begin = row_start[s + 1] - row_start[s], first[s + 1] - first[s], first[s]
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(size, own)
-        for i in range(1, size):
-            total = 0.0
-            for k in range(min(i, own)):
-                total += panel[i, k] * x[begin + k]
-            x[rows[row_start[s] + i]] -= total
-    for s in range(supers - 1, -1, -1):
-        size, own, begin = row_start[s + 1] - row_start[s], first[s + 1] - first[s], first[s]
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(size, own)
+        size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(own, size)
+        here = rows[row_start[s] : row_start[s + 1]]
+        values = local[:size]
+        values[:own] = x[first[s] : first[s + 1]]
+        values[own:] = 0.0
         for k in range(own):
-            x[begin + k] /= pivots[begin + k]
-        for i in range(size - 1, 0, -1):
-            value = x[rows[row_start[s] + i]]
-            for k in range(min(i, own)):
-                x[begin + k] -= panel[i, k] * value
+            value, row = values[k], panel[k]
+            for i in range(k + 1, size):
+                values[i] -= row[i] * value
+        x[first[s] : first[s + 1]] = values[:own]
+        for i in range(own, size):
+            x[here[i]] += values[i]
+    for s in range(supers - 1, -1, -1):
+        size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(own, size)
+        here = rows[row_start[s] : row_start[s + 1]]
+        values = local[:size]
+        for i in range(own, size):
+            values[i] = x[here[i]]
+        for k in range(own - 1, -1, -1):
+            total, row = 0.0, panel[k]
+            for i in range(k + 1, size):
+                total += row[i] * values[i]
+            values[k] = x[first[s] + k] / pivots[first[s] + k] - total
+        x[first[s] : first[s + 1]] = values[:own]

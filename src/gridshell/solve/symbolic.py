@@ -1,4 +1,8 @@
-"""The symbolic phase of a multifrontal factorisation: from a pattern and an order to the maps of the numeric one."""
+"""The symbolic phase of a multifrontal factorisation: from a pattern and an order to the maps of the numeric one.
+
+All of it but the last maps is done on *blocks*, unknowns that lie at one place and are coupled alike: a node's
+directions of motion. Tree, supernodes and fronts are found from a graph some ten times smaller than the matrix.
+"""
 
 from typing import NamedTuple
 
@@ -21,146 +25,106 @@ class Plan(NamedTuple):
     children: Ints
     entry_start: Ints  # (n_s + 1,)
     entry_source: Ints  # which value of the matrix
-    entry_place: Ints  # where it goes in the front
+    entry_place: Ints  # where it goes in the rows of the front's pivots
     panel_start: Ints  # (n_s + 1,) where its part of the factor begins
+    update_start: Ints  # (n_s,) where its update matrix lies in `stacks`
     stack_size: int
     largest_front: int
+    largest_panel: int
 
 
-def plan_of(indptr: Ints, indices: Ints, order: Ints) -> Plan:
-    """Of a pattern (upper triangle, compressed columns) whose unknowns are eliminated in `order`, but for ties."""
-    return Plan(*_symbolic(indptr.astype(np.int64), indices.astype(np.int64), order.astype(np.int64)))
+class Blocks(NamedTuple):
+    """Unknowns in blocks of consecutive ones, `begin` (b + 1,), and the blocks that each is coupled to:
+    neighbours[start[k] : start[k + 1]]."""
+
+    begin: Ints
+    start: Ints
+    neighbours: Ints
+
+
+def blocks_of(indptr: Ints, indices: Ints, begin: Ints) -> Blocks:
+    """The graph of blocks of a pattern (upper triangle, compressed columns)."""
+    begin = np.asarray(begin, dtype=np.int64)
+    return Blocks(begin, *_coupled(indptr.astype(np.int64), indices.astype(np.int64), begin))
+
+
+def plan_of(indptr: Ints, indices: Ints, blocks: Blocks, order: Ints) -> Plan:
+    """Of a pattern whose `blocks` are eliminated in `order` (b,), but for what the tree leaves open."""
+    order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
+    first = _supernodes(tree, count, weight)
+    up, child_start, children = _children(tree, first)
+    row_start, rows = _fronts(first, order, blocks.start, blocks.neighbours, child_start, children)
+    maps = _maps(indptr, indices, blocks.begin, order, weight, first, up, row_start, rows, child_start, children)
+    return Plan(*maps)
 
 
 @nb.njit(cache=True)
-def _symbolic(indptr, indices, order):  # type: ignore[no-untyped-def]
-    """Elimination tree, postorder, supernodes, row structures and all index maps of the numeric phase."""
-    n, stored = len(indptr) - 1, len(indices)
+def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
+    """The other blocks to which each block of unknowns is coupled, as start and neighbours."""
+    n = len(begin) - 1
+    block = np.empty(begin[n], dtype=np.int64)
+    for b in range(n):
+        block[begin[b] : begin[b + 1]] = b
+    mark, count = np.full(n, -1, dtype=np.int64), np.zeros(n + 1, dtype=np.int64)
+    start, neighbours, place = count, np.empty(0, dtype=np.int64), count
+    for sweep in range(2):  # count, then fill
+        mark[:] = -1
+        for b in range(n):
+            for j in range(begin[b], begin[b + 1]):
+                for e in range(indptr[j], indptr[j + 1]):
+                    a = block[indices[e]]
+                    if a != b and mark[a] != b:
+                        mark[a] = b
+                        if sweep == 0:
+                            count[a + 1] += 1
+                            count[b + 1] += 1
+                        else:
+                            neighbours[place[a]], neighbours[place[b]] = b, a
+                            place[a] += 1
+                            place[b] += 1
+        if sweep == 0:
+            start = np.cumsum(count)
+            place = start.copy()
+            neighbours = np.empty(start[n], dtype=np.int64)
+    return start, neighbours
+
+
+@nb.njit(cache=True)
+def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
+    """Blocks in a postorder of their elimination tree; and for each, its parent, unknowns, and rows of its columns."""
+    n = len(order)
     place = np.empty(n, dtype=np.int64)
     for k in range(n):
         place[order[k]] = k
-    parent = _elimination_tree(indptr, indices, place)
+    parent = _elimination_tree(start, neighbours, order, place)
     post = _postorder(parent)
-    new_order, back = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    for k in range(n):
-        new_order[k] = order[post[k]]
-        back[post[k]] = k
-    new_parent = np.empty(n, dtype=np.int64)
-    for k in range(n):
-        p = parent[post[k]]
-        new_parent[k] = back[p] if p >= 0 else -1
-    order, parent = new_order, new_parent
+    back = np.empty(n, dtype=np.int64)
+    back[post] = np.arange(n)
+    order, above = order[post], parent[post]
     for k in range(n):
         place[order[k]] = k
-    # entries below the diagonal by column, and by row, of the permuted matrix
-    low, high = np.empty(stored, dtype=np.int64), np.empty(stored, dtype=np.int64)
-    for j in range(n):
-        for k in range(indptr[j], indptr[j + 1]):
-            a, b = place[indices[k]], place[j]
-            low[k], high[k] = min(a, b), max(a, b)
-    column_start, by_column = _group(low, n)
-    row_start_, by_row = _group(high, n)
-    count = np.ones(n, dtype=np.int64)
-    mark = np.full(n, -1, dtype=np.int64)
+        parent[k] = back[above[k]] if above[k] >= 0 else -1
+    weight = begin[order + 1] - begin[order]
+    count, mark = weight.copy(), np.full(n, -1, dtype=np.int64)
     for k in range(n):  # every nonzero of row k of the factor once
         mark[k] = k
-        for e in range(row_start_[k], row_start_[k + 1]):
-            j = low[by_row[e]]
-            while mark[j] != k:
+        for e in range(start[order[k]], start[order[k] + 1]):
+            j = place[neighbours[e]]
+            while j < k and mark[j] != k:
                 mark[j] = k
-                count[j] += 1
+                count[j] += weight[k]
                 j = parent[j]
-    first = _supernodes(parent, count)
-    supers = len(first) - 1
-    owner = np.empty(n, dtype=np.int64)
-    for s in range(supers):
-        for j in range(first[s], first[s + 1]):
-            owner[j] = s
-    # rows of each front
-    up = np.full(supers, -1, dtype=np.int64)
-    for s in range(supers):
-        p = parent[first[s + 1] - 1]
-        up[s] = owner[p] if p >= 0 else -1
-    child_start, children = _group(np.where(up < 0, supers, up), supers + 1)
-    row_start = np.zeros(supers + 1, dtype=np.int64)
-    rows = np.empty(max(16, 4 * n), dtype=np.int64)
-    used = 0
-    mark[:] = -1
-    for s in range(supers):
-        begin = used
-        for j in range(first[s], first[s + 1]):
-            rows, used = _push(rows, used, j)
-            mark[j] = s
-        own = used
-        for j in range(first[s], first[s + 1]):
-            for e in range(column_start[j], column_start[j + 1]):
-                i = high[by_column[e]]
-                if mark[i] != s:
-                    mark[i] = s
-                    rows, used = _push(rows, used, i)
-        for e in range(child_start[s], child_start[s + 1]):
-            c = children[e]
-            for k in range(row_start[c] + first[c + 1] - first[c], row_start[c + 1]):
-                i = rows[k]
-                if mark[i] != s:
-                    mark[i] = s
-                    rows, used = _push(rows, used, i)
-        rows[own:used].sort()
-        row_start[s] = begin
-        row_start[s + 1] = used
-    rows = rows[:used].copy()
-    # where update rows go in the parent's front, and where matrix values go in their front
-    relative = np.zeros(used, dtype=np.int64)
-    entry_start = np.zeros(supers + 1, dtype=np.int64)
-    entry_source, entry_place = np.empty(stored, dtype=np.int64), np.empty(stored, dtype=np.int64)
-    local = np.empty(n, dtype=np.int64)
-    filled = 0
-    for s in range(supers):
-        size = row_start[s + 1] - row_start[s]
-        for k in range(size):
-            local[rows[row_start[s] + k]] = k
-        for e in range(child_start[s], child_start[s + 1]):
-            c = children[e]
-            for k in range(row_start[c] + first[c + 1] - first[c], row_start[c + 1]):
-                relative[k] = local[rows[k]]
-        for j in range(first[s], first[s + 1]):
-            for e in range(column_start[j], column_start[j + 1]):
-                source = by_column[e]
-                entry_source[filled] = source
-                entry_place[filled] = local[high[source]] * size + local[j]
-                filled += 1
-        entry_start[s + 1] = filled
-    panel_start = np.zeros(supers + 1, dtype=np.int64)
-    largest, height, deepest = 0, 0, 0
-    for s in range(supers):
-        size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
-        panel_start[s + 1] = panel_start[s] + size * own
-        largest = max(largest, size)
-        for e in range(child_start[s], child_start[s + 1]):
-            c = children[e]
-            height -= (row_start[c + 1] - row_start[c] - first[c + 1] + first[c]) ** 2
-        height += (size - own) ** 2
-        deepest = max(deepest, height)
-    return (
-        order, first, row_start, rows, relative, child_start[: supers + 1].copy(), children, entry_start,
-        entry_source, entry_place, panel_start, deepest, largest,
-    )  # fmt: skip
+    return order, parent, weight, count
 
 
 @nb.njit(cache=True)
-def _elimination_tree(indptr, indices, place):  # type: ignore[no-untyped-def]
-    """Parent of each permuted column (Liu 1990), -1 for roots."""
-    n = len(indptr) - 1
-    low, high = np.empty(len(indices), dtype=np.int64), np.empty(len(indices), dtype=np.int64)
-    for j in range(n):
-        for k in range(indptr[j], indptr[j + 1]):
-            a, b = place[indices[k]], place[j]
-            low[k], high[k] = min(a, b), max(a, b)
-    start, by_row = _group(high, n)
+def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyped-def]
+    """Parent of each permuted block (Liu 1990), -1 for roots."""
+    n = len(order)
     parent, ancestor = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
     for k in range(n):
-        for e in range(start[k], start[k + 1]):
-            j = low[by_row[e]]
+        for e in range(start[order[k]], start[order[k] + 1]):
+            j = place[neighbours[e]]
             while j != -1 and j < k:
                 above = ancestor[j]
                 ancestor[j] = k
@@ -200,18 +164,91 @@ def _postorder(parent):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)
-def _group(keys, groups):  # type: ignore[no-untyped-def]
-    """Start of each group and the indices of `keys` in groups, in a counting sort."""
-    start = np.zeros(groups + 1, dtype=np.int64)
-    for key in keys:
-        start[key + 1] += 1
-    for g in range(groups):
-        start[g + 1] += start[g]
-    filled, members = start[:-1].copy(), np.empty(len(keys), dtype=np.int64)
-    for k in range(len(keys)):
-        members[filled[keys[k]]] = k
-        filled[keys[k]] += 1
-    return start, members
+def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
+    """First block of each supernode: blocks of one structure, and small ones merged for a few zeros more."""
+    n = len(parent)
+    first = np.empty(n + 1, dtype=np.int64)
+    zeros = np.zeros(n, dtype=np.int64)
+    size = np.empty(n, dtype=np.int64)  # rows of the front
+    width = np.empty(n, dtype=np.int64)  # its own columns
+    supers = 0
+    for j in range(n):
+        if supers > 0 and parent[j - 1] == j and count[j] == count[j - 1] - weight[j - 1]:
+            width[supers - 1] += weight[j]
+            continue
+        first[supers], size[supers], width[supers], zeros[supers] = j, count[j], weight[j], 0
+        supers += 1
+    first[supers] = n
+    kept = 0  # supernodes kept so far; the last is tried on its parent, which follows it
+    for s in range(supers):
+        begin, rows, wide, empty = first[s], size[s], width[s], zeros[s]
+        while kept > 0 and parent[begin - 1] == begin:
+            narrow = width[kept - 1]
+            taller, own = narrow + rows, narrow + wide
+            more = empty + zeros[kept - 1] + narrow * (taller - size[kept - 1])
+            total = own * taller - own * (own - 1) // 2
+            share = 0.6 if own <= 8 else (0.35 if own <= 24 else (0.12 if own <= 64 else 0.04))
+            if more > share * total:
+                break
+            kept -= 1
+            begin, rows, wide, empty = first[kept], taller, own, more
+        first[kept], size[kept], width[kept], zeros[kept] = begin, rows, wide, empty
+        kept += 1
+    first[kept] = n
+    return first[: kept + 1].copy()
+
+
+@nb.njit(cache=True)
+def _children(parent, first):  # type: ignore[no-untyped-def]
+    """Parent of each supernode, -1 for roots; and the children of each, ascending."""
+    supers = len(first) - 1
+    owner, up = np.empty(len(parent), dtype=np.int64), np.empty(supers, dtype=np.int64)
+    start = np.zeros(supers + 1, dtype=np.int64)
+    for s in range(supers):
+        owner[first[s] : first[s + 1]] = s
+    for s in range(supers):
+        p = parent[first[s + 1] - 1]
+        up[s] = owner[p] if p >= 0 else -1
+        if p >= 0:
+            start[owner[p] + 1] += 1
+    start = np.cumsum(start)
+    filled, children = start[:-1].copy(), np.empty(start[supers], dtype=np.int64)
+    for s in range(supers):
+        if up[s] >= 0:
+            children[filled[up[s]]] = s
+            filled[up[s]] += 1
+    return up, start, children
+
+
+@nb.njit(cache=True)
+def _fronts(first, order, start, neighbours, child_start, children):  # type: ignore[no-untyped-def]
+    """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]]."""
+    supers, n = len(first) - 1, len(order)
+    place, mark = np.empty(n, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    for k in range(n):
+        place[order[k]] = k
+    row_start, rows, used = np.zeros(supers + 1, dtype=np.int64), np.empty(max(16, 4 * n), dtype=np.int64), 0
+    for s in range(supers):
+        for j in range(first[s], first[s + 1]):
+            rows, used = _push(rows, used, j)
+            mark[j] = s
+        own = used
+        for j in range(first[s], first[s + 1]):
+            for e in range(start[order[j]], start[order[j] + 1]):
+                i = place[neighbours[e]]
+                if i > j and mark[i] != s:
+                    mark[i] = s
+                    rows, used = _push(rows, used, i)
+        for e in range(child_start[s], child_start[s + 1]):
+            c = children[e]
+            for k in range(row_start[c] + first[c + 1] - first[c], row_start[c + 1]):
+                i = rows[k]
+                if mark[i] != s:
+                    mark[i] = s
+                    rows, used = _push(rows, used, i)
+        rows[own:used].sort()
+        row_start[s + 1] = used
+    return row_start, rows[:used].copy()
 
 
 @nb.njit(cache=True)
@@ -226,37 +263,94 @@ def _push(array, used, value):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)
-def _supernodes(parent, count):  # type: ignore[no-untyped-def]
-    """First column of each supernode: columns of one structure, and small ones merged for a few zeros more."""
-    n = len(parent)
-    first = np.empty(n + 1, dtype=np.int64)
-    zeros = np.zeros(n, dtype=np.int64)
-    size = np.empty(n, dtype=np.int64)  # rows of the front
-    supers = 0
-    for j in range(n):
-        if supers > 0 and parent[j - 1] == j and count[j] == count[j - 1] - 1:
-            continue
-        first[supers], size[supers], zeros[supers] = j, count[j], 0
-        supers += 1
-    first[supers] = n
-    kept = 0  # supernodes kept so far; the last is tried on its parent, which follows it
+def _maps(  # type: ignore[no-untyped-def]
+    indptr, indices, begin, order, weight, first, up, row_start, rows, child_start, children
+):
+    """From blocks to unknowns: all that `Plan` holds."""
+    supers, n, unknowns = len(first) - 1, len(order), begin[len(begin) - 1]
+    column = np.zeros(n + 1, dtype=np.int64)  # first permuted unknown of each block
+    column[1:] = np.cumsum(weight)
+    original, place = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
+    block, owner = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
     for s in range(supers):
-        begin, rows, empty = first[s], size[s], zeros[s]
-        while kept > 0:
-            before = first[kept - 1]
-            if parent[begin - 1] != begin:
-                break
-            narrow, wide = begin - before, first[s + 1] - begin
-            taller = narrow + rows
-            more = empty + zeros[kept - 1] + narrow * (taller - size[kept - 1])
-            own = narrow + wide
-            total = own * taller - own * (own - 1) // 2
-            share = 0.6 if own <= 8 else (0.35 if own <= 24 else (0.12 if own <= 64 else 0.04))
-            if more > share * total:
-                break
-            begin, rows, empty = before, taller, more
-            kept -= 1
-        first[kept], size[kept], zeros[kept] = begin, rows, empty
-        kept += 1
-    first[kept] = n
-    return first[: kept + 1].copy()
+        for k in range(first[s], first[s + 1]):
+            for d in range(weight[k]):
+                at = column[k] + d
+                original[at], block[at], owner[at] = begin[order[k]] + d, k, s
+                place[original[at]] = at
+    entry_start, by_front = _by_front(indptr, indices, place, owner, supers)
+    total = 0
+    for k in rows:
+        total += weight[k]
+    all_rows, relative = np.empty(total, dtype=np.int64), np.zeros(total, dtype=np.int64)
+    all_start, panel_start = np.zeros(supers + 1, dtype=np.int64), np.zeros(supers + 1, dtype=np.int64)
+    entry_place, local = np.empty(len(indices), dtype=np.int64), np.empty(n, dtype=np.int64)
+    below = np.empty(supers, dtype=np.int64)
+    used, largest, widest = 0, 0, 0
+    for s in range(supers):
+        for e in range(row_start[s], row_start[s + 1]):
+            k = rows[e]
+            local[k] = used - all_start[s]
+            for d in range(weight[k]):
+                all_rows[used] = column[k] + d
+                used += 1
+        all_start[s + 1] = used
+        size, own = used - all_start[s], column[first[s + 1]] - column[first[s]]
+        below[s] = size - own
+        panel_start[s + 1] = panel_start[s] + own * size
+        largest, widest = max(largest, size), max(widest, own * size)
+        for e in range(child_start[s], child_start[s + 1]):
+            c = children[e]
+            for k in range(all_start[c + 1] - below[c], all_start[c + 1]):
+                i = all_rows[k]
+                relative[k] = local[block[i]] + i - column[block[i]]
+        for e in range(entry_start[s], entry_start[s + 1]):
+            low, high = by_front[e, 1], by_front[e, 2]
+            entry_place[e] = (low - column[first[s]]) * size + local[block[high]] + high - column[block[high]]
+    update_start, deepest = _stack(up, below, child_start, children)
+    return (
+        original, column[first], all_start, all_rows, relative, child_start, children, entry_start,
+        by_front[:, 0].copy(), entry_place, panel_start, update_start, deepest, largest, widest,
+    )  # fmt: skip
+
+
+@nb.njit(cache=True)
+def _by_front(indptr, indices, place, owner, supers):  # type: ignore[no-untyped-def]
+    """The values of the matrix front by front: which value, and its permuted column and row, column <= row."""
+    start = np.zeros(supers + 1, dtype=np.int64)
+    for j in range(len(indptr) - 1):
+        for e in range(indptr[j], indptr[j + 1]):
+            start[owner[min(place[j], place[indices[e]])] + 1] += 1
+    start = np.cumsum(start)
+    filled, sorted_values = start[:-1].copy(), np.empty((len(indices), 3), dtype=np.int64)
+    for j in range(len(indptr) - 1):
+        for e in range(indptr[j], indptr[j + 1]):
+            a, b = place[j], place[indices[e]]
+            low, high = min(a, b), max(a, b)
+            k = filled[owner[low]]
+            filled[owner[low]] += 1
+            sorted_values[k, 0], sorted_values[k, 1], sorted_values[k, 2] = e, low, high
+    return start, sorted_values
+
+
+@nb.njit(cache=True)
+def _stack(up, below, child_start, children):  # type: ignore[no-untyped-def]
+    """Where update matrices (rows `below`) lie, and room for all: two stacks, for even and for odd depths of the tree.
+
+    What a supernode reads, its children's, and what it writes are then never on the same stack, and the children's lie
+    on top of theirs.
+    """
+    supers = len(up)
+    odd = np.zeros(supers, dtype=np.int64)
+    for s in range(supers - 1, -1, -1):  # parents come after their children
+        odd[s] = 1 - odd[up[s]] if up[s] >= 0 else 0
+    start, height, deepest = np.empty(supers, dtype=np.int64), np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
+    for s in range(supers):
+        for e in range(child_start[s], child_start[s + 1]):
+            height[1 - odd[s]] -= below[children[e]] ** 2
+        start[s] = height[odd[s]]
+        height[odd[s]] += below[s] ** 2
+        deepest[odd[s]] = max(deepest[odd[s]], height[odd[s]])
+    for s in range(supers):
+        start[s] += odd[s] * deepest[0]
+    return start, deepest[0] + deepest[1]
