@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.geometry.vectors import cross, dot, unit
+from gridshell.geometry.vectors import dot, unit
 from gridshell.model import Freedom
 from gridshell.targets import Target
 
@@ -28,12 +29,7 @@ class BoundToTarget:
     guides: Floats
 
     def freedom(self, state: Floats) -> Freedom:
-        normal = self.target.on_surface(state).normal
-        along = self.guides - dot(self.guides, normal)[:, None] * normal
-        along = unit(along)
-        directions = np.zeros((len(state), 3, 3))
-        directions[:, 0], directions[:, 1] = along, cross(normal, along)
-        return Freedom(directions, self.count)
+        return Freedom(_tangents(self.target.level(state)[1], self.guides), self.count)
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
         surface = self.target.on_surface(state)
@@ -47,4 +43,23 @@ class BoundToTarget:
 
     def contact_forces(self, state: Floats, gradient: Floats) -> Floats:
         """(n,) force of the target on each node along the outward normal [N]; negative where it pulls."""
-        return dot(self.target.on_surface(state).normal, gradient)
+        return dot(unit(self.target.level(state)[1]), gradient)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _tangents(steepest, guides):  # type: ignore[no-untyped-def]
+    """(n, 3, 3) two directions across `steepest` (n, 3), the first nearest to `guides` (n, 3); the third is zero."""
+    directions = np.zeros((len(steepest), 3, 3))
+    for i in range(len(steepest)):
+        n, g, along, across = steepest[i], guides[i], directions[i, 0], directions[i, 1]
+        length = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        share = (g[0] * n[0] + g[1] * n[1] + g[2] * n[2]) / length**2
+        for k in range(3):
+            along[k] = g[k] - share * n[k]
+        width = np.sqrt(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
+        for k in range(3):
+            along[k] /= width
+        for k in range(3):
+            a, b = (k + 1) % 3, (k + 2) % 3
+            across[k] = (n[a] * along[b] - n[b] * along[a]) / length
+    return directions

@@ -14,6 +14,7 @@ from gridshell.contact.bound import BoundToTarget
 from gridshell.formfinding.draped import Draped
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
+from gridshell.layout.flatgrid import whole_rods
 from gridshell.model import Shell
 from gridshell.nets import ChebyshevNet, chebyshev_net
 from gridshell.nets.apron import with_apron
@@ -34,13 +35,16 @@ def bound_drape(
     rod: Rod,
     *,
     anchor: tuple[float, float] | None = None,
+    near: Draped | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Drape `layout` over `target` by its net; see `drape`."""
     progress("net", "marching", 0.0)
-    net = chebyshev_net(target, layout, anchor=anchor)
+    net = chebyshev_net(target, layout, anchor=anchor, near=near.net if near else None)
     grid = with_apron(net, CLEARANCE * layout.edge)
-    cuts = [[piece for piece in net.rods if line.contains(piece)] for line in grid.rods]
+    cuts = [list[FlatRod]() for _ in grid.rods]
+    for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
+        cuts[whole].append(piece)
     mesh = mesh_grid(grid, layout.edge, marks=[[s for cut in on for s in (cut.start, cut.end)] for on in cuts])
     start = np.empty((mesh.node_count, 3))
     for k, line in enumerate(grid.rods):
@@ -155,16 +159,21 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
 
 def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
     """Distance [m] along each rod between its end and where this state crosses the target's end."""
-    result = []
+    windows, places = list[NDArray[np.intp]](), list[Floats]()
     for k, pieces in enumerate(cuts):
         s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
         for end in (end for cut in pieces if not cut.virtual for end in (cut.start, cut.end)):
-            first = int(np.clip(np.argmin(np.abs(s - end)) - 1, 0, max(len(s) - 3, 0)))
-            window = slice(first, first + 3)
-            margin = target.margin(positions[nodes[window]])
-            fit = np.polyfit(s[window] - end, margin, len(margin) - 1)
-            result.append(abs(float(fit[-1] / fit[-2])))
-    return np.array(result)
+            first = min(max(int(np.searchsorted(s, end)) - 1, 0), max(len(s) - 3, 0))
+            three = np.minimum(first + np.arange(3), len(s) - 1)
+            windows.append(nodes[three])
+            places.append(s[three] - end)
+    x = np.array(places).T
+    f = target.margin(positions[np.concatenate(windows)]).reshape(-1, 3).T
+    slope = (f[1] - f[0]) / (x[1] - x[0])  # Newton's parabola through three nodes
+    bend = np.zeros_like(slope)
+    bent = x[2] > x[1]
+    bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
+    return np.abs((f[0] - x[0] * slope + x[0] * x[1] * bend) / (slope - (x[0] + x[1]) * bend))
 
 
 def shape_of_net(net: ChebyshevNet) -> dict[str, object]:

@@ -100,19 +100,16 @@ def map_back(trimmed: Trimmed) -> Footprint:
 
 def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     """(2m, 3) outward unit tangents at both ends of each rod, to second order from the last two edges."""
-    result = np.empty((2 * len(mesh.grid.rods), 3))
-    for rod in range(len(mesh.grid.rods)):
-        nodes, s = mesh.nodes_of(rod), mesh.stations[mesh.rod_slice(rod)]
-        for side, order in enumerate((slice(None, 3), slice(None, -4, -1))):
-            x, at = positions[nodes[order]], s[order]
-            last = unit(x[0] - x[1])
-            if len(x) < 3:
-                result[2 * rod + side] = last
-                continue
-            before = unit(x[1] - x[2])
-            h, h_before = abs(at[0] - at[1]), abs(at[1] - at[2])
-            result[2 * rod + side] = last + (last - before) * h / (h + h_before)
-    return unit(result)
+    first, last = mesh.rod_start, mesh.rod_stop - 1
+    inwards = np.minimum(np.arange(3)[:, None], last - first)  # a rod of one edge counts it twice
+    rows = np.stack([first + inwards, last - inwards], axis=2).reshape(3, -1)
+    x, at = positions[mesh.rod_nodes[rows]], mesh.stations[rows]
+    h, h_before = np.abs(at[0] - at[1]), np.abs(at[1] - at[2])
+    tangents = unit(x[0] - x[1])
+    bent = h_before > 0
+    change = tangents[bent] - unit((x[1] - x[2])[bent])
+    tangents[bent] += change * (h / (h + h_before))[bent, None]
+    return unit(tangents)
 
 
 def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]]]:

@@ -53,16 +53,37 @@ class FlatRod:
         """Flat positions (..., 2) [m] at the material coordinates `s` [m]."""
         return np.asarray(self.origin) + np.asarray(s, dtype=float)[..., None] * np.asarray(self.direction)
 
+    @property
+    def line(self) -> tuple[object, ...]:
+        """The line on which it lies, whatever its ends."""
+        return self.family, self.offset, self.origin, self.direction
+
     def contains(self, piece: "FlatRod") -> bool:
         """Whether another rod is this one or a piece of it."""
         tiny = 1e-9 * self.length
-        same_line = (self.family, self.offset, self.origin, self.direction) == (
-            piece.family, piece.offset, piece.origin, piece.direction,
-        )  # fmt: skip
-        return same_line and self.start - tiny <= piece.start and piece.end <= self.end + tiny
+        return self.line == piece.line and self.start - tiny <= piece.start and piece.end <= self.end + tiny
 
     def cut(self, start: float, end: float) -> "FlatRod":
         return replace(self, start=start, end=end)
+
+
+def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:
+    """For each piece the index of the rod that it is, or is a piece of.
+
+    Raises
+    ------
+    ValueError : a piece lies on no rod.
+    """
+    on_line: dict[tuple[object, ...], list[int]] = {}
+    for k, rod in enumerate(rods):
+        on_line.setdefault(rod.line, []).append(k)
+    found = []
+    for piece in pieces:
+        whole = [k for k in on_line.get(piece.line, []) if rods[k].contains(piece)]
+        if not whole:
+            raise ValueError(f"{piece.name} is no piece of any rod")
+        found.append(whole[0])
+    return found
 
 
 @dataclass(frozen=True)

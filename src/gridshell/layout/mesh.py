@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.geometry.curves import on_curve
-from gridshell.layout.flatgrid import FlatGrid, FlatRod
+from gridshell.layout.flatgrid import FlatGrid, FlatRod, whole_rods
 
 Ints = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -126,37 +125,39 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
 
     `marks`, for each rod the material coordinates [m] of further points that must be nodes.
     """
-    rod_count = len(grid.rods)
-    joints_on = [list[tuple[float, int]]() for _ in range(rod_count)]
-    for joint, (rods, at) in enumerate(zip(grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True)):
-        for rod, s in zip(rods, at, strict=True):
-            joints_on[rod].append((s, joint))
+    joints_on = [list[tuple[float, int]]() for _ in grid.rods]
     merged = _merge_joints(grid)
-    next_node = int(merged.max(initial=-1)) + 1
-    rod_nodes, stations, rod_start = list[int](), list[float](), list[int]()
-    for index, (rod, joints) in enumerate(zip(grid.rods, joints_on, strict=True)):
-        rod_start.append(len(rod_nodes))
+    for node, pair, at in zip(merged.tolist(), grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True):
+        for k, s in zip(pair, at, strict=True):
+            joints_on[k].append((s, node))
+    count = int(merged.max(initial=-1)) + 1
+    fixed, starts = list[tuple[float, int]](), list[int]()
+    for k, (rod, joints) in enumerate(zip(grid.rods, joints_on, strict=True)):
         tiny = 1e-9 * rod.length
-        fixed = [(s, int(merged[joint])) for s, joint in sorted(joints)]
-        fixed = [mark for k, mark in enumerate(fixed) if k == 0 or mark[1] != fixed[k - 1][1]]
-        for s in (rod.start, *(marks[index] if marks is not None else ()), rod.end):
-            if all(abs(s - other) > tiny for other, _ in fixed):
-                fixed.append((s, next_node))
-                next_node += 1
-        fixed.sort()
-        for (s0, n0), (s1, _) in pairwise(fixed):
-            pieces = edge_count(s1 - s0, edge)
-            rod_nodes += [n0, *range(next_node, next_node + pieces - 1)]
-            stations += [s0 + (s1 - s0) * k / pieces for k in range(pieces)]
-            next_node += pieces - 1
-        rod_nodes.append(fixed[-1][1])
-        stations.append(fixed[-1][0])
-    nodes, s = np.array(rod_nodes, dtype=np.intp), np.array(stations)
-    starts = np.array(rod_start, dtype=np.intp)
-    flat = np.zeros((next_node, 3))
-    for rod, begin, stop in zip(grid.rods, starts, np.append(starts[1:], len(nodes)), strict=True):
-        flat[nodes[begin:stop], :2] = rod.point(s[begin:stop])
-    return GridMesh(grid, flat, nodes, starts, s, merged)
+        joints.sort()
+        here = [mark for n, mark in enumerate(joints) if n == 0 or mark[1] != joints[n - 1][1]]
+        for s in (rod.start, *(marks[k] if marks is not None else ()), rod.end):
+            if all(abs(s - other) > tiny for other, _ in here):
+                here.append((s, count))
+                count += 1
+        starts.append(len(fixed))
+        fixed += sorted(here)
+    s, nodes = np.array([s for s, _ in fixed]), np.array([node for _, node in fixed], dtype=np.intp)
+    rod_of = np.repeat(np.arange(len(starts)), np.diff([*starts, len(fixed)]))
+    edges = np.ones(len(s), dtype=np.intp)  # from each fixed point to the next of its rod, and one place for the last
+    spans = np.flatnonzero(rod_of[1:] == rod_of[:-1])
+    edges[spans] = edge_counts(s[spans + 1] - s[spans], edge)
+    after = np.repeat(np.arange(len(s)), edges)
+    first = np.cumsum(edges) - edges
+    step = np.arange(len(after)) - first[after]
+    following = np.minimum(after + 1, len(s) - 1)
+    stations = s[after] + (s[following] - s[after]) * step / edges[after]
+    rod_nodes = np.where(step > 0, count - 1 + np.cumsum(step > 0), nodes[after])
+    flat = np.zeros((count + int(np.count_nonzero(step)), 3))
+    origin, direction = np.array([rod.origin for rod in grid.rods]), np.array([rod.direction for rod in grid.rods])
+    line = rod_of[after]
+    flat[rod_nodes, :2] = origin[line] + stations[:, None] * direction[line]
+    return GridMesh(grid, flat, rod_nodes, first[starts], stations, merged)
 
 
 def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
@@ -168,7 +169,7 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     joint_of = {
         tuple(pair): int(node) for pair, node in zip(mesh.grid.crossings.rods.tolist(), mesh.joint_nodes, strict=True)
     }
-    index = [next(k for k, whole in enumerate(mesh.grid.rods) if whole.contains(rod)) for rod in rods]
+    index = whole_rods(mesh.grid.rods, rods)
     grid = FlatGrid.of(rods, margin=margin)
     known = np.array([(min(index[a], index[b]), max(index[a], index[b])) in joint_of for a, b in grid.crossings.rods])
     grid = FlatGrid(grid.rods, grid.crossings.select(known.astype(bool)))
@@ -205,9 +206,9 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     return part, chosen
 
 
-def edge_count(length: float, edge: float) -> int:
-    """Fewest equal edges of at most `edge` that make up `length` (an edge may be 1e-6 too long)."""
-    return max(1, int(np.ceil(length / edge - 1e-6)))
+def edge_counts(lengths: Floats, edge: float) -> Ints:
+    """(n,) fewest equal edges of at most `edge` that make up each of `lengths` (an edge may be 1e-6 too long)."""
+    return np.maximum(1, np.ceil(lengths / edge - 1e-6)).astype(np.intp)
 
 
 def _merge_joints(grid: FlatGrid) -> Ints:

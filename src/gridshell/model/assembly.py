@@ -34,26 +34,11 @@ class Assembly:
     @staticmethod
     def of(element_blocks: Sequence[Ints], freedom: Freedom) -> "Assembly":
         """Plan the assembly of element sets with `blocks` (m, k) each."""
-        count, n = freedom.count, len(freedom.count)
-        diagonal = np.flatnonzero(count > 0)
-        keys = [_pair_keys(blocks, count) for blocks in element_blocks]
-        flat = np.unique(np.concatenate([diagonal * (n + 1), *(key[key >= 0] for key in keys)]))
-        column, row = flat // n, flat % n
-        tall = np.cumsum(count[row]) - count[row]
-        start = np.searchsorted(column, np.arange(n))
-        before = tall - np.append(tall, 0)[start[column]]  # rows above this block in its column
-        above = np.zeros(n, dtype=np.intp)
-        above[column[row == column]] = before[row == column]
-        stored = above * count + count * (count + 1) // 2
-        begin = np.cumsum(stored) - stored
-        slot = begin[column] + before
-        slots = tuple(
-            np.where(key >= 0, slot[np.minimum(np.searchsorted(flat, key), len(flat) - 1)], -1) for key in keys
-        )
-        block = np.repeat(np.arange(n), count)
-        heights = above[block] + np.arange(len(block)) - freedom.first[block] + 1
-        indptr = np.concatenate([[0], np.cumsum(heights)])
-        indices = _row_indices(column, row, start, freedom.first, count, above, begin, int(indptr[-1]))
+        count = freedom.count
+        everywhere = np.arange(len(count))[:, None]
+        start, rows = _pattern([*element_blocks, everywhere], count)
+        indptr, indices, above, slot = _columns(start, rows, freedom.first, count)
+        slots = tuple(_find_slots(blocks, count, start, rows, slot) for blocks in element_blocks)
         return Assembly(indptr, indices, count, above, slots)
 
     def assemble(self, hessians: Sequence[Floats], element_blocks: Sequence[Ints], freedom: Freedom) -> Floats:
@@ -74,29 +59,103 @@ class Assembly:
         return np.asarray(self.indptr[1:] - 1)
 
 
-def _pair_keys(blocks: Ints, count: Ints) -> Ints:
-    """(m, k, k) key column * n + row of each pair of an element's blocks in the upper triangle, else -1."""
-    row, column = blocks[:, :, None], blocks[:, None, :]
-    keys = column * len(count) + row
-    k = blocks.shape[1]
-    stored = (row < column) | np.eye(k, dtype=bool)
-    return np.where(stored & (count[row] > 0) & (count[column] > 0), keys, -1)
+def _pattern(element_blocks: Sequence[Ints], count: Ints) -> tuple[Ints, Ints]:
+    """The stored blocks, above and on the diagonal: rows[start[j] : start[j + 1]] of block column j, ascending."""
+    total = np.zeros(len(count) + 1, dtype=np.int64)
+    for blocks in element_blocks:
+        _count_pairs(blocks, count, total)
+    start = np.cumsum(total)
+    rows, place = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
+    for blocks in element_blocks:
+        _fill_pairs(blocks, count, place, rows)
+    return _unique_rows(start, rows)  # type: ignore[no-any-return]
 
 
 @nb.njit(cache=True)
-def _row_indices(column, row, start, first, count, above, begin, total):  # type: ignore[no-untyped-def]
-    """Row index of every stored value."""
-    indices = np.empty(total, dtype=np.int64)
-    for entry in range(len(column)):
-        j, i = column[entry], row[entry]
-        before = 0
-        for earlier in range(start[j], entry):
-            before += count[row[earlier]]
+def _count_pairs(blocks, count, total):  # type: ignore[no-untyped-def]
+    for m in range(blocks.shape[0]):
+        for b in range(blocks.shape[1]):
+            for a in range(blocks.shape[1]):
+                i, j = blocks[m, a], blocks[m, b]
+                if (i < j or a == b) and count[i] > 0 and count[j] > 0:
+                    total[j + 1] += 1
+
+
+@nb.njit(cache=True)
+def _fill_pairs(blocks, count, place, rows):  # type: ignore[no-untyped-def]
+    for m in range(blocks.shape[0]):
+        for b in range(blocks.shape[1]):
+            for a in range(blocks.shape[1]):
+                i, j = blocks[m, a], blocks[m, b]
+                if (i < j or a == b) and count[i] > 0 and count[j] > 0:
+                    rows[place[j]] = i
+                    place[j] += 1
+
+
+@nb.njit(cache=True)
+def _unique_rows(start, rows):  # type: ignore[no-untyped-def]
+    """Each column's rows ascending, once each; a few dozen at most, so by insertion."""
+    n = len(start) - 1
+    kept, used = np.zeros(n + 1, dtype=np.int64), 0
+    for j in range(n):
+        begin = used
+        for e in range(start[j], start[j + 1]):
+            i, k = rows[e], used
+            while k > begin and rows[k - 1] > i:
+                k -= 1
+            if k > begin and rows[k - 1] == i:
+                continue
+            for back in range(used, k, -1):
+                rows[back] = rows[back - 1]
+            rows[k] = i
+            used += 1
+        kept[j + 1] = used
+    return kept, rows[:used].copy()
+
+
+@nb.njit(cache=True)
+def _columns(start, rows, first, count):  # type: ignore[no-untyped-def]
+    """The pattern by unknowns; rows above each diagonal block; and where each stored block begins in the values."""
+    n, unknowns = len(start) - 1, int(count.sum())
+    indptr, above, slot = np.zeros(unknowns + 1, dtype=np.int64), np.zeros(n, dtype=np.int64), np.empty_like(rows)
+    begin = 0
+    for j in range(n):
+        height = 0
+        for e in range(start[j], start[j + 1]):
+            slot[e] = begin + height
+            if rows[e] < j:
+                height += count[rows[e]]
+        above[j] = height
         for c in range(count[j]):
-            base = begin[j] + c * above[j] + c * (c + 1) // 2 + before
-            for r in range(count[i] if i != j else c + 1):
-                indices[base + r] = first[i] + r
-    return indices
+            begin += height + c + 1
+            indptr[first[j] + c + 1] = begin
+    indices = np.empty(begin, dtype=np.int64)
+    for j in range(n):
+        for c in range(count[j]):
+            k = indptr[first[j] + c]
+            for e in range(start[j], start[j + 1]):
+                i = rows[e]
+                for r in range(count[i] if i != j else c + 1):
+                    indices[k] = first[i] + r
+                    k += 1
+    return indptr, indices, above, slot
+
+
+@nb.njit(cache=True)
+def _find_slots(blocks, count, start, rows, slot):  # type: ignore[no-untyped-def]
+    """(m, k, k) where each pair of an element's blocks begins in the values, -1 if it is not stored."""
+    k = blocks.shape[1]
+    slots = np.full((blocks.shape[0], k, k), -1, dtype=np.int64)
+    for m in range(blocks.shape[0]):
+        for b in range(k):
+            for a in range(k):
+                i, j = blocks[m, a], blocks[m, b]
+                if (i < j or a == b) and count[i] > 0 and count[j] > 0:
+                    e = start[j]
+                    while rows[e] != i:
+                        e += 1
+                    slots[m, a, b] = slot[e]
+    return slots
 
 
 @nb.njit(cache=True, error_model="numpy")

@@ -7,7 +7,6 @@ built still shape the net: they are kept as virtual rods.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from math import cos, degrees, sin
 from string import ascii_lowercase
 
@@ -20,9 +19,10 @@ from gridshell.geometry.vectors import cross, dot
 from gridshell.layout import FlatRod, GridLayout
 from gridshell.layout.flatgrid import Family
 from gridshell.layout.gridlayout import rod_name
-from gridshell.layout.mesh import edge_count
+from gridshell.layout.mesh import edge_counts
 from gridshell.nets.compass import Net, march
 from gridshell.nets.cuts import Cut, cut_lines, extrapolated, inside_nodes
+from gridshell.nets.nearby import march_near
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
@@ -70,12 +70,19 @@ class ChebyshevNet:
         return on_curve(knots[known], points[known], s)
 
 
-def chebyshev_net(target: Target, layout: GridLayout, *, anchor: tuple[float, float] | None = None) -> ChebyshevNet:
+def chebyshev_net(
+    target: Target,
+    layout: GridLayout,
+    *,
+    anchor: tuple[float, float] | None = None,
+    near: ChebyshevNet | None = None,
+) -> ChebyshevNet:
     """March the net of `layout` over `target` and cut it at the target's end.
 
     Parameters
     ----------
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+    near : a net that may be similar, from which this one is found sooner; it is the same without.
 
     Raises
     ------
@@ -88,8 +95,9 @@ def chebyshev_net(target: Target, layout: GridLayout, *, anchor: tuple[float, fl
             f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
             "use a smaller spacing"
         )
-    lines = _find_lines(target, layout, start, heading)
-    coarse, fine = (_march_lines(target, layout, lines, start, heading, refine) for refine in (1, 2))
+    lines, rough = _find_lines(target, layout, start, heading, near.net if near else None)
+    coarse = _march_lines(target, layout, lines, start, heading, 1, rough)
+    fine = _march_lines(target, layout, lines, start, heading, 2, coarse)
     inside = inside_nodes(target, fine)
     _refuse_holes(fine, inside)
     angle, where = _smallest_angle(target, fine, inside)
@@ -122,9 +130,13 @@ class _Lines:
     v: Floats
 
 
-def _find_lines(target: Target, layout: GridLayout, start: Floats, heading: Floats) -> _Lines:
-    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; found by a coarse march."""
-    reach = np.full(4, 1.5 * target.size)  # towards -u, +u, -v, +v
+def _find_lines(
+    target: Target, layout: GridLayout, start: Floats, heading: Floats, near: Net | None
+) -> tuple[_Lines, Net]:
+    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them."""
+    reach = np.full(4, 2.0 * target.size)  # towards -u, +u, -v, +v
+    if near is not None:
+        reach = np.minimum([-near.u[0], near.u[-1], -near.v[0], near.v[-1]], 2 * reach)
     step = np.array(layout.spacing[::-1]) / 2  # along u, the lines of family v: their spacing
     for _ in range(12):
         u, v = (
@@ -135,7 +147,7 @@ def _find_lines(target: Target, layout: GridLayout, start: Floats, heading: Floa
             raise InputError(
                 f"the net needs more than {len(u) // 2} x {len(v) // 2} lines: use a larger spacing or a smaller target"
             )
-        net = march(target, u, v, start, heading)
+        net = march_near(target, u, v, start, heading, near) if near else march(target, u, v, start, heading)
         inside = inside_nodes(target, net)
         if not inside.any():
             raise InputError("no node of the net lies inside the target: move the anchor away from the rim")
@@ -145,33 +157,34 @@ def _find_lines(target: Target, layout: GridLayout, start: Floats, heading: Floa
         if np.all(needed <= reach + 1e-12):
             break
         reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
-    return _Lines(_lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3]))
+        near = net
+    return _Lines(_lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])), net
 
 
 def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
     """Offsets of the lattice lines of a family between -below and above, with the axis."""
-    phase, spacing = layout.phase(family), layout.spacing[0 if family == "u" else 1]
-    first, last = np.floor((-below - phase) / spacing), np.ceil((above - phase) / spacing)
-    offsets = phase + spacing * np.arange(first, last + 1)
+    spacing = layout.spacing[0 if family == "u" else 1]
+    offsets = layout.lattice(family, -below, above)
     offsets[np.abs(offsets) < 1e-9 * spacing] = 0.0
     return offsets if (offsets == 0.0).any() else np.sort(np.append(offsets, 0.0))
 
 
-def _march_lines(target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int) -> Net:
+def _march_lines(
+    target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int, near: Net
+) -> Net:
     u, v = (_subdivide(offsets, layout.edge, refine) for offsets in (lines.u, lines.v))
     if len(u) * len(v) > MOST_NODES:
         raise InputError(f"the net would have {len(u)} x {len(v)} nodes: use longer edges or a larger spacing")
-    return march(target, u, v, start, heading)
+    return march_near(target, u, v, start, heading, near)
 
 
 def _subdivide(offsets: Floats, edge: float, refine: int) -> Floats:
     """Three steps or more from line to line, twice as many where `refine` is 2, meeting the nodes of the mesh."""
-    pieces = []
-    for low, high in pairwise(offsets.tolist()):
-        edges = edge_count(high - low, edge)
-        steps = edges // 2 if edges % 2 == 0 and edges >= 6 else max(3, edges)
-        pieces.append(np.linspace(low, high, refine * steps, endpoint=False))
-    return np.append(np.concatenate(pieces), offsets[-1])
+    edges = edge_counts(np.diff(offsets), edge)
+    steps = refine * np.where((edges % 2 == 0) & (edges >= 6), edges // 2, np.maximum(3, edges))
+    span = np.repeat(np.arange(len(edges)), steps)
+    along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)
+    return np.append(offsets[span] + np.diff(offsets)[span] * along / steps[span], offsets[-1])
 
 
 def _refuse_holes(net: Net, inside: NDArray[np.bool_]) -> None:
@@ -249,8 +262,9 @@ def _name_rods(
         touching = {float(c): cut for c, cut in zip(offsets, cuts, strict=True) if cut}
         built = layout.offsets(family)
         if built is None:
-            phase, spacing = layout.phase(family), layout.spacing[0 if family == "u" else 1]
-            built = np.array([c for c in touching if abs((c - phase) / spacing - round((c - phase) / spacing)) < 1e-6])
+            lattice = layout.lattice(family, min(touching, default=0.0), max(touching, default=0.0))
+            tiny = 1e-6 * max(layout.spacing)
+            built = np.array([c for c in touching if np.abs(lattice - c).min() < tiny])
         for k, c in enumerate(built):
             name = rod_name(family, k, len(built))
             here = min(touching, key=lambda offset: abs(offset - c), default=np.inf)
@@ -258,7 +272,8 @@ def _name_rods(
                 dropped.append((name, "it never touches the target"))
                 continue
             pieces = touching.pop(here)
-            rods += [make(label, here, *cut) for label, cut in zip(piece_names(name, len(pieces)), pieces, strict=True)]
+            for label, cut in zip(piece_names(name, len(pieces)), pieces, strict=True):
+                rods.append(make(label, here, *cut, virtual=label in layout.left_out))
             if len(pieces) > 1:
                 warnings.append(f"rod {name} meets the target in {len(pieces)} pieces, each with ends of its own")
         for c, pieces in touching.items():

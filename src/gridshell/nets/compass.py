@@ -52,12 +52,12 @@ def march(target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats)
     """
     points = np.full((len(u), len(v), 3), np.nan)
     net = Net(u, v, points)
-    _lay_axes(target, net, anchor, heading)
-    _fill_quadrants(target, net)
+    lay_axes(target, net, anchor, heading)
+    fill_quadrants(target, net)
     return net
 
 
-def _lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
+def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
     """Two discrete geodesics through the anchor: equal chords, straightest at every node."""
     i0, j0 = net.origin
     normal = target.on_surface(anchor[None]).normal[0]
@@ -133,10 +133,11 @@ def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # ty
     return going
 
 
-def _fill_quadrants(target: Target, net: Net) -> None:
-    """All four quadrants together, one anti-diagonal at a time: its nodes depend only on earlier ones."""
+def fill_quadrants(target: Target, net: Net) -> None:
+    """What is not known of all four quadrants, one anti-diagonal at a time: its nodes depend only on earlier ones."""
     i0, j0 = net.origin
-    for diagonal in range(2, len(net.u) + len(net.v)):
+    unknown = np.argwhere(np.isnan(net.points[:, :, 0])) - (i0, j0)
+    for diagonal in np.unique(np.abs(unknown).sum(axis=1)).tolist():
         i, j, a, b, d, from_a, from_b, side = _next_nodes(net.points, net.u, net.v, i0, j0, diagonal)
         if len(i):
             net.points[i, j] = _compass(target, a, b, d, from_a, from_b, side)
@@ -156,7 +157,7 @@ def _next_nodes(points, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         for along in range(1, diagonal):
             p, q = i0 + i_side * along, j0 + j_side * (diagonal - along)
-            if not (0 <= p < nu and 0 <= q < nv):
+            if not (0 <= p < nu and 0 <= q < nv) or np.isfinite(points[p, q, 0]):
                 continue
             p_back, q_back = p - i_side, q - j_side
             if not np.isfinite(points[p, q_back, 0] + points[p_back, q, 0] + points[p_back, q_back, 0]):

@@ -37,13 +37,17 @@ class _Quadric(Standing):
         return 0.0, 0.0
 
     def implicit(self, x: Floats) -> Implicit:
-        weights, slope, second = self._form
-        value = x * x @ weights + slope * x[:, 2] - self.scale
-        gradient = 2.0 * weights * x
-        gradient[:, 2] += slope
         hessian = np.empty((len(x), 3, 3))
-        hessian[:] = second
-        return Implicit(value, gradient, hessian)
+        hessian[:] = self._form[2]
+        return Implicit(*self.level(x), hessian)
+
+    def level(self, x: Floats) -> tuple[Floats, Floats]:
+        weights, slope, _ = self._form
+        gradient = x * weights
+        value = np.einsum("ij,ij->i", x, gradient) + (slope * x[:, 2] - self.scale)
+        gradient *= 2.0
+        gradient[:, 2] += slope
+        return value, gradient
 
     @cached_property
     def _form(self) -> tuple[Floats, float, Floats]:

@@ -4,12 +4,15 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError
 
 Floats = NDArray[np.float64]
+
+NEARLY = 1e-8  # of the size: Newton's step leaves the square of what was missing, which is then less than round-off
 
 
 class Implicit(NamedTuple):
@@ -93,48 +96,35 @@ class Target(ABC):
         for _ in range(steps):
             value, gradient = self.level(x)
             x = x - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
-            if np.max(np.abs(value), initial=0.0) <= 1e-15 * self.size:
+            if np.max(np.abs(value), initial=0.0) <= NEARLY * self.size:
                 break
         return x
 
     def on_surface(self, x: Floats) -> Gap:
         """Normal and shape operator at points (n, 3) that lie on the surface; the distance is taken as 0."""
         _, gradient, hessian = self.implicit(x)
-        steepness = np.linalg.norm(gradient, axis=1)
-        n = gradient / steepness[:, None]
-        tangential = np.eye(3) - n[:, :, None] * n[:, None, :]
-        shape = tangential @ (hessian / steepness[:, None, None]) @ tangential
-        return Gap(np.zeros(len(x)), n, shape)
+        return Gap(np.zeros(len(x)), *_normal_and_shape(gradient, hessian))
 
     def closest(self, x: Floats) -> Floats:
         """Closest points (n, 3) of the continued surface [m]; a local minimum beyond a centre of curvature."""
         with np.errstate(all="ignore"):  # NaN, far out where the surface has no continuation
             y = self.retract(x)
-            settled = np.zeros(len(x), dtype=bool)
+            left = np.arange(len(x))
             for _ in range(12):
-                step, convex = self._newton_to_closest(x, y, 0.0)
+                step, convex = self._newton_to_closest(x[left], y[left], 0.0)
                 length = np.linalg.norm(step, axis=1)
-                y = y + step * np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
-                settled = convex & (length <= 1e-13 * self.size)
-                if settled.all():
+                y[left] += step * np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
+                left = left[~(convex & (length <= NEARLY * self.size))]
+                if len(left) == 0:
                     return y
-            left = np.flatnonzero(~settled)
             y[left] = self._descend_to_closest(x[left])
             return y
 
     def _newton_to_closest(self, x: Floats, y: Floats, damping: float | Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """One step (n, 3) of Newton on y + F'(y) t = x, F(y) = 0; and whether the distance is convex at y."""
         value, gradient, hessian = self.implicit(y)
-        square = np.einsum("ij,ij->i", gradient, gradient)
-        t = np.einsum("ij,ij->i", x - y, gradient) / square
-        bent = np.eye(3) * (1.0 + np.reshape(damping, (-1, 1, 1))) + t[:, None, None] * hessian
-        system = np.zeros((len(x), 4, 4))
-        system[:, :3, :3] = bent
-        system[:, :3, 3] = system[:, 3, :3] = gradient
-        right = np.column_stack([x - y - t[:, None] * gradient, -value])
-        both = np.einsum("nii->n", bent) - np.einsum("ni,nij,nj->n", gradient, bent, gradient) / square
-        convex = (np.linalg.det(system) < 0) & (both > 0)  # product and sum of the two tangential eigenvalues
-        return _solve(system, right)[:, :3], convex
+        damped = np.broadcast_to(damping, len(x))
+        return _closest_step(x, y, value, gradient, hessian, damped)
 
     def _descend_to_closest(self, x: Floats) -> Floats:
         """The same with steps that are damped until they lead closer: for points beyond a centre of curvature."""
@@ -184,14 +174,83 @@ class Target(ABC):
         return np.column_stack([xy, z])
 
 
+@nb.njit(cache=True, error_model="numpy")
+def _normal_and_shape(gradient, hessian):  # type: ignore[no-untyped-def]
+    """Unit normals n (m, 3), and (m, 3, 3) P H P / |grad F| with P = 1 - n n'."""
+    normal, shape = np.empty_like(gradient), np.empty_like(hessian)
+    for m in range(len(gradient)):
+        g, n, h, s = gradient[m], normal[m], hessian[m], shape[m]
+        length = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+        across = 0.0
+        for i in range(3):
+            n[i] = g[i] / length
+        for i in range(3):
+            for j in range(3):
+                across += n[i] * h[i, j] * n[j]
+        for i in range(3):
+            hn_i = h[i, 0] * n[0] + h[i, 1] * n[1] + h[i, 2] * n[2]
+            for j in range(3):
+                hn_j = h[j, 0] * n[0] + h[j, 1] * n[1] + h[j, 2] * n[2]
+                s[i, j] = (h[i, j] - hn_i * n[j] - n[i] * hn_j + across * n[i] * n[j]) / length
+    return normal, shape
+
+
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
     """Hessian of the distance at a point `distance` away: S (I + d S)^-1."""
     return np.asarray(shape @ np.linalg.inv(np.eye(3) + distance[:, None, None] * shape))
 
 
-def _solve(systems: Floats, right: Floats) -> Floats:
-    """Solve many small systems; a singular one (a centre of curvature) takes its least-squares solution."""
-    try:
-        return np.asarray(np.linalg.solve(systems, right[:, :, None])[:, :, 0])
-    except np.linalg.LinAlgError:
-        return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(systems), right))
+@nb.njit(cache=True, error_model="numpy")
+def _closest_step(x, y, value, gradient, hessian, damping):  # type: ignore[no-untyped-def]
+    """See `Target._newton_to_closest`. A singular system (a centre of curvature) takes its least-squares solution."""
+    step, convex = np.empty_like(x), np.empty(len(x), dtype=np.bool_)
+    system, right = np.zeros((4, 4)), np.empty(4)
+    for m in range(len(x)):
+        g = gradient[m]
+        square, t = 0.0, 0.0
+        for i in range(3):
+            square += g[i] * g[i]
+            t += (x[m, i] - y[m, i]) * g[i]
+        t /= square
+        trace, normal = 0.0, 0.0
+        for i in range(3):
+            right[i] = x[m, i] - y[m, i] - t * g[i]
+            system[i, 3] = system[3, i] = g[i]
+            for j in range(3):
+                system[i, j] = t * hessian[m, i, j] + (1.0 + damping[m] if i == j else 0.0)
+                normal += g[i] * system[i, j] * g[j]
+            trace += system[i, i]
+        right[3] = -value[m]
+        both = trace - normal / square  # sum of the two tangential eigenvalues; the determinant's sign their product's
+        solution, determinant = _solve(system, right)
+        convex[m] = determinant < 0.0 and both > 0.0
+        step[m] = solution[:3] if determinant != 0.0 else (np.linalg.pinv(system) @ right)[:3]
+    return step, convex
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _solve(system, right):  # type: ignore[no-untyped-def]
+    """Elimination with pivoting; also the determinant."""
+    a, b, determinant = system.copy(), right.copy(), 1.0
+    n = len(b)
+    for k in range(n):
+        p = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[p, k]):
+                p = i
+        if p != k:
+            determinant = -determinant
+            b[k], b[p] = b[p], b[k]
+            for j in range(n):
+                a[k, j], a[p, j] = a[p, j], a[k, j]
+        determinant *= a[k, k]
+        for i in range(k + 1, n):
+            factor = a[i, k] / a[k, k]
+            for j in range(k, n):
+                a[i, j] -= factor * a[k, j]
+            b[i] -= factor * b[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= a[k, j] * b[j]
+        b[k] /= a[k, k]
+    return b, determinant
