@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sparse
 
+from gridshell.solve import multifrontal
 from gridshell.solve.linear import Qdldl, SingularError
 from gridshell.solve.multifrontal import Multifrontal
 from gridshell.solve.ordering import dissect
@@ -74,6 +75,42 @@ def test_large_fronts_go_through_blas_and_still_agree():
     assert solver.factor(triangle.data) == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
     right = RANDOM.standard_normal(size)
     assert np.abs(matrix @ solver.solve(right) - right).max() < 1e-9
+
+
+@pytest.mark.parametrize("bad", [False, True])
+def test_threads_share_the_work_and_change_no_bit(monkeypatch, bad):
+    matrix, places = grid_matrix(50)
+    triangle = upper(matrix - 3.0 * sparse.eye(matrix.shape[0]))
+    right, found = RANDOM.standard_normal(matrix.shape[0]), []
+    if bad:
+        triangle.data[triangle.indptr[1000] - 1] = np.nan
+    for count in (1, 2, 5):
+        monkeypatch.setattr(multifrontal, "threads", lambda count=count: count)
+        solver = Multifrontal(triangle.indptr, triangle.indices, places)
+        assert len(solver._plan.part_start) > 6  # one thread alone would be no test
+        assert sorted(solver._plan.parts) == list(range(len(solver._plan.first) - 1))
+        if bad:
+            with pytest.raises(SingularError):
+                solver.factor(triangle.data)
+            continue
+        found.append((solver.factor(triangle.data), solver.solve(right).tobytes()))
+    assert all(one == found[0] for one in found)
+    if not bad:
+        reference = Qdldl(triangle.indptr, triangle.indices)
+        assert reference.factor(triangle.data) == found[0][0] > 0
+        exact = reference.solve(right)
+        assert np.abs(np.frombuffer(found[0][1]) - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+def test_blocks_whose_unknowns_are_coupled_differently():
+    """A block is coupled as its unknowns are together: here each of three at a place has neighbours of its own."""
+    size, places = 60, np.repeat(RANDOM.random((20, 2)), 3, axis=0)
+    matrix = random_matrix(size, 0.08, 9.0)
+    triangle = upper(matrix)
+    solver = Multifrontal(triangle.indptr, triangle.indices, places)
+    assert solver.factor(triangle.data) == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
+    right = RANDOM.standard_normal(size)
+    assert np.abs(matrix @ solver.solve(right) - right).max() < 1e-12
 
 
 def test_refactoring_the_same_pattern_forgets_the_old_values():

@@ -68,7 +68,7 @@ def _pattern(element_blocks: Sequence[Ints], count: Ints) -> tuple[Ints, Ints]:
     rows, place = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
     for blocks in element_blocks:
         _fill_pairs(blocks, count, place, rows)
-    return _unique_rows(start, rows)  # type: ignore[no-any-return]
+    return _unique_rows(start, rows)
 
 
 @nb.njit(cache=True)

@@ -7,7 +7,9 @@ it by BLAS (`dense`), the order of elimination from where the unknowns lie (`ord
 per pattern (`symbolic`).
 """
 
+import os
 from contextlib import nullcontext
+from threading import Thread
 
 import numba as nb
 import numpy as np
@@ -26,6 +28,7 @@ Ints = NDArray[np.int64]
 BLOCK = 32  # pivots eliminated together
 STRIP = 64  # rows of an update matrix that are made together: of its lower triangle only their own square is wasted
 ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
+MOST_THREADS = 4  # the last part is one thread's work
 LARGE = 128  # rows from which on BLAS would use threads for a front
 
 
@@ -44,7 +47,7 @@ class Multifrontal:
         order = _minimum_degree(indptr, indices) if places is None else _dissected(places, blocks)
         self._plan = plan_of(indptr, indices, blocks, order)
         self._panels = np.empty(int(self._plan.panel_start[-1]))
-        self._unscaled = np.empty(self._plan.largest_panel)
+        self._scratch = [np.empty(self._plan.largest_panel) for _ in range(threads())]
         self._stacks = np.empty(self._plan.stack_size)
         self._pivots = np.empty(size)
 
@@ -56,14 +59,35 @@ class Multifrontal:
     def factor(self, data: Floats) -> int:
         plan, self._data = self._plan, data
         with blas().limit(limits=1) if plan.largest_front >= LARGE else nullcontext():
-            ok = _numeric(
-                dgemm(), data, plan.first, plan.row_start, plan.relative, plan.child_start, plan.children,
-                plan.entry_start, plan.entry_source, plan.entry_place, plan.panel_start, plan.update_start,
-                self._stacks, self._unscaled, self._panels, self._pivots,
-            )  # fmt: skip
+            ok = self._in_parts(data)
         if not ok:
             raise SingularError("a pivot of the factorisation vanishes")
         return int(np.count_nonzero(self._pivots < 0))
+
+    def _in_parts(self, data: Floats) -> bool:
+        """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on
+        the threads."""
+        plan, starts = self._plan, self._plan.part_start
+        separate, ok = iter(range(len(starts) - 2)), [True]
+
+        def eliminate(part: int, scratch: Floats) -> bool:
+            return _numeric(
+                plan.parts[starts[part] : starts[part + 1]], dgemm(), data, plan.first, plan.row_start, plan.relative,
+                plan.child_start, plan.children, plan.entry_start, plan.entry_source, plan.entry_place,
+                plan.panel_start, plan.update_start, self._stacks, scratch, self._panels, self._pivots,
+            )  # fmt: skip
+
+        def work(scratch: Floats) -> None:
+            for part in separate:
+                ok.append(eliminate(part, scratch))
+
+        others = [Thread(target=work, args=(scratch,)) for scratch in self._scratch[1 : len(starts) - 2]]
+        for thread in others:
+            thread.start()
+        work(self._scratch[0])
+        for thread in others:
+            thread.join()
+        return all(ok) and eliminate(len(starts) - 2, self._scratch[0])
 
     def solve(self, right: Floats) -> Floats:
         x = self._substitute(right)
@@ -81,6 +105,11 @@ class Multifrontal:
         result = np.empty_like(x)
         result[plan.order] = x
         return result
+
+
+def threads() -> int:
+    """Threads of a factorisation: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
+    return min(int(nb.config.NUMBA_NUM_THREADS), os.cpu_count() or 1, MOST_THREADS)
 
 
 def _dissected(places: Floats, blocks: Blocks) -> Ints:
@@ -103,18 +132,18 @@ def _minimum_degree(indptr: NDArray[np.int64], indices: NDArray[np.int64]) -> ND
     return np.asarray(solver.factors()[2], dtype=np.intp)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@nb.njit(cache=True, error_model="numpy", nogil=True)
 def _numeric(  # type: ignore[no-untyped-def]
-    dgemm, data, first, row_start, relative, child_start, children, entry_start, entry_source, entry_place,
+    part, dgemm, data, first, row_start, relative, child_start, children, entry_start, entry_source, entry_place,
     panel_start, update_start, stacks, unscaled, panels, pivots,
 ):  # fmt: skip
-    """Factorise front by front; False where a pivot vanishes or is not finite.
+    """Eliminate the supernodes of a `part`, front by front; False where a pivot vanishes or is not finite.
 
     A front of `size` rows and `own` pivots is kept as its pivots' rows (own, size), in `unscaled` while it is
     eliminated, then divided by the pivots in `panels`; and as its update matrix, upper triangle, in `stacks`.
     """
     integers, numbers = np.empty(6, dtype=np.int32), np.empty(2)
-    for s in range(len(first) - 1):
+    for s in part:
         size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         m = size - own
         rows = unscaled[: own * size].reshape(own, size)

@@ -195,9 +195,26 @@ def _normal_and_shape(gradient, hessian):  # type: ignore[no-untyped-def]
     return normal, shape
 
 
+@nb.njit(cache=True, error_model="numpy")
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
-    """Hessian of the distance at a point `distance` away: S (I + d S)^-1."""
-    return np.asarray(shape @ np.linalg.inv(np.eye(3) + distance[:, None, None] * shape))
+    """Hessians (n, 3, 3) of the distance at points `distance` (n,) away from a surface: S (I + d S)^-1."""
+    result, a, adjugate = np.empty_like(shape), np.empty((3, 3)), np.empty((3, 3))
+    for m in range(len(shape)):
+        for i in range(3):
+            for j in range(3):
+                a[i, j] = distance[m] * shape[m, i, j] + (1.0 if i == j else 0.0)
+        for i in range(3):
+            for j in range(3):
+                i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+                adjugate[j, i] = a[i1, j1] * a[i2, j2] - a[i1, j2] * a[i2, j1]
+        volume = a[0, 0] * adjugate[0, 0] + a[0, 1] * adjugate[1, 0] + a[0, 2] * adjugate[2, 0]
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for k in range(3):
+                    total += shape[m, i, k] * adjugate[k, j]
+                result[m, i, j] = total / volume
+    return result
 
 
 @nb.njit(cache=True, error_model="numpy")
