@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,17 +66,37 @@ class Freedom:
 
     def expand(self, q: Floats) -> Floats:
         """Displacements (n, 3) of reduced DOFs (size,)."""
-        block, k = self._slots
-        result = np.zeros((len(self.count), 3))
-        np.add.at(result, block, q[:, None] * self.directions[block, k])
-        return result
+        return _expand(q, self.directions, self.count)
 
     def reduce(self, gradient: Floats) -> Floats:
         """Components (size,) of a gradient (n, 3) in the free directions."""
-        block, k = self._slots
-        return np.asarray(np.einsum("ij,ij->i", gradient[block], self.directions[block, k]))
+        return _reduce(gradient, self.directions, self.count, self.size)
 
     def reduce_diagonal(self, diagonal: Floats) -> Floats:
         """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses."""
         block, k = self._slots
         return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))
+
+
+@nb.njit(cache=True)
+def _expand(q, directions, count):  # type: ignore[no-untyped-def]
+    result, at = np.zeros((len(count), 3)), 0
+    for i in range(len(count)):
+        for k in range(count[i]):
+            for d in range(3):
+                result[i, d] += q[at] * directions[i, k, d]
+            at += 1
+    return result
+
+
+@nb.njit(cache=True)
+def _reduce(gradient, directions, count, size):  # type: ignore[no-untyped-def]
+    result, at = np.empty(size), 0
+    for i in range(len(count)):
+        for k in range(count[i]):
+            total = 0.0
+            for d in range(3):
+                total += gradient[i, d] * directions[i, k, d]
+            result[at] = total
+            at += 1
+    return result

@@ -43,22 +43,15 @@ class Stretch:
 
     def strains(self, state: Floats) -> Floats:
         """(e,) axial strains [-]."""
-        edge = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
-        return np.sqrt(np.einsum("ij,ij->i", edge, edge)) / self.rest_lengths - 1.0
+        return _strains(state, self.blocks, self.rest_lengths)
 
     def elongation(self, state: Floats, motion: Floats) -> Floats:
         """(e,) change of the strains [-] to first order for displacements (N, 3) [m]."""
-        edge = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
-        apart = motion[self.blocks[:, 1]] - motion[self.blocks[:, 0]]
-        length = np.sqrt(np.einsum("ij,ij->i", edge, edge))
-        return np.asarray(np.einsum("ij,ij->i", edge, apart) / (length * self.rest_lengths))
+        return _elongation(state, motion, self.blocks, self.rest_lengths)
 
     def add_axial(self, state: Floats, forces: Floats, gradient: Floats) -> None:
         """Add the gradient [N] of edges that carry the axial forces (e,) [N]."""
-        edge = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
-        pull = (forces / np.sqrt(np.einsum("ij,ij->i", edge, edge)))[:, None] * edge
-        np.add.at(gradient, self.blocks[:, 1], pull)
-        np.subtract.at(gradient, self.blocks[:, 0], pull)
+        _add_axial(state, self.blocks, forces, gradient)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         own = self.forces is None
@@ -106,3 +99,42 @@ def _stretch(x, edges, rest, stiffness, multipliers, forces, own, gradient, hess
                     hessians[e, i, j + 3] = -value
                     hessians[e, i + 3, j] = -value
     return energy
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
+    result = np.empty(len(edges))
+    for e in range(len(edges)):
+        square = 0.0
+        for k in range(3):
+            square += (x[edges[e, 1], k] - x[edges[e, 0], k]) ** 2
+        result[e] = np.sqrt(square) / rest[e] - 1.0
+    return result
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
+    result = np.empty(len(edges))
+    for e in range(len(edges)):
+        a, b = edges[e, 0], edges[e, 1]
+        square, along = 0.0, 0.0
+        for k in range(3):
+            d = x[b, k] - x[a, k]
+            square += d * d
+            along += d * (motion[b, k] - motion[a, k])
+        result[e] = along / (np.sqrt(square) * rest[e])
+    return result
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _add_axial(x, edges, forces, gradient):  # type: ignore[no-untyped-def]
+    for e in range(len(edges)):
+        a, b = edges[e, 0], edges[e, 1]
+        square = 0.0
+        for k in range(3):
+            square += (x[b, k] - x[a, k]) ** 2
+        share = forces[e] / np.sqrt(square)
+        for k in range(3):
+            pull = share * (x[b, k] - x[a, k])
+            gradient[b, k] += pull
+            gradient[a, k] -= pull
