@@ -135,6 +135,16 @@ def test_nearly_singular_system_is_solved_to_a_small_residual():
     assert np.abs(matrix @ x - right).max() < 1e-12 * np.abs(x).max() * np.abs(triangle.data).max()
 
 
+def test_digits_lost_to_a_small_pivot_are_won_back():
+    """Elimination without pivoting loses eight digits here: 1e-8 beside entries of order 1."""
+    matrix = np.array([[1e-8, 1.0, 0.3], [1.0, 1e-8, 0.7], [0.3, 0.7, 2.0]])
+    triangle = upper(matrix)
+    solver = Multifrontal(triangle.indptr, triangle.indices, np.arange(3.0)[:, None])
+    assert solver.factor(triangle.data) == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
+    exact = np.array([1.0, -2.0, 3.0]) / 7
+    assert np.abs(solver.solve(matrix @ exact) - exact).max() < 1e-14
+
+
 @pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
 def test_vanishing_pivot_is_refused(bad):
     triangle = upper(np.diag([1.0, 2.0, 3.0]))
