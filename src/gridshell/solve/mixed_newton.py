@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -236,8 +237,7 @@ class _Step:
         """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""
         result = np.zeros_like(motion)
         for hessians, blocks in zip(self._hessians, self._blocks, strict=True):
-            product = np.einsum("mij,mj->mi", hessians, motion[blocks].reshape(len(blocks), -1))
-            np.add.at(result, blocks, product.reshape(*blocks.shape, 3))
+            _add_product(hessians, blocks, motion, result)
         return result
 
     def lowest_mode(self) -> Floats:
@@ -291,3 +291,15 @@ class _Step:
             smallest = 1.0 / float(v @ image)
             v = image
         return v, smallest
+
+
+@nb.njit(cache=True)
+def _add_product(hessians, blocks, motion, result):  # type: ignore[no-untyped-def]
+    """Add to `result` (n, 3) what elements with `hessians` (m, 3k, 3k) on `blocks` (m, k) make of displacements."""
+    for m in range(blocks.shape[0]):
+        for a in range(blocks.shape[1]):
+            for b in range(blocks.shape[1]):
+                i, j = blocks[m, a], blocks[m, b]
+                for k in range(3):
+                    for d in range(3):
+                        result[i, k] += hessians[m, 3 * a + k, 3 * b + d] * motion[j, d]
