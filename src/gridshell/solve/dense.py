@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numba as nb
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import get_cython_function_address, intrinsic
@@ -47,6 +48,29 @@ def _call(typing, address, integers, numbers, a, b, c):  # type: ignore[no-untyp
         return context.get_dummy_value()
 
     return types.void(*[types.int64] * 6), generate
+
+
+def _interpreted(dgemm, integers, numbers, a, b, c):  # type: ignore[no-untyped-def]
+    """What `_call` does, where Numba compiles nothing (NUMBA_DISABLE_JIT=1) and there are no intrinsics."""
+    import ctypes
+
+    def values(address, kind, count):  # type: ignore[no-untyped-def]
+        return np.ctypeslib.as_array(ctypes.cast(ctypes.c_void_p(address), ctypes.POINTER(kind)), (count,))
+
+    def matrix(address, rows, columns, stride):  # type: ignore[no-untyped-def]
+        flat = values(address, ctypes.c_double, (rows - 1) * stride + columns)
+        return np.lib.stride_tricks.as_strided(flat, (rows, columns), (8 * stride, 8))
+
+    m, n, k, lda, ldb, ldc = values(integers, ctypes.c_int32, 6).tolist()
+    alpha, beta = values(numbers, ctypes.c_double, 2).tolist()
+    if min(m, n, k) > 0:
+        target = matrix(c, n, m, ldc)
+        kept = beta * target if beta else 0.0
+        target[:] = kept + alpha * matrix(b, k, n, ldb).T @ matrix(a, k, m, lda)
+
+
+if nb.config.DISABLE_JIT:
+    _call = _interpreted
 
 
 @nb.njit(cache=True, inline="always")
