@@ -55,7 +55,7 @@ def _interpreted(dgemm, integers, numbers, a, b, c):  # type: ignore[no-untyped-
     import ctypes
 
     def values(address, kind, count):  # type: ignore[no-untyped-def]
-        return np.ctypeslib.as_array(ctypes.cast(ctypes.c_void_p(address), ctypes.POINTER(kind)), (count,))
+        return np.ctypeslib.as_array(ctypes.cast(ctypes.c_void_p(int(address)), ctypes.POINTER(kind)), (count,))
 
     def matrix(address, rows, columns, stride):  # type: ignore[no-untyped-def]
         flat = values(address, ctypes.c_double, (rows - 1) * stride + columns)
