@@ -1,5 +1,5 @@
 # The habits of the house. `make` alone shows them.
-.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints accept-paper paper pictures bench bench-rods
+.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints accept-paper paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -40,9 +40,12 @@ paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (som
 pictures:  ## the README's pictures, made by the program
 	python docs/pictures.py
 
-bench:     ## start-up of the whole process against the bare imports; time of a rod's step against its nodes
-	python benchmarks/startup.py
-	python benchmarks/rod_scaling.py
+bench:     ## all benchmarks as one table, into docs/performance.md (some minutes; nothing else should run)
+	python benchmarks/run.py
 
-bench-rods: ## a cantilever side by side with PyElastica (pip install -e ".[bench]"; ten minutes)
+bench-quick: ## the short ones, printed only
+	python benchmarks/run.py --quick
+
+bench-rods: ## time of a rod's step against its nodes; a cantilever beside PyElastica (pip install -e ".[bench]"; ten minutes)
+	python benchmarks/rod_scaling.py
 	python benchmarks/pyelastica_cantilever.py

@@ -1,22 +1,24 @@
 """Factorisations of the pop-up's own matrices, with twist: ours against QDLDL and SciPy's SuperLU, in one run.
 
-    python benchmarks/factorisation.py [unknowns ...]        default 8000 32000 100000
+    python -m benchmarks.factorisation [unknowns ...]        default 8000 32000 100000
 
 Each time is the least of several repetitions, one thread, the symbolic phase done before where a solver keeps it.
 A solver that took more than `PATIENCE` seconds is left out of larger systems.
 """
 
 import sys
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 import qdldl
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
 import gridshell as gs
+from benchmarks.rows import Row, Section, clock, ms
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Problem
 from gridshell.solve.mixed_newton import _Step as Newton
@@ -46,44 +48,117 @@ def least(work: Callable[[], object]) -> float:
     """Seconds of the fastest of five runs, or of one that takes long."""
     times = list[float]()
     for _ in range(5):
-        begin = time.perf_counter()
+        begin = clock()
         work()
-        times.append(time.perf_counter() - begin)
+        times.append(clock() - begin)
         if times[-1] > 2.0:
             break
     return min(times)
 
 
-def main(sizes: list[int]) -> None:
+@dataclass(frozen=True)
+class Factorised:
+    """One solver on one system: seconds of a factorisation, the same over ours, and the residual of a solution."""
+
+    unknowns: int
+    solver: str
+    seconds: float
+    over_ours: float
+    residual: float
+
+
+@threadpool_limits.wrap(limits=1)
+def measure(sizes: Sequence[int]) -> Iterator[Factorised]:
+    """Every solver on every size; pypardiso too where it is installed."""
     slow = set[str]()
-    print(f"{'unknowns':>9} {'solver':>12} {'factor ms':>10} {'over ours':>10} {'residual':>9}")
     for size in sizes:
         upper, places = system(size)
         whole = csc_matrix(upper + upper.T - diags(upper.diagonal()))
         right = np.sin(np.arange(upper.shape[0]))
-        ours = Multifrontal(upper.indptr, upper.indices, places)
-        ours.factor(upper.data)
-        reference = least(lambda: ours.factor(upper.data))  # noqa: B023
-        row(upper.shape[0], "multifrontal", reference, reference, whole, ours.solve(right), right)
-        if "qdldl" not in slow:
-            theirs = qdldl.Solver(upper, upper=True)
-            seconds = least(lambda: theirs.update(upper, upper=True))  # noqa: B023
-            row(upper.shape[0], "qdldl", seconds, reference, whole, theirs.solve(right), right)
-            slow |= {"qdldl"} if seconds > PATIENCE else set()
-        if "splu" not in slow:
-            options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-            seconds = least(lambda: splu(whole, **options))  # noqa: B023
-            row(upper.shape[0], "scipy splu", seconds, reference, whole, splu(whole, **options).solve(right), right)
-            slow |= {"splu"} if seconds > PATIENCE else set()
+        reference = None
+        for name, make in SOLVERS.items():
+            if name in slow:
+                continue
+            factor, solve = make(upper, whole, places)
+            factor()
+            seconds = least(factor)
+            reference = reference or seconds
+            slow |= {name} if seconds > PATIENCE else set()
+            x = solve(right)
+            residual = np.abs(whole @ x - right).max() / (np.abs(whole) @ np.abs(x)).max()
+            yield Factorised(upper.shape[0], name, seconds, seconds / reference, float(residual))
 
 
-def row(
-    unknowns: int, name: str, seconds: float, reference: float, whole: csc_matrix, x: np.ndarray, right: np.ndarray
-) -> None:
-    residual = np.abs(whole @ x - right).max() / (np.abs(whole) @ np.abs(x)).max()
-    print(f"{unknowns:9d} {name:>12} {1e3 * seconds:10.1f} {seconds / reference:10.1f} {residual:9.1e}", flush=True)
+Solver = tuple[Callable[[], object], Callable[[np.ndarray], np.ndarray]]
+
+
+def _ours(upper: csc_matrix, whole: csc_matrix, places: np.ndarray) -> Solver:
+    solver = Multifrontal(upper.indptr, upper.indices, places)
+    return lambda: solver.factor(upper.data), solver.solve
+
+
+def _qdldl(upper: csc_matrix, whole: csc_matrix, places: np.ndarray) -> Solver:
+    solver = qdldl.Solver(upper, upper=True)
+    return lambda: solver.update(upper, upper=True), solver.solve
+
+
+def _splu(upper: csc_matrix, whole: csc_matrix, places: np.ndarray) -> Solver:
+    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    return lambda: splu(whole, **options), lambda right: splu(whole, **options).solve(right)
+
+
+def _pardiso(upper: csc_matrix, whole: csc_matrix, places: np.ndarray) -> Solver:
+    from pypardiso import PyPardisoSolver
+
+    solver, rows = PyPardisoSolver(mtype=-2), csr_matrix(upper)
+    solver.set_phase(11)
+    solver._call_pardiso(rows, np.zeros((rows.shape[0], 1)))  # the symbolic phase, once
+
+    def factor() -> None:
+        solver.set_phase(22)
+        solver._call_pardiso(rows, np.zeros((rows.shape[0], 1)))
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        solver.set_phase(33)
+        return np.asarray(solver._call_pardiso(rows, right[:, None])).ravel()
+
+    return factor, solve
+
+
+SOLVERS: dict[str, Callable[[csc_matrix, csc_matrix, np.ndarray], Solver]] = {
+    "multifrontal": _ours, "qdldl": _qdldl, "scipy splu": _splu,
+}  # fmt: skip
+if find_spec("pypardiso"):
+    SOLVERS["pypardiso"] = _pardiso
+
+
+def factorisation(quick: bool) -> Section:
+    """Tangent stiffness of pinned hemispheres with twist angles: factorisations, the least of five, one thread; the
+    symbolic phase done before where a solver keeps it."""
+    asked = {32_000: "2.5", 100_000: "10"}
+    rows, details = list[Row](), list[Row]()
+    for size in (8_000, 32_000) if quick else (8_000, 32_000, 100_000, 300_000, 1_000_000):
+        found = list(measure([size]))
+        theirs = [one for one in found[1:] if one.solver in ("qdldl", "scipy splu")]
+        if theirs:
+            best = min(theirs, key=lambda one: one.seconds)
+            limit = f"at least {asked[size]} times" if size in asked else ""
+            what = f"{found[0].unknowns} unknowns, the best of SciPy and QDLDL over ours"
+            rows.append(Row(what, f"{best.over_ours:.1f} ({best.solver})", limit))
+        details += [
+            Row(f"   {one.unknowns} unknowns, {one.solver}", f"{ms(one.seconds)}, residual {one.residual:.0e}")
+            for one in found
+        ]
+    assert factorisation.__doc__ is not None
+    return Section("Factorisation", factorisation.__doc__.replace("\n    ", " "), rows + details)
+
+
+def main(sizes: Sequence[int]) -> None:
+    print(f"{'unknowns':>9} {'solver':>12} {'factor ms':>10} {'over ours':>10} {'residual':>9}")
+    for one in measure(sizes):
+        times = f"{1e3 * one.seconds:10.1f} {one.over_ours:10.1f}"
+        print(f"{one.unknowns:9d} {one.solver:>12} {times} {one.residual:9.1e}", flush=True)
 
 
 if __name__ == "__main__":
-    with threadpool_limits(1):
-        main([int(n) for n in sys.argv[1:]] or [8_000, 32_000, 100_000])
+    main([int(n) for n in sys.argv[1:]] or [8_000, 32_000, 100_000])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         StabilityError,
     )
     from gridshell.fabrication import Fabrication
-    from gridshell.form import Form, PoppedUp, find_form, pop_up_table
+    from gridshell.form import Form, PoppedUp, Sewn, find_form, pop_up_table, sew
     from gridshell.formfinding import (
         Agreement,
         Boundary,
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         trim,
     )
     from gridshell.formfinding.rising import Rise, Risen, pop_up_in_time
+    from gridshell.formfinding.sewn import PatchLayout
     from gridshell.joints import (
         Ball,
         ExplicitPenalty,
@@ -82,12 +83,13 @@ _HOMES = {
         "ConvergenceError", "GridshellError", "InputError", "NetLimitError", "OutputError", "StabilityError",
     ),
     "gridshell.fabrication": ("Fabrication",),
-    "gridshell.form": ("Form", "PoppedUp", "find_form", "pop_up_table"),
+    "gridshell.form": ("Form", "PoppedUp", "Sewn", "find_form", "pop_up_table", "sew"),
     "gridshell.formfinding": (
         "Agreement", "Boundary", "Draped", "Fall", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
         "pop_up", "trim",
     ),
     "gridshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
+    "gridshell.formfinding.sewn": ("PatchLayout",),
     "gridshell.joints": (
         "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
     ),
@@ -116,12 +118,12 @@ __all__ = [
     "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall",
     "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity", "GridLayout", "GridMesh",
     "GridshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError",
-    "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutputError", "Paraboloid", "Pin", "Placement",
-    "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape",
-    "RodStrains", "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed",
-    "Tube", "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
-    "pop_up_in_time", "pop_up_table", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods",
-    "surface_from", "trim",
+    "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutputError", "Paraboloid", "PatchLayout", "Pin",
+    "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rise", "Risen", "Rod",
+    "RodShape", "RodStrains", "Sewn", "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target",
+    "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back",
+    "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table", "sew", "simulate", "solve_rod", "sphere_net_end",
+    "sphere_net_rod", "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """The front door: from a target to a form in one call, and what can be done with it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
@@ -10,22 +10,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gridshell.case.of import case_text
-from gridshell.checks import check
+from gridshell.checks import Checks, check
+from gridshell.checks.joined import joined_checks
 from gridshell.errors import InputError
 from gridshell.fabrication import fabricate
 from gridshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
 from gridshell.formfinding.drape import Method
 from gridshell.formfinding.popup import Ends
 from gridshell.formfinding.progress import Progress, silent
+from gridshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
 from gridshell.joints import Joint
 from gridshell.layout import FlatGrid, GridLayout
 from gridshell.output import Archive
 from gridshell.output.result import States, form_result, form_states, table_result, table_states
+from gridshell.output.sewn import sewn_result, sewn_states, with_seam_forces
 from gridshell.output.summary import summary_text
 from gridshell.output.takeaway import Takeaway
 from gridshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
 from gridshell.rods.section import Rod
 from gridshell.targets import Target
+from gridshell.targets.seam import Seam
 
 LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
 
@@ -90,13 +94,53 @@ class PoppedUp(PoppedTable):
         return self.archive(takeaway=takeaway).save(folder)
 
 
+class Sewn(SewnForm):
+    """A form in patches that are sewn together, and its files."""
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json before anything was checked."""
+        return sewn_result(self)
+
+    def summary(self) -> str:
+        """One screen of text."""
+        return summary_text(self.result())
+
+    def archive(
+        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+    ) -> Archive:
+        """All patches as one: everything that is kept, checked and made ready to be built."""
+        takeaway = takeaway or Takeaway()
+        if case_toml is None:
+            case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+        checks = joined_checks(
+            {k: check(one.popped, self.rod, stages=takeaway.stages, progress=progress) for k, one in self.found.items()}
+        )
+        result = with_seam_forces(self.result(), self, checks)
+        shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
+        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway)
+
+    def save(
+        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+    ) -> Path:
+        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
+        return self.archive(case_toml, takeaway=takeaway).save(folder)
+
+
 def _archive(job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress) -> Archive:
     """A job's result and states with its checks and its fabrication."""
-    mesh = job.footprint.mesh
     checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
-    final = next((job.popped[ends].positions for ends in PREFERRED if ends in checks.bending), None)
+    shapes = {ends: shell.positions for ends, shell in job.popped.items()}
+    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway)
+
+
+def _kept(
+    job: Form | PoppedUp | Sewn, result: dict[str, Any], states: States, checks: Checks, shapes: Mapping[Ends, Any],
+    case_toml: str, takeaway: Takeaway,
+) -> Archive:  # fmt: skip
+    mesh = job.footprint.mesh
+    final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    result = workshop_result(job.result(), mesh, checks, made, takeaway.strength)
+    result = workshop_result(result, mesh, checks, made, takeaway.strength)
     result["drawings"] = takeaway.drawings.parameters()
     return Archive(result, states | workshop_states(checks), case_toml).as_stored()
 
@@ -112,6 +156,7 @@ def find_form(
     joint: Joint | None = None,
     fall: Fall | None = None,
     ends: Sequence[Ends] = ("pinned", "clamped"),
+    start: FoundForm | None = None,
     progress: Progress = silent,
 ) -> Form:
     """From a target to the flat grid that pops up into it, with the proof.
@@ -125,6 +170,11 @@ def find_form(
     joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
     fall : of method "paper", see `drape`.
     ends : end conditions of the pop-up.
+    start : a form found before, for a spacing, heading, anchor or target that has changed a little: its net is where
+        the new net is looked for (method "bound"), and where its shells went from their draped states is where the new
+        ones start, rods being matched by their place in the lattice. Any form will do; what does not help is
+        left, and the result is the same as without, to the solver's tolerance. A shell that has several equilibria
+        stays with the one that it is in.
     progress : called as progress(stage, detail, residual) at every iteration.
 
     Returns
@@ -137,9 +187,44 @@ def find_form(
     """
     found = find_stages(
         target, layout, rod,
-        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends, progress=progress,
+        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,
+        start=start, progress=progress,
     )  # fmt: skip
     return Form(**{field.name: getattr(found, field.name) for field in fields(found)})
+
+
+def sew(
+    target: Target,
+    seams: Sequence[ArrayLike],
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    own: Mapping[str, PatchLayout] | None = None,
+    joint: Joint | None = None,
+    ends: Sequence[Ends] = ("pinned", "clamped"),
+    search: bool = False,
+    progress: Progress = silent,
+) -> Sewn:
+    """From a target cut into patches to the flat grids that pop up into them and meet at the seams.
+
+    Parameters
+    ----------
+    seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down; each goes on
+        straight past its ends, unless it is closed.
+    layout : of every patch, rods and length "auto"; its heading is that at the target's summit.
+    own : what patches, by their names A, B, ... from left to right, have of their own.
+    rod, joint, ends, progress : as of `find_form`.
+    search : whether to look for the heading that leaves out the fewest rods, in place of the layout's.
+
+    Raises
+    ------
+    InputError : a value does not fit. NetLimitError : no net covers a patch from its anchor and heading.
+    """
+    found = find_sewn_stages(
+        target, [Seam.of(row) for row in seams], layout, rod,
+        own=own, joint=joint, ends=ends, search=search, progress=progress,
+    )  # fmt: skip
+    return Sewn(**{field.name: getattr(found, field.name) for field in fields(found)})
 
 
 def pop_up_table(

@@ -1,14 +1,17 @@
 """The drawing set: true to scale, on sheets that match, with labels that never cover each other."""
 
+import io
 import re
 import zlib
 from itertools import pairwise
+from math import pi
 from pathlib import Path
 
 import ezdxf
 import numpy as np
 import pytest
 from dxf_reader import read_dxf
+from ezdxf.enums import TextEntityAlignment
 from forms import TARGETS, archive, wished
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,11 +21,12 @@ from sample_archive import sample_archive, table_archive
 from gridshell.errors import InputError
 from gridshell.output import Archive
 from gridshell.output.archive import export
-from gridshell.output.drawing import Drawing, Pencil, Text
+from gridshell.output.drawing import LAYERS, Drawing, Pencil, Text
 from gridshell.output.drawing import Path as Line
 from gridshell.output.drawings import drawing_set, sheet_set
 from gridshell.output.drawings.flat import diagonals, flat_drawing
 from gridshell.output.drawings.sheets import OVERLAP, SCALES, TEXT, fitted, room, tiled
+from gridshell.output.dxf import drawing_dxf
 from gridshell.output.labels import boxes_meet, spread
 from gridshell.output.plan import flat_plan
 from gridshell.output.schedules import rods_table
@@ -287,3 +291,71 @@ def test_a_text_box_holds_its_text() -> None:
     for words in ("U01/V12", "1234.56", "-0.07", "ends 14 % of the way", "R07.1"):
         box = Text(words, np.zeros(2), 10.0, "LABEL").box()
         assert np.ptp(box[:, 0]) >= 10 * _width(words)
+
+
+def by_ezdxf(drawing: Drawing, names: dict[str, str]) -> str:
+    """The same drawing as a DXF file by ezdxf."""
+    file = ezdxf.new("R2010", units=ezdxf.units.MM)
+    for name, layer in LAYERS.items():
+        file.layers.add(names.get(name, name), color=layer.number)
+    space = file.modelspace()
+    for path in drawing.paths:
+        style = {"layer": names.get(path.layer, path.layer)}
+        if not path.flat:
+            space.add_polyline3d(path.points.tolist(), close=path.closed, dxfattribs=style)
+        elif len(path.points) == 2:
+            space.add_line(*path.points.tolist(), dxfattribs=style)
+        else:
+            space.add_lwpolyline(path.points.tolist(), close=path.closed, dxfattribs=style)
+    for mark in drawing.marks:
+        style = {"layer": names.get(mark.layer, mark.layer)}
+        space.add_circle(mark.at.tolist(), mark.radius, dxfattribs=style)
+    align = {"start": TextEntityAlignment.LEFT, "middle": TextEntityAlignment.CENTER, "end": TextEntityAlignment.RIGHT}
+    for text in drawing.texts:
+        style = {"layer": names.get(text.layer, text.layer), "height": 0.72 * text.size}
+        written = space.add_text(text.text, dxfattribs=style | {"rotation": float(np.degrees(text.angle))})
+        written.set_placement(text.at.tolist(), align=align[text.anchor])
+    stream = io.StringIO()
+    file.write(stream)
+    return stream.getvalue()
+
+
+def part(dxf: str, section: str) -> list[tuple[str, str]]:
+    """Tags of one section, without handles, which are only numbers."""
+    lines = dxf.splitlines()
+    tags = list(zip(lines[::2], lines[1::2], strict=True))
+    begin = tags.index(("  2", section))
+    end = tags.index(("  0", "ENDSEC"), begin)
+    return [(code, value) for code, value in tags[begin:end] if code.strip() not in ("5", "105", "330", "350", "360")]
+
+
+@pytest.mark.parametrize("names", [{}, {"CUT": "LASER", "DIM": "Maße"}], ids=["our layers", "named layers"])
+@pytest.mark.parametrize("section", ["TABLES", "BLOCKS", "ENTITIES", "OBJECTS"])
+def test_dxf_says_what_ezdxf_would_write(section: str, names: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Word for word; entities of each kind, open and closed, in the plane and in space, texts of each alignment."""
+    monkeypatch.setattr(ezdxf.options, "write_fixed_meta_data_for_testing", True)  # no clock
+    points = np.array([[0.0, -0.0], [1.0, 2.5], [10 / 3, 1e-7]])
+    pencil = Pencil()
+    for closed in (False, True):
+        pencil.line(points, "MARK", closed=closed)
+        pencil.line(np.column_stack([points, [1.0, 2.0, 3.0]]), "BOUNDARY-FINAL", closed=closed)
+    pencil.line(points[:2], "CUT")
+    pencil.mark((1.0, 2.0), 0.5, "DIM")
+    for anchor, angle in (("start", 0.0), ("middle", 0.3), ("end", -pi / 2)):
+        pencil.write("Stück 50 %", (1.0, 2 / 3), 2.1, "LABEL", anchor=anchor, angle=angle)
+    drawing = pencil.done("a", "b", 2.0)
+    assert part(drawing_dxf(drawing, names), section) == part(by_ezdxf(drawing, names), section)
+
+
+def test_no_two_things_in_a_dxf_have_one_handle(tmp_path: Path) -> None:
+    export(archive("dome"), tmp_path, ["dxf"])
+    for file in (tmp_path / "drawings").iterdir():
+        lines = file.read_text().splitlines()
+        tags = list(zip(lines[::2], lines[1::2], strict=True))
+        seed = tags[tags.index(("  9", "$HANDSEED")) + 1]
+        handles = [int(value, 16) for code, value in tags if code in ("  5", "105") and (code, value) != seed]
+        assert len(set(handles)) == len(handles)
+        assert max(handles) < int(seed[1], 16)
+        ends = [k for k, tag in enumerate(tags) if tag == ("  0", "SEQEND")]
+        lines_in_space = [tags[k + 1][1] for k, tag in enumerate(tags) if tag == ("  0", "POLYLINE")]
+        assert [tags[k + 2][1] for k in ends] == lines_in_space  # each ends the one that it belongs to

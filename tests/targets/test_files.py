@@ -147,3 +147,16 @@ def test_broken_files_are_refused_in_one_sentence(tmp_path):
     for what, arguments in list(broken_files(tmp_path))[3::10]:
         result = called(what, arguments, tmp_path / "out")
         assert not result.wrong, (what, result)
+
+
+def test_saved_case_of_a_relative_file_runs_again_from_elsewhere(tmp_path, monkeypatch):
+    source = Path(__file__).parents[2] / "examples" / "data" / "freeform.obj"
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "roof.obj").write_bytes(source.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    saved = load_case("in/roof.obj", {"target.unit": "m"}).to_toml()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "case.toml").write_text(saved)
+    monkeypatch.chdir(tmp_path / "out")
+    assert load_case("case.toml").to_toml() == saved
+    assert Path(load_case("case.toml").target.file).samefile(tmp_path / "in" / "roof.obj")

@@ -6,7 +6,8 @@ from functools import cache
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
-from gridshell.case.schema import Case, Table
+from gridshell.case.schema import Case
+from gridshell.case.table import Table
 
 BY_KIND: dict[str, str] = {
     "target": Case().target.kind,

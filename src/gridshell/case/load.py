@@ -27,11 +27,12 @@ BUILT_IN: dict[str, Raw] = {
 }
 """The cases that need no file, each named like its target's kind; the schema's defaults give the rest."""
 
-BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf"), "mesh") | {".3dm": "nurbs"}
+BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf"), "mesh")
+BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
 BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
 """Kinds of targets by the file that holds them: the file alone is a case."""
 
-FILE_KEYS = ("file", "boundary")
+FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
 
 def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Case:
@@ -114,9 +115,11 @@ def _read(name_or_path: str | PathLike[str]) -> Raw:
 
 def _beside(path: Path, raw: Raw) -> Raw:
     """Files that a case names lie in its own folder, unless they are given from the root."""
-    target = raw.get("target")
-    if isinstance(target, dict):
-        for key in FILE_KEYS:
-            if isinstance(target.get(key), str):
-                target[key] = str(path.parent / target[key])
+    for name, keys in FILE_KEYS.items():
+        table = raw.get(name)
+        if not isinstance(table, dict):
+            continue
+        for key in keys:
+            if isinstance(table.get(key), str):
+                table[key] = str(path.parent / table[key])
     return raw

@@ -4,6 +4,7 @@ from typing import Any
 
 from gridshell.case.schema import Case
 from gridshell.formfinding import Fall
+from gridshell.formfinding.sewn import SewnForm
 from gridshell.joints import Joint, joint_parameters
 from gridshell.layout import GridLayout
 from gridshell.output.takeaway import Takeaway
@@ -17,11 +18,12 @@ def case_text(
     rod: Rod,
     *,
     joint: Joint,
-    method: str,
-    anchor: tuple[float, float] | None,
-    gravity: float,
+    method: str = "bound",
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
     fall: Fall | None = None,
     takeaway: Takeaway | None = None,
+    sewn: SewnForm | None = None,
 ) -> str:
     """A case file that gives these objects again; of a target that is a Python function, a note that says so."""
     shape = target.parameters()
@@ -41,6 +43,7 @@ def case_text(
             "rod": rod.parameters(),
             "joint": joint_parameters(joint),
             "drape": drape,
+            **({"seams": sewn.parameters()} if sewn else {}),
             **(takeaway or Takeaway()).parameters(),
         }
     )

@@ -1,181 +1,51 @@
-"""The tables and keys of a case file: the one place that lists each, with its type, default and help."""
+"""The tables and keys of a case file, each listed once, with its type, default and help.
 
-from math import floor, inf, log10
+Those of targets, and of rods and joints, have modules of their own.
+"""
+
+from math import floor, log10
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from gridshell.case.rod_tables import BallTable, JointKinds, RodTable
+from gridshell.case.table import Table
+from gridshell.case.target_tables import HemisphereTable, TargetTable
 from gridshell.case.toml import toml_text
 from gridshell.case.values import (
     Acceleration,
     Angle,
     AngleOrAuto,
-    Angles,
     AngleStiffness,
-    BendingStiffness,
     Coordinate,
-    Corners,
     Counts,
-    Density,
-    Distance,
     Duration,
-    Factor,
-    Force,
-    InertiaPerLength,
     Length,
     LengthOrAuto,
+    Lengths,
     LengthsOrAuto,
-    MassPerLength,
     NodeStiffness,
     Point,
-    Point3,
     PointOrAuto,
-    PoissonRatio,
+    Polylines,
     Share,
-    Size,
-    Stiffness,
     Stress,
     Unit,
     Whole,
+    polylines,
+    unit,
 )
+from gridshell.errors import InputError
+from gridshell.units import shown
 
 if TYPE_CHECKING:
     from gridshell.formfinding.fall import Fall
-    from gridshell.joints import Joint
+    from gridshell.formfinding.sewn import PatchLayout
     from gridshell.layout import GridLayout
     from gridshell.output.takeaway import Takeaway
-    from gridshell.rods.section import GivenSection, Rod, Section
+    from gridshell.rods.section import Rod
     from gridshell.targets import Target
-
-
-class Table(BaseModel):
-    """A table of a case file: frozen, and every key in it must be known."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class HemisphereTable(Table):
-    kind: Literal["hemisphere"] = "hemisphere"
-    radius: Length = Field(default=0.2, description="radius")
-
-    def build(self) -> "Target":
-        from gridshell.targets import Hemisphere
-
-        return Hemisphere(radius=self.radius)
-
-
-class CapTable(Table):
-    kind: Literal["cap"] = "cap"
-    radius: Length = Field(default=0.25, description="radius")
-    base: Coordinate = Field(default=0.1, description="z of the base plane, the sphere's centre being z = 0")
-
-    def build(self) -> "Target":
-        from gridshell.targets import Cap
-
-        return Cap(radius=self.radius, base=self.base)
-
-
-class ParaboloidTable(Table):
-    kind: Literal["paraboloid"] = "paraboloid"
-    radius: Length = Field(default=0.2, description="radius")
-    height: Length = Field(default=0.12, description="height of the top above the base")
-
-    def build(self) -> "Target":
-        from gridshell.targets import Paraboloid
-
-        return Paraboloid(radius=self.radius, height=self.height)
-
-
-class EllipsoidTable(Table):
-    kind: Literal["ellipsoid"] = "ellipsoid"
-    a: Length = Field(default=0.2, description="half-axis along x")
-    b: Length = Field(default=0.15, description="half-axis along y")
-    c: Length = Field(default=0.12, description="half-axis along z")
-
-    def build(self) -> "Target":
-        from gridshell.targets import Ellipsoid
-
-        return Ellipsoid(a=self.a, b=self.b, c=self.c)
-
-
-class HeightFieldTable(Table):
-    kind: Literal["heightfield"] = "heightfield"
-    formula: str = Field(description='height z = f(x, y) in metres, such as "0.1 - 2*x**2 - y**2"')
-    domain: Literal["disc", "rectangle"] = Field(default="disc", description="the plan, centred on the origin")
-    radius: Length | None = Field(default=None, description="radius; of a height field: of its disc")
-    size: Size | None = Field(default=None, description="width along x and depth along y of a rectangle")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _domain_decides(cls, given: dict[str, Any]) -> dict[str, Any]:
-        domain = given.get("domain", "disc")
-        if domain == "disc":
-            if "size" in given:
-                raise ValueError('target.size is for domain "rectangle": leave it out, or set target.domain')
-            return {"radius": 0.2, **given}
-        if domain == "rectangle":
-            if "radius" in given:
-                raise ValueError('target.radius is for domain "disc": leave it out, or set target.domain')
-            if "size" not in given:
-                raise ValueError('target.size is missing: give width and depth, such as ["400 mm", "300 mm"]')
-        return given
-
-    def build(self) -> "Target":
-        from gridshell.targets import Disc, HeightField, Rectangle
-
-        if self.radius is not None:
-            return HeightField(formula=self.formula, domain=Disc(self.radius))
-        assert self.size is not None
-        return HeightField(formula=self.formula, domain=Rectangle(self.size))
-
-
-class PlacedTable(Table):
-    """Keys of every target that comes from a file."""
-
-    file: str = Field(description="path of the file; in a case file from the case file's folder")
-    base: Coordinate | None = Field(default=None, description="z of the base plane; of a cap: its sphere's centre is 0")
-    boundary: str | None = Field(default=None, description="OBJ or DXF with closed curves: the shell's edge, openings")
-    scale: Factor = Field(default=1.0, description="factor, about the origin")
-    turn: Angles = Field(default=(0.0, 0.0, 0.0), description="angles about x, y, z, in that order")
-    move: Point3 = Field(default=(0.0, 0.0, 0.0), description="shift along x, y, z")
-
-    def options(self) -> dict[str, Any]:
-        """Keyword arguments that all files have."""
-        from gridshell.targets import Placement
-
-        placement = Placement(scale=self.scale, turn=self.turn, move=self.move)
-        return {"base": self.base, "boundary": self.boundary, "placement": placement}
-
-
-class SurfaceTable(PlacedTable):
-    unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
-    object: str | None = Field(default=None, description="name of the object, of several; 3dm: or of its layer")
-
-    def build(self) -> "Target":
-        from gridshell.targets import surface_from
-
-        return surface_from(self.file, unit=self.unit, name=self.object, **self.options())
-
-
-class MeshTable(SurfaceTable):
-    kind: Literal["mesh"] = "mesh"
-
-
-class NurbsTable(SurfaceTable):
-    kind: Literal["nurbs"] = "nurbs"
-
-
-class HeightsTable(PlacedTable):
-    kind: Literal["heights"] = "heights"
-    size: Size = Field(description="width along x and depth along y of a rectangle")
-    height: Length | None = Field(
-        default=None, description="of a paraboloid; of an image: of white; of a CSV: its unit"
-    )
-
-    def build(self) -> "Target":
-        from gridshell.targets import heights_from
-
-        return heights_from(self.file, size=self.size, height=self.height, **self.options())
 
 
 class LayoutTable(Table):
@@ -198,142 +68,6 @@ class LayoutTable(Table):
         rotate = 0.0 if self.rotate == "auto" else self.rotate
         edge = min(spacing) / 6 if self.edge == "auto" else self.edge
         return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "edge": edge, "rotate": rotate})
-
-
-class CircleTable(Table):
-    kind: Literal["circle"] = "circle"
-    radius: Length = Field(default=0.001, description="radius; of a tube: outer radius")
-
-    def build(self) -> "Section":
-        from gridshell.rods.section import Circle
-
-        return Circle(radius=self.radius)
-
-
-class TubeTable(Table):
-    kind: Literal["tube"] = "tube"
-    radius: Length = Field(default=0.001, description="outer radius")
-    thickness: Length = Field(description="thickness of the tube's wall")
-
-    def build(self) -> "Section":
-        from gridshell.rods.section import Tube
-
-        return Tube(radius=self.radius, thickness=self.thickness)
-
-
-class EllipseTable(Table):
-    kind: Literal["ellipse"] = "ellipse"
-    a: Length = Field(description="half-axis along the grid's normal; of a target: along x")
-    b: Length = Field(description="half-axis within the grid; of a target: along y")
-
-    def build(self) -> "Section":
-        from gridshell.rods.section import Ellipse
-
-        return Ellipse(a=self.a, b=self.b)
-
-
-class RectangleTable(Table):
-    kind: Literal["rectangle"] = "rectangle"
-    width: Length = Field(description="side along the grid's normal: of a flat lath its thickness")
-    height: Length = Field(description="side within the grid: of a flat lath its breadth")
-
-    def build(self) -> "Section":
-        from gridshell.rods.section import RectangularSection
-
-        return RectangularSection(width=self.width, height=self.height)
-
-
-class GivenTable(Table):
-    kind: Literal["given"] = "given"
-    EA: Force = Field(description="stretch stiffness")
-    EI1: BendingStiffness = Field(description="stiffness against bends out of the grid")
-    EI2: BendingStiffness = Field(description="stiffness against bends within the grid")
-    GJ: BendingStiffness = Field(description="twist stiffness")
-    mass: MassPerLength = Field(default=0.0, description="mass per length")
-    rotary_inertia: InertiaPerLength = Field(default=0.0, description="rotary inertia about the rod's line, per length")
-
-    def build(self) -> "GivenSection":
-        from gridshell.rods.section import GivenSection
-
-        return GivenSection(**self.model_dump(exclude={"kind"}))
-
-
-class MaterialTable(Table):
-    youngs_modulus: Stress = Field(default=1e6, description="Young's modulus")
-    poisson_ratio: PoissonRatio | None = Field(default=None, description="Poisson's ratio; default 0.5")
-    shear: Stress | None = Field(default=None, description="shear modulus, in place of Poisson's ratio: timber")
-    density: Density = Field(default=1000.0, description="density")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _one_of_two(cls, given: dict[str, Any]) -> dict[str, Any]:
-        if "shear" not in given:
-            return {"poisson_ratio": 0.5, **given}
-        if "poisson_ratio" in given:
-            raise ValueError("rod.material.shear stands in place of poisson_ratio: leave one of them out")
-        return given
-
-
-class RodTable(Table):
-    section: CircleTable | TubeTable | EllipseTable | RectangleTable | GivenTable = Field(
-        default=CircleTable(), discriminator="kind"
-    )
-    material: MaterialTable | None = MaterialTable()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _given_needs_no_material(cls, given: dict[str, Any]) -> dict[str, Any]:
-        section = given.get("section")
-        if not (isinstance(section, dict) and section.get("kind") == "given"):
-            return given
-        if given.get("material"):
-            raise ValueError("rod.material: a given section says all stiffnesses and masses itself; leave it out")
-        return {**given, "material": None}
-
-    def build(self) -> "Rod":
-        from gridshell.rods.section import Material, Rod
-
-        if self.material is None:
-            return Rod(section=self.section.build())
-        return Rod(section=self.section.build(), material=Material(**self.material.model_dump(exclude_none=True)))
-
-
-class JointTable(Table):
-    """Keys of every joint; `build` takes the kind from the table's own."""
-
-    def build(self) -> "Joint":
-        from gridshell import joints
-
-        kinds = {"ball": joints.Ball, "pin": joints.Pin, "spring": joints.Spring, "rigid": joints.Rigid}
-        given = self.model_dump(exclude={"kind"}, exclude_none=True)
-        given = {name: inf if value == "rigid" else value for name, value in given.items()}
-        return (kinds | {"linker": joints.Linker})[self.kind](**given)  # type: ignore[attr-defined]
-
-
-class BallTable(JointTable):
-    kind: Literal["ball"] = "ball"
-
-
-class PinTable(JointTable):
-    kind: Literal["pin"] = "pin"
-    eccentricity: Distance = Field(default=0.0, description="distance of the two rods' centre lines at a joint")
-
-
-class RigidTable(PinTable):
-    kind: Literal["rigid"] = "rigid"  # type: ignore[assignment]
-    rest_angle: Angle | None = Field(default=None, description="between the rods at rest; without: as laid out flat")
-
-
-class SpringTable(RigidTable):
-    kind: Literal["spring"] = "spring"  # type: ignore[assignment]
-    shear: Stiffness = Field(default=0.0, description='of the joint about its normal, or "rigid"')
-    out_of_plane: Stiffness = Field(default=0.0, description="of a corner across its bisector")
-    twist: Stiffness = Field(default=0.0, description="of a corner about its bisector")
-
-
-class LinkerTable(JointTable):
-    kind: Literal["linker"] = "linker"
-    corners: Corners = Field(default=2, description="corners of a crossing with a linker: 2 as in the paper, or 4")
 
 
 class DrapeTable(Table):
@@ -378,6 +112,55 @@ class PopUpTable(Table):
     ends: Literal["pinned", "clamped", "both"] = Field(default="both", description="how the rod ends are held")
 
 
+class PatchTable(Table):
+    """What a patch has of its own."""
+
+    name: str = Field(description="name of the patch: A, B, ... from left to right")
+    anchor: Point | None = Field(default=None, description="point x,y where its axes cross; default: its middle")
+    rotate: Angle | None = Field(default=None, description="turn of its grid seen from above; default: as the whole's")
+    spacing: Lengths | None = Field(default=None, description="between neighbouring rods: one length, or u,v")
+
+    def build(self) -> "PatchLayout":
+        from gridshell.formfinding.sewn import PatchLayout
+
+        return PatchLayout(self.anchor, self.rotate, self.spacing)
+
+
+class SeamsTable(Table):
+    lines: Polylines = Field(default=(), description='lines x,y; x,y that cut the target in plan, "|" between two')
+    file: str | None = Field(default=None, description="OBJ or DXF with such lines")
+    unit: Unit = Field(default=1.0, description="the unit of that file, such as mm")
+    patches: tuple[PatchTable, ...] = Field(default=(), description="what patches, by their names, have of their own")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_now(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """The lines of the file become lines of the case, which then needs the file no longer."""
+        if given.get("file") is None:
+            return given
+        from gridshell.targets.curvefile import read_lines
+
+        rest = {key: value for key, value in given.items() if key not in ("file", "unit")}
+        try:
+            drawn = read_lines(Path(given["file"]), unit(given.get("unit", 1.0)))
+        except InputError as reason:
+            raise InputError(f"seams.file = {shown(given['file'])}: {reason}") from None
+        return {**rest, "lines": [*polylines(given.get("lines", ())), *(line[:, :2].tolist() for line in drawn)]}
+
+    def own(self) -> "dict[str, PatchLayout]":
+        """What patches have of their own, by name.
+
+        Raises
+        ------
+        InputError : two tables for one patch.
+        """
+        names = [patch.name for patch in self.patches]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"seams.patches has patch {shown(name)} twice: put all that it has in one table")
+        return {patch.name: patch.build() for patch in self.patches}
+
+
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
     stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
@@ -420,21 +203,6 @@ class Built(NamedTuple):
     drape_options: dict[str, Any]
 
 
-TargetTable = (
-    HemisphereTable
-    | CapTable
-    | ParaboloidTable
-    | EllipsoidTable
-    | HeightFieldTable
-    | MeshTable
-    | NurbsTable
-    | HeightsTable
-)
-
-
-JointKinds = BallTable | PinTable | SpringTable | LinkerTable | RigidTable
-
-
 def _round(length: float) -> float:
     """The nearest length below of 1, 1.5, 2, 3, 5 or 7 times a power of ten [m]."""
     decade = 10.0 ** floor(log10(length))
@@ -450,13 +218,18 @@ class Case(Table):
     joint: JointKinds = Field(default=BallTable(), discriminator="kind")
     drape: DrapeTable = DrapeTable()
     pop_up: PopUpTable = PopUpTable()
+    seams: SeamsTable = SeamsTable()
     checks: ChecksTable = ChecksTable()
     fabrication: FabricationTable = FabricationTable()
     drawings: DrawingsTable = DrawingsTable()
 
     def to_toml(self) -> str:
-        """The full input as a case file with SI numbers: loading it gives an equal case."""
-        return toml_text(self.model_dump(exclude_none=True))
+        """The full input as a case file with SI numbers: loading it from anywhere gives the same case."""
+        content = self.model_dump(exclude_none=True)
+        for key in ("file", "boundary"):
+            if key in content["target"]:
+                content["target"][key] = str(Path(content["target"][key]).absolute())
+        return toml_text(content)
 
     @property
     def undecided(self) -> bool:
@@ -465,8 +238,12 @@ class Case(Table):
 
     def decided(self, anchor: tuple[float, float], rotate: float) -> "Case":
         """The same case with its anchor [m] and heading [rad]."""
-        layout = self.layout.model_copy(update={"rotate": rotate})
-        return self.model_copy(update={"layout": layout, "drape": self.drape.model_copy(update={"anchor": anchor})})
+        drape = self.drape.model_copy(update={"anchor": anchor})
+        return self.headed(rotate).model_copy(update={"drape": drape})
+
+    def headed(self, rotate: float) -> "Case":
+        """The same case with its heading [rad]."""
+        return self.model_copy(update={"layout": self.layout.model_copy(update={"rotate": rotate})})
 
     def build(self) -> Built:
         """The target, layout, rod and drape options.
@@ -483,6 +260,27 @@ class Case(Table):
         options["joint"] = self.joint.build()
         target = self.target.build()
         return Built(target, self.layout.build(target), self.rod.build(), options)
+
+    def build_sewn(self) -> Built:
+        """The same of a case with seams; the options are those of `gridshell.sew`.
+
+        Raises
+        ------
+        InputError : moreover, keys that a form in patches does not have.
+        """
+        for key, value, default in (
+            ("layout.rods", self.layout.rods, "auto"),
+            ("layout.length", self.layout.length, "auto"),
+            ("layout.offset", self.layout.offset, (0.0, 0.0)),
+            ("drape.method", self.drape.method, "bound"),
+            ("drape.anchor", self.drape.anchor, None),
+        ):
+            if value != default:
+                instead = "leave it out" if default in (None, (0.0, 0.0)) else f'use "{default}"'
+                raise InputError(f"{key} = {shown(value)}: a target cut by seams has it from its patches: {instead}")
+        target, layout, rod, options = self.build()
+        kept = {key: options[key] for key in ("joint", "ends")}
+        return Built(target, layout, rod, {"seams": self.seams.lines, "own": self.seams.own(), **kept})
 
     def takeaway(self) -> "Takeaway":
         """What checks, workshop and drawings are told.

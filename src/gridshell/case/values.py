@@ -146,6 +146,14 @@ def poisson_ratio(value: object) -> float:
     return number
 
 
+def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
+    """Rows of points of the plan: [[[x, y], [x, y]], ...], or "x, y; x, y | x, y; x, y"."""
+    rows = [row.split(";") for row in value.split("|")] if isinstance(value, str) else value
+    if not isinstance(rows, list | tuple) or not all(isinstance(row, list | tuple) and len(row) > 1 for row in rows):
+        raise ValueError('give rows of two points or more, such as [[[-1, 0], [1, 0]]] or "-1, 0; 1, 0 | 0, -1; 0, 1"')
+    return tuple(tuple(pair(quantity("length"))(point) for point in row) for row in rows)
+
+
 Length = Annotated[float, BeforeValidator(positive("length"))]
 LengthOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(positive("length")))]
 Coordinate = Annotated[float, BeforeValidator(quantity("length"))]
@@ -157,6 +165,7 @@ Size = Annotated[tuple[float, float], BeforeValidator(pair(positive("length")))]
 Point = Annotated[tuple[float, float], BeforeValidator(pair(quantity("length")))]
 Whole = Annotated[int, BeforeValidator(whole)]
 Counts = Annotated[tuple[int, int] | Auto, BeforeValidator(counts)]
+Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], BeforeValidator(polylines)]
 Point3 = Annotated[tuple[float, float, float], BeforeValidator(triple("length"))]
 Angles = Annotated[tuple[float, float, float], BeforeValidator(triple("angle"))]
 Factor = Annotated[float, BeforeValidator(positive("number"))]

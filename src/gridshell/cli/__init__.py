@@ -14,6 +14,7 @@ COMMANDS = {
     "form": "From a target to the flat grid that pops up into it.",
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
     "export": "Write drawings, schedules, models or the report of an earlier result again.",
+    "warmup": "Compile all kernels ahead, once, so that no job waits for it.",
     "paper": "Make a figure of the paper again, with its errors.",
 }
 
@@ -82,8 +83,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(f"{error.format_message().rstrip('.')}: see {where} --help", 2)
     except click.ClickException as error:
         return _fail(error.format_message(), 2)
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("gridshell: interrupted", err=True)
+    except (click.Abort, KeyboardInterrupt) as stopped:
+        kept = str(stopped.__cause__ or "")  # click raises Abort from the interrupt, which may say what was kept
+        click.echo("gridshell: interrupted" + (f": {kept}" if kept else ""), err=True)
         return 130
     return code if isinstance(code, int) else 0
 

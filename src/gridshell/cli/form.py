@@ -1,6 +1,7 @@
 """`gridshell form`: the main job. Its options are the keys of the case file."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -89,6 +90,8 @@ command.help = command.help.format(names=", ".join(BUILT_IN))
 def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bool, quiet: bool) -> int:
     """Find the form of a case and write it; the exit code."""
     folder = output_folder(out, name)
+    if case.seams.lines:
+        return _sew(case, folder, only=only, as_json=as_json, quiet=quiet)
     target, layout, rod, options = case.build()
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
@@ -108,6 +111,21 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
     if found:
         (folder / "search.svg").write_text(_picture(found), encoding="utf-8")
     return code
+
+
+def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bool) -> int:
+    """Find the form of a case with seams and write it; the exit code."""
+    target, layout, rod, options = case.build_sewn()
+    takeaway, kinds = case.takeaway(), wanted_kinds(only)
+    announce_compilation(quiet=quiet)
+    from gridshell.form import sew
+
+    with Progress(quiet=quiet) as progress:
+        search = case.layout.rotate == "auto"
+        form = sew(target, layout=layout, rod=rod, search=search, progress=progress, **options)
+        case = case.headed(form.layout.rotate)
+        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
+    return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
 
 
 def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: Progress) -> "Search":

@@ -52,7 +52,7 @@ class Progress:
 def announce_compilation(*, quiet: bool = False) -> None:
     """Before the first run, say what it will wait for."""
     if not quiet and not compiled_before():
-        click.echo("gridshell: compiling kernels, once, about 20 s", err=True)
+        click.echo("gridshell: compiling kernels, once, about 20 s (gridshell warmup compiles all ahead)", err=True)
 
 
 def compiled_before() -> bool:

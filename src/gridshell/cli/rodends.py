@@ -107,6 +107,10 @@ def read_result(folder: Path) -> RodEnds:
     from gridshell.output.rods import rods_of
 
     archive = read(folder)
+    if archive.result.get("patches"):
+        raise InputError(
+            f"{folder} holds patches, whose flat grids lie side by side: pop up a table of one patch's rods"
+        )
     try:
         rods = rods_of(archive)
         shell = archive.states[next(name for name in SHELLS if name in archive.states)]

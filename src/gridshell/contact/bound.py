@@ -1,14 +1,15 @@
 """Nodes bound to a target: each slides on the surface in its two tangent directions, or less."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.geometry.vectors import dot, unit
+from gridshell.geometry.vectors import dot
 from gridshell.model import Freedom
-from gridshell.targets import Target
+from gridshell.targets import Gap, Target
 
 Floats = NDArray[np.float64]
 
@@ -28,11 +29,15 @@ class BoundToTarget:
     count: NDArray[np.intp]
     guides: Floats
 
+    @cached_property
+    def _surface(self) -> "_Latest":
+        return _Latest(self.target)
+
     def freedom(self, state: Floats) -> Freedom:
-        return Freedom(_tangents(self.target.level(state)[1], self.guides), self.count)
+        return Freedom(_tangents(self._surface.at(state).normal, self.guides), self.count)
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        surface = self.target.on_surface(state)
+        surface = self._surface.at(state)
         return -dot(surface.normal, gradient)[:, None, None] * surface.hessian
 
     def remaining(self, state: Floats) -> Floats | None:
@@ -43,7 +48,21 @@ class BoundToTarget:
 
     def contact_forces(self, state: Floats, gradient: Floats) -> Floats:
         """(n,) force of the target on each node along the outward normal [N]; negative where it pulls."""
-        return dot(unit(self.target.level(state)[1]), gradient)
+        return dot(self._surface.at(state).normal, gradient)
+
+
+class _Latest:
+    """Normals and curvature of a target where they were last asked for: a solver asks several times at one state."""
+
+    def __init__(self, target: Target) -> None:
+        self._target = target
+        self._points = np.empty((0, 3))
+        self._found = target.on_surface(self._points)
+
+    def at(self, points: Floats) -> Gap:
+        if not np.array_equal(points, self._points):
+            self._points, self._found = points.copy(), self._target.on_surface(points)
+        return self._found
 
 
 @nb.njit(cache=True, error_model="numpy")

@@ -52,7 +52,7 @@ def agreement(popped: Popped, target: Target) -> Agreement:
     nodes = popped.positions
     middles = edge_middles(popped.footprint.mesh, nodes)
     points = np.vstack([nodes, middles])
-    gaps = target.gap(points).distance
+    gaps = target.distance(points)
     k = int(np.argmax(np.abs(gaps)))
     x, y, z = points[k].tolist()
     return Agreement(

@@ -90,7 +90,7 @@ def bound_drape(
         positions=found.state,
         rods=tuple(line for line in net.rods if not line.virtual),
         levels=(found.report,),
-        max_gap=float(np.abs(target.gap(found.state[on_target]).distance).max()),
+        max_gap=float(np.abs(target.distance(found.state[on_target])).max()),
         pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
         min_angle=net.min_angle,
         min_angle_at=net.min_angle_at,

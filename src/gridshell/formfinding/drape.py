@@ -26,6 +26,7 @@ def drape(
     gravity: float = 9.81,
     joint: Joint | None = None,
     fall: Fall | None = None,
+    start: Draped | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Lay a flat grid of rods on a target.
@@ -40,13 +41,16 @@ def drape(
     joint : what the rods do to each other where they cross, for methods "gravity" and "paper"; ball joints
         without. The bound drape has none: its net is a matter of geometry.
     fall : height, time stepping, coupling, friction and drag, for method "paper".
+    start : a grid draped before. Method "bound" looks for the net near the one found then, which changes nothing but
+        the time. The others always fall from flat: without friction a grid that starts where another lay may turn
+        and end elsewhere.
 
     Raises
     ------
     InputError, NetLimitError : the layout does not fit the target; no net exists.
     """
     if method == "bound":
-        return bound_drape(target, layout, rod, anchor=anchor, progress=progress)
+        return bound_drape(target, layout, rod, anchor=anchor, near=start, progress=progress)
     if method == "gravity":
         return gravity_drape(target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, progress=progress)
     if method == "paper":

@@ -1,6 +1,6 @@
 """The main job: drape, trim, map back, pop up, compare; and the pop-up of a table of rods on its own."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,21 +97,32 @@ def find_stages(
     joint: Joint | None = None,
     fall: Fall | None = None,
     ends: Sequence[Ends] = ("pinned", "clamped"),
+    start: FoundForm | None = None,
+    cut: Callable[[Draped], Trimmed] = trim,
     progress: Progress = silent,
 ) -> FoundForm:
-    """Drape, trim, map back, pop up and compare; see `gridshell.find_form`."""
+    """Drape, trim, map back, pop up and compare; see `gridshell.find_form`.
+
+    cut : how the draped shell is trimmed.
+    """
     joint = joint or Ball()
     draped = drape(
         layout, rod, target,
-        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, progress=progress,
+        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall,
+        start=start.draped if start else None, progress=progress,
     )  # fmt: skip
-    trimmed = trim(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
+    trimmed = cut(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
     footprint = map_back(trimmed)
     popped: dict[Ends, Popped] = {}
     if draped.converged:
+        last = start.popped if start else {}
         popped = {
-            end: pop_up(footprint, trimmed.boundary, rod, ends=end, joint=joint, progress=progress) for end in ends
-        }
+            end: pop_up(
+                footprint, trimmed.boundary, rod,
+                ends=end, start=last.get(end, "draped"), joint=joint, progress=progress,
+            )
+            for end in ends
+        }  # fmt: skip
     compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
     return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared)
 
@@ -171,7 +182,8 @@ def _springs_off(compared: dict[Ends, Agreement]) -> tuple[str, ...]:
     x, y, z = gap.where
     return (
         f"the free grid springs off the target by {gap.max:.3g} m ({100 * gap.max_relative:.1f} % of its size) near "
-        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends: dips and ridges need graded stiffness or supports",
+        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends: dips and ridges need seams, graded stiffness or "
+        "supports",
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError
+from gridshell.formfinding.carried import carried_edges, carried_nodes
 from gridshell.formfinding.draped import node_normals
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.formfinding.trim import Boundary, Footprint
@@ -31,6 +32,8 @@ Start = Literal["draped", "flat"]
 UP = np.array([0.0, 0.0, 1.0])
 FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
 CLAMP_STEP = 0.25
+MOST_AGAIN = 8  # iterations from the last form before starting afresh
+NEARBY = 0.1  # of the length: a state further from the guess may be another one
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Popped:
     Parameters
     ----------
     positions : (n, 3) of the footprint's nodes [m].
+    footprint, boundary : as they were given.
     shell : the mechanical model; state : (N, 3) its state in equilibrium, its source frames being there.
     forces : (e,) axial forces of the edges [N].
     """
@@ -47,6 +51,7 @@ class Popped:
     ends: Ends
     start: Start
     footprint: Footprint
+    boundary: Boundary
     positions: Floats
     report: SolveReport
     shell: Shell
@@ -60,7 +65,7 @@ def pop_up(
     rod: Rod,
     *,
     ends: Ends = "clamped",
-    start: Start = "draped",
+    start: "Start | Popped" = "draped",
     joint: Joint | Sequence[Joint] | None = None,
     progress: Progress = silent,
 ) -> Popped:
@@ -71,7 +76,9 @@ def pop_up(
     ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp).
     start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
         flat grid, which leaves its plane to the side that the boundary's directions point away from (without
-        directions to that of +z), then turns the clamps.
+        directions to that of +z), then turns the clamps. A shell popped up before, with the same ends: as "draped",
+        but the displacements and axial forces that it had on the same rods are the first guess. Where that does
+        not lead to a stable state nearby, the draped state does.
     joint : what the rods do to each other where they cross: one for all, or one for each crossing; ball joints
         without. Eccentric rods end half their distance above or below the boundary.
 
@@ -80,14 +87,16 @@ def pop_up(
     InputError : `start` is "draped" and the boundary has no draped state; the joints do not fit the grid.
     """
     job = _PopUp(footprint, boundary, rod, joint or Ball(), progress)
-    if start == "draped":
-        shell, found = job.release(ends)
+    if start == "draped" or isinstance(start, Popped):
+        shell, found = (job.again(start) if isinstance(start, Popped) else None) or job.release(ends)
+        start = "draped"
     else:
         shell, found = job.rise()
         if ends == "clamped" and found.report.converged:
             shell, found = job.turn_clamps(shell, found)
     shell = shell.with_elements(found.elements)
-    return Popped(ends, start, footprint, shell.positions(found.state), found.report, shell, found.state, found.forces)
+    positions = shell.positions(found.state)
+    return Popped(ends, start, footprint, boundary, positions, found.report, shell, found.state, found.forces)
 
 
 @dataclass(frozen=True)
@@ -141,6 +150,26 @@ class _PopUp:
             progress=lambda k, step: self.progress("pop-up", f"{ends}, sliding down, step {k}", step),
         )
         return shell, replace(slid, report=slid.report.after(at_once.report))
+
+    def again(self, last: Popped) -> tuple[Shell, Equilibrium] | None:
+        """From where a shell popped up before went from its draped state; None where that leads nowhere near."""
+        here, there = self.boundary.draped, last.boundary.draped
+        if here is None or there is None:
+            return None
+        shell, mesh, before = self.shell(last.ends), self.footprint.mesh, last.footprint.mesh
+        moved = carried_nodes(last.positions - there, before, mesh)
+        moved[mesh.ends] = 0.0
+        state = self.upright(shell, here + moved, self.boundary.tangents)
+        stiffer = shell.stretch.stiffness.mean() / last.shell.stretch.stiffness.mean()
+        found = find_stable(
+            self.problem(shell),
+            state,
+            stiffer * carried_edges(last.forces, before, mesh),
+            most_iterations=MOST_AGAIN,
+            progress=lambda k, step: self.progress("pop-up", f"{last.ends}, again, iteration {k}", step),
+        )
+        strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
+        return None if strayed or not found.report.stable else (shell, found)
 
     def rise(self) -> tuple[Shell, Equilibrium]:
         """Pinned, from the flat grid: the ends go straight to the boundary while the grid rises."""

@@ -60,8 +60,10 @@ class Trimmed:
     dropped: tuple[tuple[str, str], ...]
 
 
-def trim(draped: Draped) -> Trimmed:
+def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     """Cut every rod at the target's end and drop the rods that cannot be built or would swing.
+
+    fewest : joints of a rod that does not swing.
 
     Raises
     ------
@@ -75,11 +77,11 @@ def trim(draped: Draped) -> Trimmed:
         rods, lost = _cut_rods(draped)
         dropped += lost
         source, positions = _recut(draped, rods)
-    kept, swinging = FlatGrid.of(rods, margin=margin).without(lambda grid: grid.joint_counts() < FEWEST_JOINTS)
-    dropped += [(name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging]
+    kept, swinging = FlatGrid.of(rods, margin=margin).without(lambda grid: grid.joint_counts() < fewest)
+    dropped += [(name, f"it has fewer than {fewest} joints and would swing") for name in swinging]
     if not kept.rods:
         raise InputError(
-            f"no rod of the grid has {FEWEST_JOINTS} joints on the target: use a smaller spacing or a larger target"
+            f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
         )
     mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
     positions = positions[nodes]

@@ -27,6 +27,9 @@ class GridLayout:
     edge : longest edge of the mesh [m].
     rotate : angle of family u against the target's x axis [rad].
     offset : (x, y) shift of the lattice against the axes through the anchor [m].
+    lines : ascending offsets of some rods of families u and v [m], where these do not lie at equal spacing; beyond the
+        first and the last of them the spacing goes on. Empty for a family whose rods all lie at equal spacing.
+    left_out : names of rods that are not built; their lines still shape the net.
     """
 
     rods: tuple[int, int] | Auto
@@ -35,6 +38,8 @@ class GridLayout:
     edge: float
     rotate: float = 0.0
     offset: tuple[float, float] = (0.0, 0.0)
+    lines: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    left_out: tuple[str, ...] = ()
 
     @staticmethod
     def orthogonal(
@@ -76,6 +81,17 @@ class GridLayout:
         half = 0.0 if self.rods == "auto" else (self.rods[side] - 1) / 2 % 1
         return self.offset[1 - side] + half * self.spacing[side]
 
+    def lattice(self, family: Family, low: float, high: float) -> NDArray[np.float64]:
+        """Offsets [m] of the lines of a family from `low` to `high`, both within a spacing."""
+        spacing, given = self.spacing[0 if family == "u" else 1], self.lines[0 if family == "u" else 1]
+        if given:
+            before = given[0] + spacing * np.arange(min(np.floor((low - given[0]) / spacing), 0), 0)
+            after = given[-1] + spacing * np.arange(1, max(np.ceil((high - given[-1]) / spacing), 0) + 1)
+            return np.concatenate([before, given, after])
+        phase = self.phase(family)
+        first, last = np.floor((low - phase) / spacing), np.ceil((high - phase) / spacing)
+        return np.asarray(phase + spacing * np.arange(first, last + 1))
+
     def offsets(self, family: Family) -> NDArray[np.float64] | None:
         """Offsets [m] of the rods of a family, ascending, or None where the count is "auto"."""
         if self.rods == "auto":
@@ -94,7 +110,8 @@ class GridLayout:
 
     def parameters(self) -> dict[str, object]:
         """The layout in SI, as it stands in a case file."""
-        return asdict(self)
+        own = asdict(self)
+        return {key: value for key, value in own.items() if key not in ("lines", "left_out")}
 
     def flat_grid(self, counts: tuple[int, int], length: float) -> FlatGrid:
         """The whole rectangular grid before trimming, with `counts` and `length` [m] standing in for "auto"."""

@@ -20,7 +20,7 @@ from gridshell.layout import FlatRod, GridLayout
 from gridshell.layout.flatgrid import Family
 from gridshell.layout.gridlayout import rod_name
 from gridshell.layout.mesh import edge_counts
-from gridshell.nets.compass import Net, march
+from gridshell.nets.compass import Net, axes, geodesics, march
 from gridshell.nets.cuts import Cut, cut_lines, extrapolated, inside_nodes
 from gridshell.nets.nearby import march_near
 from gridshell.targets import Target
@@ -134,10 +134,11 @@ def _find_lines(
     target: Target, layout: GridLayout, start: Floats, heading: Floats, near: Net | None
 ) -> tuple[_Lines, Net]:
     """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them."""
-    reach = np.full(4, 2.0 * target.size)  # towards -u, +u, -v, +v
-    if near is not None:
-        reach = np.minimum([-near.u[0], near.u[-1], -near.v[0], near.v[-1]], 2 * reach)
     step = np.array(layout.spacing[::-1]) / 2  # along u, the lines of family v: their spacing
+    if near is not None:  # towards -u, +u, -v, +v
+        reach = np.minimum([-near.u[0], near.u[-1], -near.v[0], near.v[-1]], 4 * target.size)
+    else:
+        reach = _length_of_axes(target, start, heading) + 2 * MARGIN * np.repeat(step, 2)
     for _ in range(12):
         u, v = (
             np.arange(-np.ceil(reach[2 * k] / step[k]), np.ceil(reach[2 * k + 1] / step[k]) + 1) * step[k]
@@ -159,6 +160,15 @@ def _find_lines(
         reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
         near = net
     return _Lines(_lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])), net
+
+
+def _length_of_axes(target: Target, start: Floats, heading: Floats) -> Floats:
+    """How far the axes run inside the target, towards -u, +u, -v and +v [m]; at most twice its size, roughly."""
+    step = 0.1 * target.size
+    arms = geodesics(target, np.tile(start, (4, 1)), axes(target, start, heading), [np.full(20, step)] * 4)
+    inside = target.margin(np.concatenate(arms)).reshape(4, -1) > 0
+    last = np.where(inside.any(axis=1), inside.shape[1] - np.argmax(inside[:, ::-1], axis=1), 0)
+    return step * (1.0 + last[[1, 0, 3, 2]])
 
 
 def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
@@ -205,7 +215,8 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
     x, y, z = where
     return NetLimitError(
         f"no inextensible net covers this target: near ({x:.4g}, {y:.4g}, {z:.4g}) m {what}; "
-        "use a smaller part of the target (a higher base), or another anchor or heading; a larger spacing does not help"
+        "use a smaller part of the target (a higher base, or seams), or another anchor or heading; a larger spacing does "
+        "not help"
     )
 
 

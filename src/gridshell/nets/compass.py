@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 SMALLEST_SINE = 0.02  # of a crossing angle: beyond it the two circles of the compass hardly cut (1.1 degrees)
 NEWTON_STEPS = 12
-TOLERANCE = 1e-13  # of the step; Newton doubles its digits, so one step more than 1e-8 needs
+TOLERANCE = 1e-7  # of the step: Newton doubles its digits, so that the change that is below it leaves 1e-14
 
 
 @dataclass(frozen=True)
@@ -60,15 +60,19 @@ def march(target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats)
 def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
     """Two discrete geodesics through the anchor: equal chords, straightest at every node."""
     i0, j0 = net.origin
-    normal = target.on_surface(anchor[None]).normal[0]
-    along = heading - (heading @ normal) * normal
-    along /= np.linalg.norm(along)
-    across = cross(normal, along)
     net.points[i0, j0] = anchor
     steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
-    arms = geodesics(target, np.tile(anchor, (4, 1)), np.stack([along, -along, across, -across]), steps)
+    arms = geodesics(target, np.tile(anchor, (4, 1)), axes(target, anchor, heading), steps)
     net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
     net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
+
+
+def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
+    """(4, 3) unit tangents at the anchor towards +u, -u, +v and -v; see `march`."""
+    normal = target.on_surface(anchor[None]).normal[0]
+    along = unit(heading - (heading @ normal) * normal)
+    across = cross(normal, along)
+    return np.stack([along, -along, across, -across])
 
 
 def geodesics(target: Target, start: Floats, direction: Floats, steps: list[Floats]) -> list[Floats]:
@@ -106,7 +110,7 @@ def geodesics(target: Target, start: Floats, direction: Floats, steps: list[Floa
             value, gradient = target.level(here + h[:, None] * chord)
             if not _turned(flat, normal, value, gradient, h, turn, change, chord, swing):
                 break
-        lost = ~(np.abs(turn) < 1.2) | ~(np.abs(change) < 1e-9)
+        lost = ~(np.abs(turn) < 1.2) | ~(np.abs(change) < TOLERANCE)
         point[going] = here + h[:, None] * chord
         point[going[lost]] = np.nan
         tangent[going] = chord
@@ -184,7 +188,7 @@ def _compass(target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, fr
             break
     sine = dot(cross(p - b, p - a), gradient) * side
     sine /= np.linalg.norm(gradient, axis=1) * from_a * from_b
-    p[~(change < 1e-8) | ~(sine > SMALLEST_SINE)] = np.nan
+    p[~(change < TOLERANCE) | ~(sine > SMALLEST_SINE)] = np.nan
     return p
 
 
@@ -216,6 +220,6 @@ def _towards(p, a, b, from_a, from_b, value, gradient, change):  # type: ignore[
             p[m, k] -= step[k] / volume
             largest = max(largest, abs(step[k] / volume)) if volume != 0.0 else np.nan
         change[m] = largest / min(from_a[m], from_b[m])
-        if TOLERANCE * 1e3 <= change[m] < 1.0:
+        if TOLERANCE <= change[m] < 1.0:
             going = True
     return going

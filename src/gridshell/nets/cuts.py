@@ -15,6 +15,9 @@ Ints = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 
+SQUARE = 5  # nodes each way
+
+
 class Cut(NamedTuple):
     """A part of one line that lies on the target: material coordinates of its two ends [m]."""
 
@@ -27,11 +30,7 @@ def inside_nodes(target: Target, net: Net) -> Mask:
 
     Where the anchor lies in an opening, with the first inside nodes along the axes.
     """
-    flat = net.points.reshape(-1, 3)
-    inside = np.zeros(len(flat), dtype=bool)
-    known = np.flatnonzero(np.isfinite(flat[:, 0]))
-    inside[known] = target.margin(flat[known]) > 0
-    region = inside.reshape(net.points.shape[:2])
+    region = _region(target, net)
     reached = np.zeros_like(region)
     i, j = net.origin
     reached[i, j] = region[i, j]
@@ -44,6 +43,27 @@ def inside_nodes(target: Target, net: Net) -> Mask:
         if np.array_equal(grown, reached):
             return grown
         reached = grown
+
+
+def _region(target: Target, net: Net) -> Mask:
+    """(nu, nv) nodes inside the target's end.
+
+    A square of nodes in whose middle the end is further away than the way to its corners is asked about but once.
+    """
+    known = np.isfinite(net.points[:, :, 0])
+    inside, asked = np.zeros(known.shape, dtype=bool), known.copy()
+    nu, nv = (count // SQUARE * SQUARE for count in known.shape)
+    squares = (nu // SQUARE, SQUARE, nv // SQUARE, SQUARE)
+    middle = slice(SQUARE // 2, None, SQUARE)
+    whole = known[:nu, :nv].reshape(squares).all(axis=(1, 3))
+    margin = np.zeros(whole.shape)
+    margin[whole] = target.margin(net.points[:nu, :nv][middle, middle][whole])
+    way = [np.abs(s[:n].reshape(-1, SQUARE) - s[:n][middle, None]).max(axis=1) for s, n in ((net.u, nu), (net.v, nv))]
+    clear = np.abs(margin) > way[0][:, None] + way[1]
+    asked[:nu, :nv] &= ~np.repeat(np.repeat(clear, SQUARE, axis=0), SQUARE, axis=1)
+    inside[:nu, :nv] = np.repeat(np.repeat(clear & (margin > 0), SQUARE, axis=0), SQUARE, axis=1)
+    inside[asked] = target.margin(net.points[asked]) > 0
+    return inside
 
 
 def _fill_runs(region: Mask, seeds: Mask) -> Mask:

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.geometry.curves import cubic_windows
-from gridshell.nets.compass import NEWTON_STEPS, SMALLEST_SINE, TOLERANCE, Net, fill_quadrants, lay_axes
+from gridshell.nets.compass import NEWTON_STEPS, SMALLEST_SINE, Net, axes, fill_quadrants, lay_axes
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
 
 ROUNDS = 6
-SETTLED = 1e-6  # of the target's size: what a round moves; the error left is its square
+SETTLED = 5e-5  # of the target's size: what a round moves; the error left is its third power
+EXACT = 1e-13  # of the step, on a local model
 BEYOND = 0.1  # of the known net's extent that a guess may lie outside it
 
 
@@ -26,7 +27,6 @@ def march_near(target: Target, u: Floats, v: Floats, anchor: Floats, heading: Fl
     guess = interpolated(near, u, v)
     net = Net(u, v, guess)
     if not _settle_axes(target, net, anchor, heading):
-        guess[net.origin[0], :] = guess[:, net.origin[1]] = np.nan
         lay_axes(target, net, anchor, heading)
     _settle(target, net)
     fill_quadrants(target, net)
@@ -57,17 +57,14 @@ def _interpolate(points, rows, along, columns, across):  # type: ignore[no-untyp
 def _settle_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; whether they were found."""
     i0, j0 = net.origin
-    _, normal, _ = target.implicit(anchor[None])
-    normal = normal[0] / np.linalg.norm(normal[0])
-    along = heading - (heading @ normal) * normal
-    along /= np.linalg.norm(along)
-    across = np.cross(normal, along)
+    along, back, across, aback = axes(target, anchor, heading)
+    normal = np.cross(along, across)
     net.points[i0, j0] = anchor
     arms = (
         (net.points[i0 + 1 :, j0], np.diff(net.u[i0:]), along),
-        (net.points[:i0, j0][::-1], np.diff(-net.u[i0::-1]), -along),
+        (net.points[:i0, j0][::-1], np.diff(-net.u[i0::-1]), back),
         (net.points[i0, j0 + 1 :], np.diff(net.v[j0:]), across),
-        (net.points[i0, :j0][::-1], np.diff(-net.v[j0::-1]), -across),
+        (net.points[i0, :j0][::-1], np.diff(-net.v[j0::-1]), aback),
     )
     points = np.concatenate([arm for arm, _, _ in arms])
     steps = np.concatenate([step for _, step, _ in arms])
@@ -111,7 +108,7 @@ def _geodesic(start, direction, normal, steps, points, value, gradient, hessian)
                 slope[k] = gradient[s, k] + bent
                 rate += slope[k] * swing[k]
             change = level / (h * rate)
-            if not abs(change) >= TOLERANCE:
+            if not abs(change) >= EXACT:
                 break
             turn -= change
         if not (abs(turn) < 1.2 and abs(change) < 1e-9):
@@ -125,27 +122,34 @@ def _geodesic(start, direction, normal, steps, points, value, gradient, hessian)
 
 
 def _settle(target: Target, net: Net) -> None:
-    """Move the guess of all nodes but those of the axes to the net; what does not settle is left NaN."""
-    i0, j0 = net.origin
-    shape, moved = net.points.shape[:2], np.zeros(net.points.shape[:2])
+    """Move the guess of all nodes but those of the axes to the net; what does not settle is left NaN.
+
+    A round asks the target only where the last one moved a node: elsewhere its model is still good.
+    """
+    (i0, j0), shape = net.origin, net.points.shape[:2]
+    models, value, gradient = net.points.copy(), np.full(shape, np.nan), np.full((*shape, 3), np.nan)
+    hessian = np.full((*shape, 3, 3), np.nan)
+    moved = np.full(shape, np.inf)
     for _ in range(ROUNDS):
-        known = np.isfinite(net.points[:, :, 0])
-        value, gradient = np.full(shape, np.nan), np.full((*shape, 3), np.nan)
-        value[known], gradient[known] = target.level(net.points[known])
-        _sweep(net.points, value, gradient, net.u, net.v, i0, j0, moved)
+        asked = np.isfinite(net.points[:, :, 0]) & ~(moved < SETTLED * target.size)
+        models[asked] = net.points[asked]
+        value[asked], gradient[asked], hessian[asked] = target.implicit(models[asked])
+        moved[i0], moved[:, j0] = 0.0, 0.0
+        _sweep(net.points, models, value, gradient, hessian, net.u, net.v, i0, j0, moved)
         if np.nanmax(moved, initial=0.0) < SETTLED * target.size:
             return
-    _forget(net.points, moved, SETTLED * target.size, i0, j0)
+    _forget(net.points, moved >= SETTLED * target.size, i0, j0)
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _sweep(points, value, gradient, u, v, i0, j0, moved):  # type: ignore[no-untyped-def]
-    """One march on the planes that touch the level sets at `points` (nu, nv, 3), which move by `moved` (nu, nv).
+def _sweep(points, models, value, gradient, hessian, u, v, i0, j0, moved):  # type: ignore[no-untyped-def]
+    """One march of the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), from which they then lie
+    away by `moved` (nu, nv).
 
     As `compass`: the three equations are |p - a| = from_a, |p - b| = from_b and f(p) = 0.
     """
-    guess = points.copy()
     p, x, y, cross, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    away, g = np.empty(3), np.empty(3)
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         i_stop, j_stop = (len(u) if i_side > 0 else -1), (len(v) if j_side > 0 else -1)
@@ -154,18 +158,21 @@ def _sweep(points, value, gradient, u, v, i0, j0, moved):  # type: ignore[no-unt
             for j in range(j0 + j_side, j_stop, j_side):
                 from_a = abs(v[j] - v[j - j_side])
                 a, b, d = points[i, j - j_side], points[i - i_side, j], points[i - i_side, j - j_side]
-                g, here = gradient[i, j], guess[i, j]
-                for k in range(3):  # as far from the guess as its neighbours are from theirs
-                    p[k] = here[k] + (a[k] - guess[i, j - j_side, k]) + (b[k] - guess[i - i_side, j, k])
-                    p[k] -= d[k] - guess[i - i_side, j - j_side, k]
+                slope, bend, here = gradient[i, j], hessian[i, j], models[i, j]
+                for k in range(3):  # as far from its model as its neighbours are from theirs
+                    p[k] = here[k] + (a[k] - models[i, j - j_side, k]) + (b[k] - models[i - i_side, j, k])
+                    p[k] -= d[k] - models[i - i_side, j - j_side, k]
                 change, tries = np.inf, 0
                 while change > 1e-10 and tries < NEWTON_STEPS:
                     ra, rb, level, volume = -from_a * from_a, -from_b * from_b, value[i, j], 0.0
                     for k in range(3):
-                        x[k], y[k] = p[k] - a[k], p[k] - b[k]
+                        away[k], x[k], y[k] = p[k] - here[k], p[k] - a[k], p[k] - b[k]
                         ra += x[k] * x[k]
                         rb += y[k] * y[k]
-                        level += g[k] * (p[k] - here[k])
+                    for k in range(3):
+                        bent = bend[k, 0] * away[0] + bend[k, 1] * away[1] + bend[k, 2] * away[2]
+                        level += (slope[k] + 0.5 * bent) * away[k]
+                        g[k] = slope[k] + bent
                     for k in range(3):
                         m, n = (k + 1) % 3, (k + 2) % 3
                         cross[k] = x[m] * y[n] - x[n] * y[m]
@@ -188,15 +195,9 @@ def _sweep(points, value, gradient, u, v, i0, j0, moved):  # type: ignore[no-unt
                     points[i, j, k] = p[k] if found else np.nan
 
 
-@nb.njit(cache=True)
-def _forget(points, moved, settled, i0, j0):  # type: ignore[no-untyped-def]
-    """NaN for every node that has not settled, and for all that hang on it."""
-    for quadrant in range(4):
-        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-        i_stop = points.shape[0] if i_side > 0 else -1
-        j_stop = points.shape[1] if j_side > 0 else -1
-        for i in range(i0 + i_side, i_stop, i_side):
-            for j in range(j0 + j_side, j_stop, j_side):
-                behind = points[i - i_side, j, 0] + points[i, j - j_side, 0] + points[i - i_side, j - j_side, 0]
-                if not (moved[i, j] < settled and np.isfinite(behind)):
-                    points[i, j] = np.nan
+def _forget(points: Floats, unsettled: NDArray[np.bool_], i0: int, j0: int) -> None:
+    """NaN for every node that has not settled, and for all that hang on it: those beyond it in its quadrant."""
+    for rows in (slice(i0, None), slice(i0, None, -1)):
+        for columns in (slice(j0, None), slice(j0, None, -1)):
+            lost = np.logical_or.accumulate(unsettled[rows, columns], axis=0)
+            points[rows, columns][np.logical_or.accumulate(lost, axis=1)] = np.nan

@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import OutputError
+from gridshell.output.beside import beside
 from gridshell.output.folder import put, read_json, replacing
 
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
@@ -71,15 +73,21 @@ def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str]
     ------
     OutputError : the folder cannot be written, or holds something that is not a gridshell result.
     """
-    from gridshell.output.files import files_of
+    from gridshell.output.files import ASIDE, DEFAULT, files_of
 
     archive = archive.as_stored()
-    with replacing(folder) as temporary:
+    wanted = list(DEFAULT if kinds is None else kinds)
+    aside = [kind for kind in wanted if kind in ASIDE]
+
+    def make(some: Iterable[str]) -> None:
+        for name, content in files_of(archive, some):
+            put(temporary / name, content)
+
+    with replacing(folder) as temporary, beside(lambda: make(aside)) if aside else nullcontext():
         put(temporary / "result.json", json_text(archive.result))
         if archive.case_toml:
             put(temporary / "case.toml", archive.case_toml)
-        for name, content in files_of(archive, kinds):
-            put(temporary / name, content)
+        make(kind for kind in wanted if kind not in ASIDE)
         with open(temporary / "states.npz", "wb") as stream:
             np.savez_compressed(stream, allow_pickle=False, **archive.states)
     return Path(folder).expanduser().resolve()

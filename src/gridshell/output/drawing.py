@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from math import cos, sin
 from typing import Literal
 
 import numpy as np
@@ -99,12 +100,12 @@ class Text:
 
     @cached_property
     def _box(self) -> Floats:
+        (x, y), c, s = self.at.tolist(), cos(self.angle), sin(self.angle)
         width = LETTER * self.size * len(self.text)
         left = {"start": 0.0, "middle": -0.5, "end": -1.0}[self.anchor] * width
-        low, high = -BELOW * self.size, (LINE - BELOW) * self.size
-        corners = np.array([[left, low], [left + width, low], [left + width, high], [left, high]])
-        c, s = np.cos(self.angle), np.sin(self.angle)
-        return np.asarray(self.at + corners @ np.array([[c, s], [-s, c]]))
+        right, low, high = left + width, -BELOW * self.size, (LINE - BELOW) * self.size
+        corners = (left, low), (right, low), (right, high), (left, high)
+        return np.array([(x + c * u - s * v, y + s * u + c * v) for u, v in corners])
 
 
 @dataclass(frozen=True)
@@ -138,19 +139,23 @@ class Drawing:
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
         """Scaled about the origin, then shifted (2,); own pens and texts too. Paths in space are left out."""
-        return replace(
-            self,
-            text=scale * self.text,
-            paths=tuple(
-                replace(path, points=scale * path.points + shift, pen=_scaled(path.pen, scale))
-                for path in self.paths if path.flat
+        pens = {path.pen for path in self.paths} | {mark.pen for mark in self.marks}
+        pen = {one: _scaled(one, scale) for one in pens}
+        return Drawing(
+            self.name,
+            self.title,
+            scale * self.text,
+            tuple(
+                Path(scale * path.points + shift, path.layer, path.closed, pen[path.pen], path.name, path.note)
+                for path in self.paths
+                if path.flat
             ),
-            marks=tuple(
-                replace(mark, at=scale * mark.at + shift, radius=scale * mark.radius, pen=_scaled(mark.pen, scale))
+            tuple(
+                Mark(scale * mark.at + shift, scale * mark.radius, mark.layer, pen[mark.pen], mark.note)
                 for mark in self.marks
             ),
-            texts=tuple(replace(text, at=scale * text.at + shift, size=scale * text.size) for text in self.texts),
-        )  # fmt: skip
+            tuple(replace(text, at=scale * text.at + shift, size=scale * text.size) for text in self.texts),
+        )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
         """What is inside a rectangle; marks and texts that cross its border are left out."""

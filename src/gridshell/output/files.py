@@ -88,6 +88,7 @@ def _csv(content: Content) -> Files:
     }
     tables |= {"bracing": schedules.bracing_table} if made.get("bracing") else {}
     tables |= {"stock": schedules.stock_table} if made.get("stock") else {}
+    tables |= {"seams": schedules.seams_table} if archive.result.get("seams") else {}
     tables |= {"end_paths": schedules.end_paths_table} if "history" in archive.states else {}
     for name, table in tables.items():
         yield f"schedule/{name}.csv", schedules.table_csv(table(archive))
@@ -167,3 +168,4 @@ KINDS: dict[str, Callable[[Content], Files]] = {
     "3dm": _rhino, "png": _png, "report": _report,
 }  # fmt: skip
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # which needs another package
+ASIDE = ("png", "obj", "gltf", "vtp")  # about half of the work, which shares nothing with the rest

@@ -60,8 +60,8 @@ class Room:
             self._taken.setdefault(key, []).append(box)
 
     def _keys(self, box: Floats) -> Iterator[tuple[int, int]]:
-        (x0, y0), (x1, y1) = (np.floor(corner / self._square).astype(int) for corner in (box.min(0), box.max(0)))
-        return ((x, y) for x in range(x0, x1 + 1) for y in range(y0, y1 + 1))
+        columns, rows = (sorted([int(value // self._square) for value in axis]) for axis in box.T.tolist())
+        return ((x, y) for x in range(columns[0], columns[-1] + 1) for y in range(rows[0], rows[-1] + 1))
 
 
 def place(texts: Sequence[str], rods: Floats, size: float, *, both: bool = True) -> list[Label]:

@@ -6,8 +6,7 @@ less than a general library costs to load. Letters outside Windows-1252 come out
 
 import zlib
 from collections.abc import Iterator, Sequence
-
-import numpy as np
+from math import cos, sin
 
 from gridshell.output.drawing import LAYERS, Drawing, Mark, Path, Pen, Text
 
@@ -15,13 +14,14 @@ POINTS = 72 / 25.4  # of a millimetre
 ROUND = 0.5522847  # handles of four cubics that make a circle, over its radius
 
 # widths of Helvetica's letters from the space to the tilde, in thousandths of its size [Adobe's font metrics]
-WIDTHS = np.array([
+WIDTHS = dict(enumerate([
     278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556, 556, 556, 556, 556,
     556, 556, 556, 278, 278, 584, 584, 584, 556, 1015, 667, 667, 722, 722, 667, 611, 778, 722, 278, 500, 667, 556, 833,
     722, 778, 667, 778, 722, 667, 611, 722, 667, 944, 667, 667, 611, 278, 278, 278, 469, 556, 333, 556, 556, 500, 556,
     556, 278, 556, 556, 222, 222, 500, 222, 833, 556, 556, 556, 556, 333, 500, 278, 556, 500, 722, 500, 500, 500, 334,
     260, 334, 584,
-])  # fmt: skip
+], start=ord(" ")))  # fmt: skip
+OTHER = 556  # a letter without a width counts as a digit
 
 
 def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: str) -> bytes:
@@ -107,18 +107,17 @@ def _outline(item: Path | Mark) -> str:
 
 
 def _text(text: Text) -> str:
-    c, s = np.cos(text.angle), np.sin(text.angle)
-    back = {"start": 0.0, "middle": 0.5, "end": 1.0}[text.anchor] * _width(text.text) * text.size
-    x, y = text.at - back * np.array([c, s])
+    (x, y), c, s = text.at.tolist(), cos(text.angle), sin(text.angle)
+    if text.anchor != "start":
+        back = (0.5 if text.anchor == "middle" else 1.0) * _width(text.text) * text.size
+        x, y = x - back * c, y - back * s
     words = _string(text.text).decode("cp1252", "replace")
     return f"BT /F{int(text.bold)} {text.size:.3f} Tf {c:.5f} {s:.5f} {-s:.5f} {c:.5f} {x:.3f} {y:.3f} Tm {words} Tj ET"
 
 
 def _width(text: str) -> float:
-    """Width of a line of Helvetica over its size; a letter without a width counts as a digit."""
-    codes = np.frombuffer(text.encode("utf-32-le"), dtype=np.uint32).astype(np.intp) - 32
-    known = (codes >= 0) & (codes < len(WIDTHS))
-    return float(np.where(known, WIDTHS[np.where(known, codes, 0)], 556).sum()) / 1000
+    """Width of a line of Helvetica over its size."""
+    return sum([WIDTHS.get(ord(letter), OTHER) for letter in text]) / 1000
 
 
 def _string(text: str) -> bytes:

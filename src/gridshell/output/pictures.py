@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gridshell.layout.outline import opens
 from gridshell.output.archive import SHELLS, Archive
 from gridshell.output.colours import mixed
 from gridshell.output.drawing import Drawing, Pen, Pencil
-from gridshell.output.rods import RodRecord, around, rods_of
+from gridshell.output.rods import RodRecord, outlines_of, rods_of
 from gridshell.output.scale import FINEST, Colour, Scale, colour_bar, scale_of
 from gridshell.output.shapes import Shape, shape_of
 from gridshell.output.svg import picture_document
@@ -24,6 +25,7 @@ PAPER, INK, SOFT, GROUND = "#fdfdfb", "#22282f", "#7b838a", "#f1efe8"
 FAMILIES = ("#1f5f8b", "#a8552a")
 LAYERS = 20  # of depth: rods of a nearer layer pass over those of a farther one
 SEGMENTS = 14000  # pieces of rods at most, so that files stay small
+LEVEL = 0.1  # of its width: an outline that rises more is not filled
 FADE = 0.42  # share of paper in the colour of the farthest rods
 
 
@@ -56,7 +58,7 @@ def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     ends = np.array([rod.nodes[[0, -1]] for rod in rods if len(rod.nodes) > 1], dtype=np.intp).ravel()
     front = view.depth(points[ends]) > 0.5
     ground_axes(pencil, view, SOFT, 12.5)
-    _ground_curve(pencil, view, points[ends])
+    _ground_curves(pencil, view, shape, rods)
     _rods(pencil, view, shape, rods, scale, range(LAYERS // 2))
     _supports(pencil, view, points[ends[~front]], state, len(ends))
     _rods(pencil, view, shape, rods, scale, range(LAYERS // 2, LAYERS))
@@ -125,15 +127,26 @@ def _chains(pieces: Pieces, chosen: Ints) -> list[Ints]:
     if not len(chosen):
         return []
     apart = (np.diff(chosen) > 1) | (np.diff(pieces.rod[chosen]) != 0)
-    groups = np.split(chosen, np.flatnonzero(apart) + 1)
-    return [np.append(pieces.entries[group, 0], pieces.entries[group[-1], 1]) for group in groups]
+    stops = np.append(np.flatnonzero(apart) + 1, len(chosen))
+    entries = np.insert(pieces.entries[chosen, 0], stops, pieces.entries[chosen[stops - 1], 1])
+    begin = 0
+    chains = list[Ints]()
+    for stop in (stops + np.arange(1, len(stops) + 1)).tolist():
+        chains.append(entries[begin:stop])
+        begin = stop
+    return chains
 
 
-def _ground_curve(pencil: Pencil, view: View, ends: Floats) -> None:
-    """The boundary: the closed curve through the rods' ends."""
-    if len(ends) > 2:
-        outline = view.project(ends[around(ends)])
-        pencil.line(outline, "BOUNDARY-FINAL", closed=True, pen=Pen(SOFT, 1.0, fill=GROUND))
+def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[RodRecord]) -> None:
+    """The boundary: closed curves through the rods' ends, openings on top of what they open."""
+    drawn = [rod for rod in rods if len(rod.nodes) > 1]
+    ends = np.array([rod.nodes[[0, -1]] for rod in drawn], dtype=np.intp).ravel()
+    for loop in outlines_of(drawn):
+        outline = shape.positions[ends[loop]]
+        fill = ""
+        if np.ptp(outline[:, 2]) < LEVEL * np.ptp(outline[:, :2]):
+            fill = PAPER if opens(np.array([rod.flat for rod in drawn]).reshape(-1, 2)[loop]) else GROUND
+        pencil.line(view.project(outline), "BOUNDARY-FINAL", closed=True, pen=Pen(SOFT, 1.0, fill=fill))
 
 
 def _supports(pencil: Pencil, view: View, ends: Floats, state: str, count: int) -> None:

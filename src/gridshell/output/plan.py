@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.output.archive import Archive
-from gridshell.output.rods import JointRecord, RodRecord, around, joints_of, rods_of
+from gridshell.output.rods import JointRecord, RodRecord, joints_of, outlines_of, rods_of
 
 Floats = NDArray[np.float64]
 
@@ -24,9 +24,9 @@ class FlatPlan:
     lines : (r, 2, 2) start and end of each rod on the footprint [mm].
     cuts : (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
     marks : (c, 2) the joints, in the order of `joints` [mm].
-    footprint : (f, 2) closed curve through the rod ends [mm].
-    boundary : (f, 3) closed curve through the final rod ends [mm], vertex by vertex those of `footprint`; empty if
-        there is none.
+    footprint : closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
+    boundary : closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if they
+        are not known.
     """
 
     name: str
@@ -35,8 +35,8 @@ class FlatPlan:
     lines: Floats
     cuts: Floats
     marks: Floats
-    footprint: Floats
-    boundary: Floats
+    footprint: list[Floats]
+    boundary: list[Floats]
 
     @cached_property
     def extent(self) -> float:
@@ -75,10 +75,11 @@ def flat_plan(archive: Archive) -> FlatPlan:
     marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
     footprint = np.array(archive.result.get("footprint") or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
     boundary = np.array(archive.result.get("boundary") or [], dtype=float).reshape(-1, 3)
-    order = around(footprint)
+    loops = outlines_of(rods)
     return FlatPlan(
-        archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks, 1e3 * footprint[order],
-        1e3 * boundary[order] if len(boundary) == len(footprint) else np.empty((0, 3)),
+        archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks,
+        [1e3 * footprint[loop] for loop in loops],
+        [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from gridshell.output.drawing import Drawing
 from gridshell.output.figures import checks_table, key_figures, levels_table, supports_table
 from gridshell.output.pictures import picture_svg
 from gridshell.output.plan import NOTE, FlatPlan
-from gridshell.output.schedules import Table, rods_table, stock_table
+from gridshell.output.schedules import Table, rods_table, seams_table, stock_table
 from gridshell.output.schedules import joints_table as joints
 from gridshell.output.schedules import supports_table as supports
 from gridshell.output.shapes import CAPTIONS
@@ -89,6 +89,8 @@ def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
     ]
     if archive.result.get("boundary"):
         tables.append(("Supports", supports(archive, brief=True), "With reactions: schedule/supports.csv."))
+    if archive.result.get("seams"):
+        tables.append(("Seams", seams_table(archive), "Forces: what a seam carries there, both rods together."))
     if (archive.result.get("fabrication") or {}).get("stock"):
         tables.append(("Stock", stock_table(archive), "First fit decreasing."))
     return tables

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.formfinding import Agreement, Footprint, FoundForm, Popped, PoppedTable
+from gridshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
 from gridshell.formfinding.bound import shape_of_net
 from gridshell.joints import joint_parameters
 from gridshell.rods.section import Rod
@@ -20,7 +20,23 @@ States = dict[str, NDArray[Any]]
 
 def form_result(form: FoundForm) -> dict[str, Any]:
     """result.json of a form, SI units; the keys are those of the documentation's page on files."""
-    draped = form.draped
+    return {
+        **head(form.target.name, form.status, form.warnings),
+        "target": {**form.target.parameters(), "reference_size": form.target.size},
+        "layout": form.layout.parameters(),
+        "rod": rod_table(form.rod),
+        "joint": joint_parameters(form.joint),
+        **({"net": shape_of_net(form.draped.net)} if form.draped.net is not None else {}),
+        **grid_table(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
+        "end_tangents": form.trimmed.boundary.tangents,
+        "agreement": {ends: agreement_table(gap) for ends, gap in form.agreement.items()},
+        "drape": drape_table(form.draped),
+        "pop_up": {ends: popped_table(shell.report, shell.start) for ends, shell in form.popped.items()},
+    }
+
+
+def drape_table(draped: Draped) -> dict[str, Any]:
+    """Figures of a drape."""
     drape: dict[str, Any] = {
         "method": draped.method,
         "status": draped.report.status.value,
@@ -39,19 +55,7 @@ def form_result(form: FoundForm) -> dict[str, Any]:
         drape["fall"] = asdict(draped.rest)
     if draped.own_ends is not None:
         drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
-    return {
-        **_head(form.target.name, form.status, form.warnings),
-        "target": {**form.target.parameters(), "reference_size": form.target.size},
-        "layout": form.layout.parameters(),
-        "rod": _rod(form.rod),
-        "joint": joint_parameters(form.joint),
-        **({"net": shape_of_net(draped.net)} if draped.net is not None else {}),
-        **_grid(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
-        "end_tangents": form.trimmed.boundary.tangents,
-        "agreement": {ends: _agreement(gap) for ends, gap in form.agreement.items()},
-        "drape": drape,
-        "pop_up": {ends: _popped(shell) for ends, shell in form.popped.items()},
-    }
+    return drape
 
 
 def form_states(form: FoundForm) -> States:
@@ -75,10 +79,10 @@ def _mesh_states(footprint: Footprint) -> States:
 def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
     """result.json of a popped-up table of rods."""
     return {
-        **_head(name, table.status, table.warnings),
-        "rod": _rod(table.rod),
-        **_grid(table.footprint, table.boundary.points, table.dropped),
-        "pop_up": {ends: _popped(shell) for ends, shell in table.popped.items()},
+        **head(name, table.status, table.warnings),
+        "rod": rod_table(table.rod),
+        **grid_table(table.footprint, table.boundary.points, table.dropped),
+        "pop_up": {ends: popped_table(shell.report, shell.start) for ends, shell in table.popped.items()},
     }
 
 
@@ -87,7 +91,8 @@ def table_states(table: PoppedTable) -> States:
     return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
 
 
-def _head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
+def head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
+    """What every result begins with."""
     return {
         "format": "gridshell-result",
         "version": 1,
@@ -100,7 +105,10 @@ def _head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def _grid(footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tuple[str, str], ...]) -> dict[str, Any]:
+def grid_table(
+    footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tuple[str, str], ...]
+) -> dict[str, Any]:
+    """Rods, joints and rod ends."""
     rods: list[dict[str, Any]] = [
         {
             "id": rod.name,
@@ -127,7 +135,8 @@ def _grid(footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tu
     }
 
 
-def _rod(rod: Rod) -> dict[str, Any]:
+def rod_table(rod: Rod) -> dict[str, Any]:
+    """Section, material and stiffnesses."""
     first, second = rod.bend_stiffnesses
     return {
         **rod.parameters(),
@@ -148,11 +157,11 @@ def _level(report: SolveReport) -> dict[str, Any]:
     }
 
 
-def _popped(shell: Popped) -> dict[str, Any]:
-    report = shell.report
+def popped_table(report: SolveReport, start: str) -> dict[str, Any]:
+    """Figures of a pop-up that began from the shape `start`."""
     return {
         **_level(report),
-        "start": shell.start,
+        "start": start,
         "force_residual": report.force_residual,
         "max_strain": report.max_strain,
         "negative_modes": report.negative_modes,
@@ -160,7 +169,8 @@ def _popped(shell: Popped) -> dict[str, Any]:
     }
 
 
-def _agreement(gap: Agreement) -> dict[str, Any]:
+def agreement_table(gap: Agreement) -> dict[str, Any]:
+    """Gap to the target."""
     return {
         "max": gap.max,
         "rms": gap.rms,

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gridshell.layout.outline import outlines
 from gridshell.output.archive import Archive, printable
 
 Floats = NDArray[np.float64]
@@ -106,12 +108,15 @@ def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
     return places
 
 
-def around(points: Floats) -> NDArray[np.intp]:
-    """The order (n,) of points (n, 2 or 3) by their angle about the middle, seen from above."""
-    if not len(points):
-        return np.empty(0, dtype=np.intp)
-    x, y = (points[:, :2] - points[:, :2].mean(axis=0)).T
-    return np.argsort(np.arctan2(y, x), kind="stable")
+def outlines_of(rods: list[RodRecord]) -> list[NDArray[np.intp]]:
+    """Rod ends along each outline of the flat grid, see `outlines`."""
+    return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
+
+
+@lru_cache(maxsize=4)
+def _outlines(flat: bytes) -> list[NDArray[np.intp]]:
+    """Kept for the next drawing of the same grid."""
+    return outlines(np.frombuffer(flat).reshape(-1, 2, 2))
 
 
 def _nodes(archive: Archive) -> list[NDArray[np.intp]]:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gridshell.output.archive import Archive
 from gridshell.output.rods import RodRecord, joints_of, rods_of
+from gridshell.output.verdict import ENDS
 
 Floats = NDArray[np.float64]
 Rows = list[list[str]]
@@ -126,6 +127,30 @@ def supports_table(archive: Archive, *, brief: bool = False) -> Table:
 
 
 _FORCES = (("force", "N"), ("moment", "Nm"))
+
+
+def seam_meetings(result: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every place where rods meet, with its number: the seam's, and its own along the result."""
+    for number, seam in enumerate(result.get("seams") or [], start=1):
+        for k, meeting in enumerate(seam["meetings"], start=1):
+            yield f"{number}.{k}", meeting
+
+
+def seams_table(archive: Archive) -> Table:
+    """One row a meeting: the two rod ends (0 start, 1 end), their place, and the sum of both rods' support forces."""
+    seams = archive.result.get("seams") or []
+    ends = [end for end in ENDS if all(end in (seam.get("forces") or {}) for seam in seams)]
+    columns = ["meeting", "first_end", "second_end", "x_mm", "y_mm", "z_mm"]
+    columns += [f"{end}_f{axis}_N" for end in ends for axis in "xyz"]
+    rows = [
+        [number, *meeting["ends"], *map(_mm, meeting["point"])] for number, meeting in seam_meetings(archive.result)
+    ]
+    carried = [
+        [force for end in ends for force in seam["forces"][end]["each"][k]]
+        for seam in seams
+        for k in range(len(seam["meetings"]))
+    ]
+    return columns, [[*row, *(f"{force:.6g}" for force in forces)] for row, forces in zip(rows, carried, strict=True)]
 
 
 def bracing_table(archive: Archive) -> Table:

@@ -1,5 +1,7 @@
 """One screen of text about a result."""
 
+from collections.abc import Iterator
+from math import degrees
 from typing import Any
 
 from gridshell.output.wording import stress
@@ -11,6 +13,7 @@ def summary_text(result: dict[str, Any]) -> str:
     joints = sum(len(rod["joints"]) for rod in rods) // 2
     verdict = "converged" if result["status"] == "converged" else f"NOT CONVERGED: {result['status']}"
     lines = [f"{result['name']}: {verdict}", f"  grid      {len(rods)} rods, {joints} joints"]
+    lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
             f"  footprint known within {_mm(net['error_estimate'])} before extrapolation; "
@@ -37,6 +40,22 @@ def summary_text(result: dict[str, Any]) -> str:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
     lines += [f"  WARNING   {warning}" for warning in result["warnings"]]
     return "\n".join(lines)
+
+
+def _sewn(result: dict[str, Any]) -> Iterator[str]:
+    """Each patch and each seam in a line of the summary."""
+    for patch in result.get("patches") or []:
+        line = f"  patch {patch['id']:<4}{patch['rods']} rods, heading {degrees(patch['rotate']):.1f} deg; "
+        line += f"smallest angle {patch['net']['min_angle_deg']:.1f} deg"
+        for ends, gap in patch["agreement"].items():
+            line += f"; {ends} gap rms {_percent(gap['rms_relative'])}"
+        yield line
+    moved = max((patch["ends_moved"] for patch in result.get("patches") or []), default=0.0)
+    for number, seam in enumerate(result.get("seams") or [], start=1):
+        line = f"  seam {number:<5}{len(seam['meetings'])} rods of either side meet, ends moved by {_mm(moved)} at most"
+        for ends, force in (seam.get("forces") or {}).items():
+            line += f"; {ends} it carries {force['largest']:.3g} N at most"
+        yield line
 
 
 def _checked(result: dict[str, Any]) -> list[str]:

@@ -1,5 +1,6 @@
 """Writing SVG: elements with escaped attributes and text, short numbers, and whole drawings."""
 
+import re
 from collections.abc import Iterator
 from html import escape
 from itertools import groupby
@@ -9,6 +10,8 @@ import numpy as np
 
 from gridshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
 
+ZEROS = re.compile(r"\.00(?!\d)|(\.\d)0(?!\d)")
+MINUS_ZERO = re.compile(r"-0(?![.\d])")
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
 
 
@@ -88,8 +91,14 @@ def _shapes(drawing: Drawing) -> Iterator[str]:
 
 def _data(path: Path) -> str:
     """Data of an anonymous path, to 0.01 of a unit."""
-    words = [f"{number(x)} {number(-y)}" for x, y in path.points.tolist()]
-    return "M" + "L".join(words) + ("Z" if path.closed else "")
+    flipped = (path.points * (1.0, -1.0)).ravel().tolist()
+    words = "L".join(["%.2f %.2f"] * len(path.points)) % tuple(flipped)
+    return "M" + _short(words) + ("Z" if path.closed else "")
+
+
+def _short(words: str) -> str:
+    """Numbers with two decimals as `number` has them."""
+    return MINUS_ZERO.sub("0", ZEROS.sub(r"\1", words))
 
 
 def _look(pen: Pen) -> dict[str, Any]:

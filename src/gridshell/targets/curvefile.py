@@ -23,18 +23,36 @@ def read_curves(path: Path, unit: float) -> list[Floats]:
     ------
     InputError : no such file, damaged, or without a closed curve.
     """
+    loops = closed_loops(_strokes(path, unit))
+    if not loops or not all(np.isfinite(loop).all() for loop in loops):
+        raise InputError(f"{path} holds no closed curve of finite coordinates: draw one polyline around the shell")
+    return loops
+
+
+def read_lines(path: Path, unit: float) -> list[Floats]:
+    """Polylines (n, 3) [m], open or closed, those that touch end to end joined.
+
+    Raises
+    ------
+    InputError : no such file, damaged, or without a line.
+    """
+    lines = joined(_strokes(path, unit))
+    if not lines or not all(np.isfinite(line).all() for line in lines):
+        raise InputError(f"{path} holds no line of finite coordinates: draw a polyline along each seam")
+    return lines
+
+
+def _strokes(path: Path, unit: float) -> list[Floats]:
+    """Polylines (n, 3) [m] as they stand in a file."""
     data = file_bytes(path)
     if path.suffix.lower() not in CURVE_FILES:
-        raise InputError(f"{path}: a boundary is read from {' or '.join(CURVE_FILES)}")
+        raise InputError(f"{path}: curves are read from {' or '.join(CURVE_FILES)}")
     try:
         strokes = _of_dxf(path) if path.suffix.lower() == ".dxf" else _of_obj(data)
     except Exception as reason:  # a damaged file can break a reader anywhere
         said = " ".join(str(reason).split())[:80]
         raise InputError(f"{path} cannot be read as a drawing of curves ({said}): export it anew") from None
-    loops = closed_loops([np.asarray(stroke, dtype=float) * unit for stroke in strokes if len(stroke) > 1])
-    if not loops or not all(np.isfinite(loop).all() for loop in loops):
-        raise InputError(f"{path} holds no closed curve of finite coordinates: draw one polyline around the shell")
-    return loops
+    return [np.asarray(stroke, dtype=float) * unit for stroke in strokes if len(stroke) > 1]
 
 
 def _of_obj(data: bytes) -> list[Floats]:
@@ -66,21 +84,29 @@ def _of_dxf(path: Path) -> list[Floats]:
 
 def closed_loops(strokes: Iterable[Floats]) -> list[Floats]:
     """Strokes (n, 3) joined end to end into closed loops, the longest first; what stays open is left out."""
+    loops = [line[:-1] for line in joined(strokes) if len(line) > 3 and np.array_equal(line[0], line[-1])]
+    return sorted(loops, key=lambda x: -float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum()))
+
+
+def joined(strokes: Iterable[Floats]) -> list[Floats]:
+    """Strokes (n, 3) joined end to end; of what closes, the last point is the first again."""
     left = list(strokes)
     if not left:
         return []
     tiny = TOUCH * float(np.ptp(np.vstack(left), axis=0).max())
-    loops = list[Floats]()
+    lines = list[Floats]()
     while left:
-        chain = left.pop()
+        chain, turned = left.pop(), 0
         while np.linalg.norm(chain[-1] - chain[0]) > tiny:
             near = [(k, flip) for k, s in enumerate(left) for flip in (False, True)
                     if np.linalg.norm((s[-1] if flip else s[0]) - chain[-1]) <= tiny]  # fmt: skip
-            if not near:
+            if near:
+                k, flip = near[0]
+                stroke = left.pop(k)
+                chain = np.vstack([chain, (stroke[::-1] if flip else stroke)[1:]])
+            elif turned:
                 break
-            k, flip = near[0]
-            stroke = left.pop(k)
-            chain = np.vstack([chain, (stroke[::-1] if flip else stroke)[1:]])
-        if len(chain) > 3 and np.linalg.norm(chain[-1] - chain[0]) <= tiny:
-            loops.append(chain[:-1])
-    return sorted(loops, key=lambda x: -float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum()))
+            else:
+                chain, turned = chain[::-1], 1
+        lines.append(np.vstack([chain[:-1], chain[:1]]) if np.linalg.norm(chain[-1] - chain[0]) <= tiny else chain)
+    return lines

@@ -8,7 +8,7 @@ from gridshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound
 from gridshell.output.drawings.strips import per_sheet, strips_drawing
 from gridshell.output.drawings.titleblock import title_block, with_title
 from gridshell.output.plan import FlatPlan
-from gridshell.output.schedules import bracing_table, joints_table, rods_table, stock_table, supports_table
+from gridshell.output.schedules import bracing_table, joints_table, rods_table, seams_table, stock_table, supports_table
 from gridshell.output.takeaway import PAPERS
 
 __all__ = ["drawing_set", "sheet_set"]
@@ -36,6 +36,8 @@ def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[fl
             sheets += table("Bracing", *bracing_table(archive), paper)
     sheets += table("Rods", *rods_table(archive, brief=True), paper)
     sheets += table("Joints", *joints_table(archive, brief=True), paper)
+    if archive.result.get("seams"):
+        sheets += table("Seams", *seams_table(archive), paper)
     if (archive.result.get("fabrication") or {}).get("stock"):
         sheets += table("Stock", *stock_table(archive), paper)
     return bound(sheets, title_block(archive, plan.summary), paper), paper

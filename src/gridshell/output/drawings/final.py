@@ -8,6 +8,7 @@ from gridshell.output.drawing import INK, PALE, SOFT, Drawing, Pen, Pencil
 from gridshell.output.labels import Room, leaders, place, upright
 from gridshell.output.plan import FlatPlan, nice_ticks
 from gridshell.output.rods import joint_places, rods_of
+from gridshell.output.schedules import seam_meetings
 
 Floats = NDArray[np.float64]
 
@@ -26,16 +27,33 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     ends, inner = (
         np.array([curve[k, :2] for curve in curves for k in two]).reshape(-1, 2) for two in ((0, -1), (1, -2))
     )
-    if len(plan.boundary):
-        pencil.line(plan.boundary[:, :2], "BOUNDARY-FINAL", closed=True)
+    for outline in plan.boundary:
+        pencil.line(outline[:, :2], "BOUNDARY-FINAL", closed=True)
     names = [f"{rod.id}.{end}" for rod in plan.rods if len(rod.nodes) > 1 for end in (0, 1)]
     for name, end, behind in zip(names, ends, inner, strict=True):
         away = (end - behind) / max(float(np.linalg.norm(end - behind)), 1e-9)
         pencil.mark(end, 0.3 * text, "MARK", note=name)
         pencil.line([end, end + 1.2 * text * away], "DIM")
-    _labels_outside(pencil, names, ends, text)
+    sewn = {end for seam in archive.result.get("seams") or [] for one in seam["meetings"] for end in one["ends"]}
+    apart = np.array([name not in sewn for name in names])
+    _labels_outside(pencil, [name for name in names if name not in sewn], ends[apart], text)
+    _meetings(pencil, archive, text)
     _axes(pencil, text)
     return pencil.done("supports", "Support plan", text)
+
+
+def _meetings(pencil: Pencil, archive: Archive, text: float) -> None:
+    """The numbers of the places on seams where rods meet, as in the table of the seams, where there is room."""
+    room, size = Room(3 * text), 0.7 * text
+    for number, meeting in seam_meetings(archive.result):
+        at = 1e3 * np.array(meeting["point"][:2])
+        for corner in ((0.5, 0.4), (0.5, -1.1), (-0.5, 0.4), (-0.5, -1.1)):
+            anchor = "start" if corner[0] > 0 else "end"
+            pencil.write(number, at + text * np.array(corner), size, "LABEL", anchor=anchor)
+            if room.free(pencil.texts[-1].box()):
+                room.take(pencil.texts[-1].box())
+                break
+            pencil.texts.pop()
 
 
 def bracing_drawing(archive: Archive, text: float) -> Drawing:

@@ -13,10 +13,10 @@ TITLE = "Flat plan"
 def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     """The flat plan [mm], its rods labelled in the size `text` [mm]."""
     pencil = Pencil()
-    if len(plan.footprint):
-        pencil.line(plan.footprint, "BOUNDARY-FLAT", closed=True)
-    if len(plan.boundary):
-        pencil.line(plan.boundary, "BOUNDARY-FINAL", closed=True)
+    for outline in plan.footprint:
+        pencil.line(outline, "BOUNDARY-FLAT", closed=True)
+    for outline in plan.boundary:
+        pencil.line(outline, "BOUNDARY-FINAL", closed=True)
     _rods(pencil, plan, text)
     _labels(pencil, plan, text)
     _joints(pencil, plan, text)

@@ -60,8 +60,8 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
     if archive.final:
         for name, at in joint_places(archive, archive.states[archive.final]).items():
             model.Objects.AddPoint(r.Point3d(*(1e3 * at).tolist()), about("MARK", name))
-    if len(plan.boundary):
-        closed = np.vstack([plan.boundary, plan.boundary[:1]])
+    for outline in plan.boundary:
+        closed = np.vstack([outline, outline[:1]])
         model.Objects.AddPolyline(polyline(closed), about("BOUNDARY-FINAL", "boundary"))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.3dm"

@@ -1,0 +1,169 @@
+"""Whole jobs, warm and in one thread: each stage, against the linear algebra that they cannot do without."""
+
+import importlib
+from collections.abc import Callable
+from dataclasses import replace
+from statistics import median
+
+import numpy as np
+import qdldl
+from scipy.sparse import csc_matrix
+
+import gridshell as gs
+from benchmarks.rows import Row, Section, clock, ms, timed
+from gridshell.nets import chebyshev_net
+from gridshell.solve.mixed_newton import _Step as Newton
+
+RADIUS = 0.2
+ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+DOME = gs.Hemisphere(radius=RADIUS)
+bound = importlib.import_module("gridshell.formfinding.bound")
+
+
+def auto(spacing: float = 0.03, edge: float = 0.005) -> gs.GridLayout:
+    return gs.GridLayout.orthogonal(spacing=spacing, edge=edge)
+
+
+def square(spacing: float = 0.03) -> gs.GridLayout:
+    """17 x 17 rods, 5 mm edges."""
+    return gs.GridLayout.orthogonal(rods=(17, 17), spacing=spacing, length=1.4, edge=0.005)
+
+
+def whole_job(runs: int) -> Section:
+    """Net, bound drape, trim, map back, both pop-ups, agreement; the hemisphere with every line a rod."""
+    times = [_stages() for _ in range(runs + 1)][1:]
+    each = {name: median(one[name] for one in times) for name in times[0]}
+    unit, theirs, dofs = _units()
+    formed = sum(each[name] for name in ("net", "rest of the drape", "trim and map back"))
+    popped = formed + each["pop-up pinned"] + each["pop-up clamped"]
+    rows = [
+        Row(f"net + bound drape + trim + map back, over one assembly, factorisation and solve of its {dofs} unknowns",
+            f"{formed / unit:.1f} ({ms(formed)} / {ms(unit)})", "at most 6, target 4"),
+        Row("the same, over one QDLDL factorisation of that matrix", f"{formed / theirs:.1f} ({ms(theirs)})",
+            "at most 12"),
+        Row("with both pop-ups", f"{popped / unit:.1f} ({ms(popped)})", "at most 24, target 12"),
+        *(Row(name, f"{ms(seconds)}, {seconds / unit:.2f} units") for name, seconds in each.items()),
+    ]  # fmt: skip
+    return Section("Whole job: hemisphere, 30 mm, automatic rods, 5 mm edges", _first(whole_job), rows)
+
+
+def _stages() -> dict[str, float]:
+    told = dict[str, float]()
+    last = clock()
+
+    def stage(name: str) -> None:
+        nonlocal last
+        now = clock()
+        told[name] = told.get(name, 0.0) + now - last
+        last = now
+
+    chebyshev_net(DOME, auto())
+    stage("net")
+    draped = gs.drape(auto(), ROD, DOME)
+    stage("rest of the drape")
+    told["rest of the drape"] -= told["net"]
+    trimmed = gs.trim(draped)
+    footprint = gs.map_back(trimmed)
+    stage("trim and map back")
+    for ends in ("pinned", "clamped"):
+        popped = gs.pop_up(footprint, trimmed.boundary, ROD, ends=ends)
+        stage(f"pop-up {ends}")
+        gs.agreement(popped, DOME)
+        stage("agreement, twice")
+    return told
+
+
+def _units() -> tuple[float, float, int]:
+    """Seconds of one Newton step of the bound system (assembly, factorisation, solve), of QDLDL's factorisation."""
+    step, state, forces = bound_system(auto())
+    unit = timed(lambda: step.take(state, forces, False), runs=15)
+    pattern = step._assembly
+    matrix = csc_matrix((step._data, pattern.indices, pattern.indptr), shape=(step.dofs, step.dofs))
+    theirs = qdldl.Solver(matrix, upper=True)
+    return unit, timed(lambda: theirs.update(matrix, upper=True), runs=15), step.dofs
+
+
+def bound_system(layout: gs.GridLayout) -> tuple[Newton, np.ndarray, np.ndarray]:
+    """The bound drape's own system, and where its solve starts."""
+    asked = list[tuple[object, ...]]()
+    solve: Callable[..., object] = bound.find_equilibrium
+
+    def listen(*given: object, **options: object) -> object:
+        asked.append(given)
+        return solve(*given, **options)
+
+    bound.find_equilibrium = listen
+    try:
+        gs.drape(layout, ROD, DOME)
+    finally:
+        bound.find_equilibrium = solve
+    problem, state, forces = asked[0][:3]
+    return Newton(problem, state), state, forces  # type: ignore[arg-type]
+
+
+def slider(runs: int) -> Section:
+    """Spacing, heading, size or anchor changed a little, the net looked for near the last: net, drape and map back."""
+    rows = []
+    for name, at in SLIDERS.items():
+        target, layout, anchor = at(0.0)
+        draped, times = gs.drape(layout, ROD, target, anchor=anchor), list[float]()
+        for t in np.linspace(0.0, 1.0, runs + 2)[1:]:
+            target, layout, anchor = at(float(t))
+            begin = clock()
+            draped = gs.drape(layout, ROD, target, anchor=anchor, start=draped)
+            gs.map_back(gs.trim(draped))
+            times.append(clock() - begin)
+        rows.append(Row(f"{name} changed", f"{1 / median(times[1:]):.1f} updates a second", "at least 10"))
+    return Section("Slider: 17 x 17 rods, 5 mm edges", _first(slider), rows)
+
+
+SLIDERS: dict[str, Callable[[float], tuple[gs.Target, gs.GridLayout, tuple[float, float]]]] = {
+    "spacing": lambda t: (DOME, square(0.03 + 0.001 * t), (0.0, 0.0)),
+    "heading": lambda t: (DOME, replace(square(), rotate=0.1 * t), (0.0, 0.0)),
+    "anchor": lambda t: (DOME, square(), (0.01 * t, 0.0)),
+    "size": lambda t: (gs.Hemisphere(radius=RADIUS + 0.005 * t), square(), (0.0, 0.0)),
+}
+
+BUMPS = gs.HeightField(
+    formula="0.08*(exp(-((x-.09)^2/.06^2 + y^2/.07^2)/2) + exp(-((x+.09)^2/.06^2 + y^2/.07^2)/2))",
+    domain=gs.Disc(RADIUS),
+)
+
+
+def warm(runs: int) -> Section:
+    """A form found again after its spacing grew, from nothing and from the last form (`start=`), by turns.
+
+    From nothing there is little to save: the drape starts from the net in either case, and a new spacing is a new mesh,
+    whose matrices are planned and factorised anew. What is saved are steps of Newton's method in pop-ups that are far
+    from the draped state.
+    """
+    rows = []
+    for name, target in (("hemisphere", DOME), ("two bumps with a dip", BUMPS)):
+        last = gs.find_form(target, auto(), ROD)
+        for change in (0.02, 0.002):
+            layout = auto(0.03 * (1 + change))
+            cold, again = list[float](), list[float]()
+            for _ in range(runs + 1):
+                for start, times in ((None, cold), (last, again)):
+                    begin = clock()
+                    form = gs.find_form(target, layout, ROD, start=start)
+                    times.append(clock() - begin)
+                    solves = [popped.report.factorizations for popped in form.popped.values()]
+                    counts = f"{form.draped.report.factorizations} + {' + '.join(map(str, solves))}"
+                    if start is None:
+                        before = counts
+            ratio = median(again[1:]) / median(cold[1:])
+            rows.append(
+                Row(
+                    f"{name}, spacing +{100 * change:g} %: from the last form, over from nothing",
+                    f"{ratio:.2f} ({ms(median(again[1:]))} / {ms(median(cold[1:]))}; factorisations of drape and "
+                    f"pop-ups {counts} against {before})",
+                    "at most 0.33" if change == 0.02 else "",
+                )
+            )
+    return Section("Found again", _first(warm), rows)
+
+
+def _first(work: Callable[..., object]) -> str:
+    assert work.__doc__ is not None
+    return work.__doc__.replace("\n    ", " ")
