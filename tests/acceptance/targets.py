@@ -16,6 +16,7 @@ from tests.acceptance.rows import Row, print_table
 from tests.acceptance.targets_broken import broken_files, called
 from tests.acceptance.targets_random import outcome
 from tests.targets.meshes import Mesh, capped_sphere, disc, sheet, strewn
+from tests.targets.stepfile import StepFile
 
 SIZE = 0.2  # m
 GRID = gs.GridLayout.orthogonal(spacing=0.03, edge=0.005)
@@ -77,39 +78,54 @@ def mesh_rows(name: str, meshes: tuple[str, ...]) -> Iterator[Row]:
 
 
 def nurbs_rows() -> Iterator[Row]:
-    """A saddle that is a NURBS of degree two exactly, and the sphere, in Rhino's files."""
+    """A saddle that is a NURBS of degree two exactly, and half a sphere, in Rhino's files and in STEP."""
+    square = gs.HeightField(formula="(x^2 - y^2)/0.8", domain=gs.Rectangle((2 * SIZE, 2 * SIZE)))
+    exact = {
+        "saddle": gs.find_form(square, GRID, ROD, anchor=(0.0, 0.0)),
+        "hemisphere": analytic_form("hemisphere"),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        for name, path, base in (*_rhino_files(Path(folder)), *_step_files(Path(folder))):
+            form = gs.find_form(gs.surface_from(path, base=base), GRID, ROD, anchor=(0.0, 0.0))
+            off = 100 * apart(ends_of(form), ends_of(exact[name]))
+            yield Row(f"{name} as {path.suffix[1:]}", "rod ends off the analytic ones", off, 0.02, "%size")
+
+
+def _saddle_controls() -> np.ndarray:
+    """(3, 3, 3) Bezier points [m]: the heights of x^2 over [-a, a] are a^2, -a^2, a^2."""
+    i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
+    return np.stack([SIZE * (i - 1), SIZE * (j - 1), SIZE**2 * ((-1.0) ** i - (-1.0) ** j) / 0.8], axis=2)
+
+
+def _rhino_files(folder: Path) -> Iterator[tuple[str, Path, float | None]]:
+    """A name, a file in millimetres, and where the base is [m]."""
     import rhino3dm
 
     saddle = rhino3dm.NurbsSurface.Create(3, False, 3, 3, 3, 3)
-    for i in range(3):
-        for j in range(3):
-            x, y = SIZE * (i - 1), SIZE * (j - 1)
-            z = SIZE**2 * ((-1) ** i - (-1) ** j) / 0.8  # Bezier heights of x^2 over [-a, a]: a^2, -a^2, a^2
-            saddle.Points[i, j] = rhino3dm.Point4d(1e3 * x, 1e3 * y, 1e3 * z, 1.0)
+    for (i, j), p in zip(np.ndindex(3, 3), 1e3 * _saddle_controls().reshape(-1, 3), strict=True):
+        saddle.Points[i, j] = rhino3dm.Point4d(*p.tolist(), 1.0)
     for knots in (saddle.KnotsU, saddle.KnotsV):
         for k in range(4):
             knots[k] = float(k > 1)
     ball = rhino3dm.Sphere(rhino3dm.Point3d(0, 0, 0), 1e3 * SIZE).ToBrep()
-    square = gs.HeightField(formula="(x^2 - y^2)/0.8", domain=gs.Rectangle((2 * SIZE, 2 * SIZE)))
-    for name, shape, exact, base in (
-        ("saddle", saddle, gs.find_form(square, GRID, ROD, anchor=(0.0, 0.0)), None),
-        ("hemisphere", ball, analytic_form("hemisphere"), 0.0),
-    ):
-        with tempfile.TemporaryDirectory() as folder:
-            model = rhino3dm.File3dm()
-            model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
-            add = model.Objects.AddBrep if name == "hemisphere" else model.Objects.AddSurface
-            add(shape, rhino3dm.ObjectAttributes())
-            model.Write(str(Path(folder) / "shape.3dm"), 7)
-            target = gs.surface_from(Path(folder) / "shape.3dm", base=base)
-        form = gs.find_form(target, GRID, ROD, anchor=(0.0, 0.0))
-        yield Row(
-            f"{name} as 3dm",
-            "rod ends off the analytic ones",
-            100 * apart(ends_of(form), ends_of(exact)),
-            0.02,
-            "%size",
-        )
+    for name, shape, base in (("saddle", saddle, None), ("hemisphere", ball, 0.0)):
+        model, path = rhino3dm.File3dm(), folder / f"{name}.3dm"
+        model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+        add = model.Objects.AddBrep if name == "hemisphere" else model.Objects.AddSurface
+        add(shape, rhino3dm.ObjectAttributes())
+        model.Write(str(path), 7)
+        yield name, path, base
+
+
+def _step_files(folder: Path) -> Iterator[tuple[str, Path, float | None]]:
+    """The same as faces, in millimetres and in metres; the half sphere ends at its own edge."""
+    saddle, cap = StepFile("mm"), StepFile("m")
+    saddle.patch(1e3 * _saddle_controls(), 2, [0.0, 1.0])
+    cap.cap(SIZE, 0.0)
+    for name, file in (("saddle", saddle), ("hemisphere", cap)):
+        path = folder / f"{name}.step"
+        path.write_bytes(file.text())
+        yield name, path, None
 
 
 def same_rows() -> Iterator[Row]:
@@ -143,7 +159,6 @@ def same_rows() -> Iterator[Row]:
 
 def gallery_rows() -> Iterator[Row]:
     """Every gallery target converged and stable; the whole job at some 30 rods each way against the dome's."""
-    took: dict[str, float] = {}
     for name, piece in gallery().items():
         form = piece.form()
         note = ", ".join(f"{ends} gap rms {100 * gap.rms_relative:.3f} %" for ends, gap in form.agreement.items())
@@ -152,24 +167,27 @@ def gallery_rows() -> Iterator[Row]:
         yield Row(name, "negative modes, drape and pop-ups", modes, 0)
         for ends, bound in (("pinned", piece.pinned), ("clamped", piece.clamped)):
             yield Row(name, f"gap {ends}, rms", 100 * form.agreement[ends].rms_relative, 100 * bound, "%size")
-    for name in gallery():
-        took[name], rods, said = min((_whole_job(name) for _ in range(2)), key=lambda job: job[0])
-        note = f"{rods[0]} x {rods[1]} rods, {took[name]:.2f} s, {said}"
-        yield Row(name, "whole job over the dome's", took[name] / took["dome"], 3.0, note=note)
+    jobs: dict[str, list[tuple[float, tuple[int, int], str]]] = {name: [] for name in gallery()}
+    for name in 3 * list(jobs):  # the dome's among the others', so that a busy machine delays all alike
+        jobs[name].append(_whole_job(name))
+    least = {name: min(done, key=lambda job: job[0]) for name, done in jobs.items()}
+    for name, (seconds, rods, said) in least.items():
+        note = f"{rods[0]} x {rods[1]} rods, {seconds:.2f} s of CPU, {said}"
+        yield Row(name, "whole job over the dome's", seconds / least["dome"][0], 3.0, note=note)
 
 
 def _whole_job(name: str) -> tuple[float, tuple[int, int], str]:
-    """Seconds from the file to the pop-ups with about 30 rods each way; the number of rods; the status."""
+    """Seconds of CPU from the file to the pop-ups with about 30 rods each way; the number of rods; the status."""
     piece = gallery()[name]
     coarse = gs.chebyshev_net(piece.target, piece.layout(), anchor=piece.anchor)
     lines = {family: len({rod.offset for rod in coarse.rods if rod.family == family}) for family in "uv"}
     spacing = tuple(piece.spacing * lines[family] / 30 for family in "uv")
     edge = min(float(np.sqrt(spacing[0] * spacing[1])) / 4, min(spacing))
     layout = gs.GridLayout.orthogonal(spacing=(spacing[0], spacing[1]), edge=edge, rotate=piece.rotate)
-    started = time.perf_counter()
+    started = time.process_time()
     target = gallery_target(name)
     form = gs.find_form(target, layout, LATH, anchor=piece.anchor)
-    seconds = time.perf_counter() - started
+    seconds = time.process_time() - started
     families = [rod.family for rod in form.footprint.rods]
     return seconds, (families.count("u"), families.count("v")), form.status
 

@@ -8,9 +8,12 @@ from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tests.targets.stepfile import StepFile
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -150,7 +153,8 @@ def broken_files(folder: Path) -> Iterator[tuple[str, list[str]]]:
     yield case("no heights", "none.csv", b",,,\n,,,\n,,,\n,,,\n", "--target.size", "4 m, 4 m")
     yield case("no size", "size.csv", b"1,2,3,4\n" * 4, "--spacing", "500mm")
     yield case("no image", "noise.png", rng.bytes(2000), "--target.size", "4 m, 4 m", "--target.height", "1 m")
-    yield case("STEP", "roof.step", b"ISO-10303-21;", "--unit", "m")
+    for what, name, text, *options in _step_files():
+        yield case(what, f"{name}.step", text, *(options or ("--spacing", "500mm")))
     huge = folder / "huge.obj"
     with huge.open("wb") as file:
         file.truncate(400_000_000)
@@ -159,6 +163,43 @@ def broken_files(folder: Path) -> Iterator[tuple[str, list[str]]]:
     yield case("a case with a scale of 0", "scale.toml", b'[target]\nkind = "mesh"\nfile = "x.obj"\nscale = 0\n')
     yield "no such file", [str(folder / "nowhere.obj"), "--unit", "m"]
     yield "a folder", [str(folder), "--unit", "m"]
+
+
+def _step_files() -> Iterator[tuple[Any, ...]]:
+    """What is wrong, a name, the file, and options."""
+    x = np.stack([*np.meshgrid([-5.0, 0.0, 5.0], [-5.0, 0.0, 5.0], indexing="ij"), np.zeros((3, 3))], axis=2)
+    x[1, 1, 2] = 4.0
+    roof, many, line, dot, far = (StepFile("m") for _ in range(5))
+    roof.patch(x, 2, [0.0, 1.0], "roof")
+    for k in range(20):
+        many.cap(4.0 + k, 1.0, f"cap {k}")
+    line.patch(x * [1, 0, 0], 2, [0.0, 1.0])
+    dot.patch(0 * x, 2, [0.0, 1.0])
+    far.patch(1e4 * x, 2, [0.0, 1.0])
+    whole, rng = roof.text(), np.random.default_rng(3)
+    end = b"ENDSEC;\nEND-ISO-10303-21;\n"
+    for k, share in enumerate((0.0, 0.1, 0.3, 0.5, 0.8, 0.99)):
+        yield f"cut short at {share:.0%}", f"cut{k}", whole[: int(share * len(whole))]
+    for k, share in enumerate((0.2, 0.4, 0.6, 0.8)):
+        yield f"cut short at {share:.0%}, and ended", f"ended{k}", whole[: int(share * len(whole))] + b"\n" + end
+    yield "binary garbage", "noise", rng.bytes(30_000)
+    yield "binary garbage, ended", "noise_ended", rng.bytes(30_000) + end
+    yield "a unit that it has already", "unit", whole, "--unit", "mm"
+    yield "no such face", "face", whole, "--target.object", "wall"
+    yield "twenty faces", "many", many.text()
+    yield "flat as a line", "line", line.text()
+    yield "a single point", "dot", dot.text()
+    yield "absurdly large", "far", far.text()
+    yield "no face", "bare", StepFile().text()
+    yield "a face on nothing", "nothing", whole.replace(b"B_SPLINE_SURFACE_WITH_KNOTS", b"NO_SURFACE")
+    yield "a knot that is none", "knot", whole.replace(b"(3,3),(3,3),(0.0", b"(3,9),(3,3),(0.0")
+    yield "numbers that are none", "number", whole.replace(b"E+00", b"E+999")
+    yield "points that are words", "words", whole.replace(b"5.000000000000E+00", b"five")
+    for k in range(6):
+        spoilt = bytearray(whole)
+        for place in rng.integers(400, len(whole) - 40, 200).tolist():
+            spoilt[place] = int(rng.integers(32, 126))
+        yield "spoilt in 200 places", f"spoilt{k}", bytes(spoilt)
 
 
 def _crossing() -> tuple[Floats, Ints]:

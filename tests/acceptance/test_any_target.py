@@ -22,6 +22,7 @@ def test_a_mesh_gives_the_form_of_its_analytic_target(name: str) -> None:
 
 def test_a_nurbs_gives_the_form_of_its_analytic_target() -> None:
     pytest.importorskip("rhino3dm")
+    pytest.importorskip("OCP")
     check_reached(nurbs_rows())
 
 

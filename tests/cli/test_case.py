@@ -220,7 +220,6 @@ def test_an_unknown_override_names_the_nearest_key() -> None:
         ("hemispher", "did you mean hemisphere?"),
         ("nothing.toml", 'no file named "nothing.toml"'),
         (".", "is a folder"),
-        ("roof.step", "STEP files are not read"),
     ],
 )
 def test_a_case_that_is_not_there_is_named(name: str, message: str) -> None:

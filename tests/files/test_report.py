@@ -132,3 +132,13 @@ def test_the_verdict_calls_a_way_up_smooth_only_where_nothing_snaps() -> None:
     way = {**made.result["deployment"], "snaps": [[0.1, 0.2]]}
     assert smooth not in verdict(replace(made, result={**made.result, "deployment": way})).sentences
     assert smooth not in verdict(sample_archive()).sentences
+
+
+def test_the_verdict_warns_of_a_shell_that_springs_off_with_every_support() -> None:
+    made = archive("dome")
+    gaps = {ends: dict(gap) for ends, gap in made.result["agreement"].items()}
+    gaps["clamped"]["max_relative"] = gaps["pinned"]["max_relative"] = 0.09
+    found = verdict(replace(made, result={**made.result, "agreement": gaps}))
+    assert (found.level, found.headline) == ("caution", "Converged and stable, but it does not keep to the target")
+    gaps["clamped"]["max_relative"] = 0.01
+    assert verdict(replace(made, result={**made.result, "agreement": gaps})).level == "good"

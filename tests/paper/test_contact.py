@@ -10,6 +10,7 @@ from gridshell.errors import InputError
 from gridshell.model import Freedom
 from gridshell.rods.stretch import Stretch
 from gridshell.solve.summed import SparseSum
+from gridshell.targets.domain import Domain, EllipseDomain
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, RADIUS, STEP, TARGETS, G, Particles, slope
 
 ROUND_OFF = 1e-12  # of numbers of order 1
@@ -72,6 +73,31 @@ def test_no_node_is_corrected_by_more_than_its_depth(name: str) -> None:
     assert (depth > 0).sum() > 100
 
 
+SHAPES = {
+    **TARGETS,
+    "overhanging cap": gs.Cap(RADIUS, -0.1),
+    "low cap": gs.Cap(RADIUS, 0.12),
+    "rectangle": gs.HeightField(formula="0.1 - x**2", domain=gs.Rectangle((0.3, 0.2))),
+}
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_what_signs_say_to_be_outside_is_outside(name: str) -> None:
+    target, chance = SHAPES[name], np.random.default_rng(7)
+    points = chance.uniform([-0.35, -0.35, -0.3], [0.35, 0.35, 0.4], (3000, 3))
+    outside, distance = target.outside(points), target.contact(points).distance
+    assert distance[outside].min() > -1e-12
+    # and they miss none, so that contact itself is asked for nodes inside alone
+    assert distance[~outside].max() < 1e-12
+    assert 100 < np.count_nonzero(~outside) < 2900
+
+
+@pytest.mark.parametrize("domain", [gs.Disc(0.2), EllipseDomain(0.2, 0.1), gs.Rectangle((0.3, 0.2))])
+def test_a_domain_holds_what_has_no_positive_distance_to_it(domain: Domain) -> None:
+    points = np.random.default_rng(8).uniform(-0.3, 0.3, (500, 2))
+    np.testing.assert_array_equal(domain.holds(points), domain.distance(points)[0] <= 0)
+
+
 def test_a_node_slides_down_a_slope_as_in_the_textbook() -> None:
     tangent = 0.5
     sine, down = tangent / np.hypot(1, tangent), np.array([1.0, 0.0, -tangent]) / np.hypot(1, tangent)
@@ -123,9 +149,25 @@ def test_supports_and_contact_leave_what_is_left_of_both() -> None:
     np.testing.assert_array_equal(particle.state[0, :2], [x, 0.0])
     assert abs(particle.state[0] @ normal - RADIUS) < ROUND_OFF
     # a wall cannot move what is held across it: nothing happens, and nothing fails
-    beside = Particles(HEMISPHERE, np.array([[RADIUS - 1e-3, 0.0, -0.1]]), free=rail)
-    beside.step()
-    np.testing.assert_allclose(beside.state[0], [RADIUS - 1e-3, 0.0, -0.1 - G * STEP**2], atol=ROUND_OFF)
+    for way in ([1.0, 0.0], [0.0, 1.0], [0.6, -0.8]):
+        x, y = (RADIUS - 1e-3) * np.array(way)
+        beside = Particles(HEMISPHERE, np.array([[x, y, -0.1]]), free=rail)
+        beside.step()
+        np.testing.assert_allclose(beside.state[0], [x, y, -0.1 - G * STEP**2], atol=ROUND_OFF)
+
+
+def test_a_node_that_touches_is_not_looked_at_again_in_its_step() -> None:
+    """In a hollow a node that its neighbour pulls along its plane gets below the surface: it stays on the plane."""
+    hollow = TARGETS["hollow"]
+    x = np.array([[0.1, 0.0, 0.11], [0.15, 0.0, 0.14]])
+    pulled = Stretch.elastic(np.array([[0, 1]]), np.array([0.05]), np.array([5e-3]))
+    particles = Particles(hollow, x, elements=(pulled,), stopped="along the normal")
+    particles.step()
+    touching = particles.stepper.last
+    assert touching is not None
+    assert touching.nodes.tolist() == [0]
+    assert abs((particles.state[0] - touching.points[0]) @ touching.normals[0]) < ROUND_OFF
+    assert hollow.contact(particles.state[:1]).distance[0] < -1e-10
 
 
 @pytest.mark.parametrize("matrix", [None, SparseSum], ids=["banded", "sparse"])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import gridshell as gs
-from gridshell.cli import main
 from gridshell.paper.fig4 import make
 from gridshell.paper.two_rods import LENGTH, RATE, ROD, STEP, run, run_statics
 
@@ -88,9 +87,3 @@ def test_figure_is_written_with_its_tables(tmp_path):
     assert float(angles[-1][1]) == pytest.approx(18.0)
     assert json.loads((tmp_path / "fig4" / "result.json").read_text())["figure"] == "fig4"
     figure.save(tmp_path / "fig4")  # a result may be replaced
-
-
-def test_a_figure_that_is_not_there_is_refused(capsys):
-    assert main(["paper", "fig5"]) == 2
-    refused = "gridshell: error: there is no figure fig5 here: the figures are fig4, fig6, fig7, fig8\n"
-    assert capsys.readouterr().err == refused

@@ -11,8 +11,11 @@ import pytest
 
 import gridshell as gs
 from gridshell.formfinding.fall import Fall
+from gridshell.output.view import TOWARDS
+from gridshell.paper import drape_pictures
 from gridshell.paper.drapefigure import DrapeFigure
 from gridshell.paper.drapes import METHODS, Case, Drape, drape_all
+from gridshell.paper.panels import standing
 from tests.paper.falls import HEMISPHERE
 
 CASE = Case("a", HEMISPHERE, (7, 7), spacing=0.06, edge=0.03)
@@ -66,3 +69,27 @@ def test_a_fall_that_does_not_rest_is_the_status_of_the_figure() -> None:
     moving = DrapeFigure("fig6", "a title", drape_all([CASE], lambda *told: None, fall=Fall(duration=0.8)))
     assert moving.status.startswith("(a) by method paper was not at rest")
     assert "NOT AT REST after 0.8 s" in moving.summary()
+
+
+def test_a_footprint_that_was_sought_is_drawn_where_its_rods_are_those_of_the_case(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def curves(found: np.ndarray | None) -> int:
+        monkeypatch.setattr(drape_pictures, "stored_footprint", lambda name: found)
+        return drape_pictures.rows_svg([by("bound")]).count("<polygon")
+
+    around = np.column_stack([np.cos(np.arange(28)), np.sin(np.arange(28))])
+    assert curves(around) == curves(None) + 1
+    assert curves(around[:-2]) == curves(None)
+
+
+def test_what_lies_behind_the_target_is_pale_and_the_flat_grid_is_not() -> None:
+    one = by("bound")
+    flat = standing(CASE.target, one.trimmed.mesh, one.trimmed.mesh.flat + [0.0, 0.0, 0.3], hides=False)
+    draped = standing(CASE.target, one.trimmed.mesh, one.trimmed.positions)
+    assert not any("stroke-opacity" in mark for mark in flat)
+    # a node of a sphere about the origin is behind where it lies on the far side of the plane through the origin
+    near = one.trimmed.positions @ TOWARDS >= 0
+    hidden = np.count_nonzero(~near[one.trimmed.mesh.edges].all(axis=1))
+    pale = [mark.count(",") - 1 for mark in draped if "stroke-opacity" in mark]
+    assert 0 < hidden == sum(pale)

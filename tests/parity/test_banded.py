@@ -98,6 +98,32 @@ def test_turning_directions_need_no_new_matrix():
         )
 
 
+@pytest.mark.parametrize("kind", [Banded, SparseSum])
+def test_blocked_directions_keep_their_places_and_do_not_move(kind):
+    """Nodes that touch: turned, the last direction zero; or stuck, all three. As if these unknowns were not there."""
+    rng = np.random.default_rng(3)
+    stencils, free = chain(3), Freedom.free(BLOCKS)
+    hessians, field = random_hessians(rng, stencils), rng.normal(size=(BLOCKS, 3))
+    inertia = np.full((BLOCKS, 3), 50.0)
+    directions, touching, stuck = free.directions.copy(), [0, 3, 4, 5, 17, BLOCKS - 1], [4, 30]
+    for node in touching:
+        directions[node] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        directions[node, 2] = 0.0
+    directions[stuck] = 0.0
+    blocked = Freedom(directions, free.count)
+    matrix = kind([stencils], blocked)
+    matrix.clear()
+    matrix.add(0, hessians, stencils, blocked)
+    matrix.add_blocks(inertia, NO_CURVATURE, blocked)
+    assert matrix.factor() == 0
+    exact, t = dense(hessians, stencils, inertia, [], blocked)
+    left = np.abs(t).sum(axis=0) > 0
+    assert np.count_nonzero(~left) == len(touching) - 1 + 3 * len(stuck)
+    exact, t = exact[np.ix_(left, left)], t[:, left]
+    solution = t @ np.linalg.solve(exact, t.T @ field.ravel())
+    np.testing.assert_allclose(matrix.solve(field, blocked).ravel(), solution, rtol=1e-10, atol=1e-12)
+
+
 def test_reordering_narrows_a_shuffled_chain_to_its_width():
     free = Freedom.free(BLOCKS)
     for seed in range(5):

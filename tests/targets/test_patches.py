@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-import gridshell as gs
 from gridshell.targets import Freeform
 from gridshell.targets.fitting import Samples, fit_field
 from gridshell.targets.patches import PatchField
@@ -58,7 +57,7 @@ def test_field_is_that_of_plain_sums():
     a, b = local[..., 0] / patches.spacing, local[..., 1] / patches.spacing
     terms = np.stack([1 + 0 * a, a, b, a * a, a * b, b * b, a**3, a * a * b, a * b * b, b**3])
     q = local[..., 2] - np.einsum("mk,knm->nm", patches.coefficients, terms)
-    w = np.exp(-np.sum(d * d, axis=-1) / (0.7 * patches.spacing) ** 2)
+    w = np.exp(-np.sum(d * d, axis=-1) / (0.5 * patches.spacing) ** 2)
     exact = np.sum(w * q, axis=1) / np.sum(w, axis=1)
     # weights below exp(-20) of the largest are left out, 2e-9 each, of some hundred patches that differ by a spacing
     assert np.abs(patches.implicit(x).value - exact).max() < 1e-7 * patches.spacing
@@ -161,10 +160,18 @@ def test_a_field_of_points_alone_needs_no_mesh():
     assert np.abs(patches.implicit(points).value).max() < 1e-4
 
 
-def test_one_evaluation_of_many_points_is_that_of_each():
-    target = gs.Freeform.of(*PARTS["bowl"]())
-    x = around(target.field, 1.0, 20)
-    whole = target.implicit(x)
-    for k in range(20):
-        one = target.implicit(x[k : k + 1])
-        assert np.array_equal(one.hessian[0], whole.hessian[k])
+@pytest.mark.parametrize("off", [0.1, 1.0, 3.0])
+def test_points_may_come_in_any_order_and_number(off):
+    """Neighbours in a row share a list of patches; strangers do not, and each has the field that it has alone."""
+    patches = field("torus")
+    x = around(patches, off, 200)
+    path = x[:50, None] + patches.spacing * np.linspace(0, 1.5, 7)[:, None] * [1, 0, 0]  # short walks, and jumps
+    x = np.vstack([x, path.reshape(-1, 3)])
+    whole, order = patches.implicit(x), np.random.default_rng(5).permutation(len(x))
+    size = np.abs(whole.hessian).max()
+    assert patches.implicit(x[order]).hessian == pytest.approx(whole.hessian[order], abs=1e-11 * size)
+    level = patches.implicit(x, second=False)
+    assert level.value == pytest.approx(whole.value, abs=1e-14)
+    assert level.gradient == pytest.approx(whole.gradient, abs=1e-12)
+    for k in range(0, len(x), 29):
+        assert patches.implicit(x[k : k + 1]).hessian[0] == pytest.approx(whole.hessian[k], abs=1e-11 * size)

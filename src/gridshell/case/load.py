@@ -32,6 +32,9 @@ BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
 BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
 """Kinds of targets by the file that holds them: the file alone is a case."""
 
+BY_SIZE: Raw = {"layout": {"spacing": "auto", "edge": "auto"}, "rod": {"section": {"radius": "auto"}}}
+"""What such a case takes from its target's size."""
+
 FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
 
@@ -94,9 +97,7 @@ def _read(name_or_path: str | PathLike[str]) -> Raw:
     if name in BUILT_IN:
         return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
     if kind := BY_SUFFIX.get(path.suffix.lower()):
-        return {"target": {"kind": kind, "file": name}, "layout": {"spacing": "auto", "edge": "auto"}}
-    if path.suffix.lower() in (".step", ".stp"):
-        raise InputError(f"{name}: STEP files are not read: save the surface as 3DM or as a mesh (OBJ, STL, PLY)")
+        return {"target": {"kind": kind, "file": name}, **deepcopy(BY_SIZE)}
     if path.is_dir():
         raise InputError(f"{name} is a folder: give a case file, such as {path / 'case.toml'}")
     if not path.exists():

@@ -15,36 +15,49 @@ from gridshell.case.values import (
     Force,
     InertiaPerLength,
     Length,
+    LengthOrAuto,
     MassPerLength,
     PoissonRatio,
     Stiffness,
     Stress,
 )
+from gridshell.errors import InputError
 
 if TYPE_CHECKING:
     from gridshell.joints import Joint
     from gridshell.rods.section import GivenSection, Rod, Section
+    from gridshell.targets import Target
+
+SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]
+
+
+def _decided(radius: float | Literal["auto"]) -> float:
+    if radius == "auto":
+        raise InputError('rod.section.radius = "auto": there is no target whose size it could be taken from: give it')
+    return radius
 
 
 class CircleTable(Table):
     kind: Literal["circle"] = "circle"
-    radius: Length = Field(default=0.001, description="radius; of a tube: outer radius")
+    radius: LengthOrAuto = Field(
+        default=0.001, description='radius; "auto": 1/200 of the target\'s size; of a tube: outer radius'
+    )
 
     def build(self) -> "Section":
         from gridshell.rods.section import Circle
 
-        return Circle(radius=self.radius)
+        return Circle(radius=_decided(self.radius))
 
 
 class TubeTable(Table):
     kind: Literal["tube"] = "tube"
-    radius: Length = Field(default=0.001, description="outer radius")
+    radius: LengthOrAuto = Field(default=0.001, description="outer radius")
     thickness: Length = Field(description="thickness of the tube's wall")
 
     def build(self) -> "Section":
         from gridshell.rods.section import Tube
 
-        return Tube(radius=self.radius, thickness=self.thickness)
+        return Tube(radius=_decided(self.radius), thickness=self.thickness)
 
 
 class EllipseTable(Table):
@@ -115,6 +128,14 @@ class RodTable(Table):
         if given.get("material"):
             raise ValueError("rod.material: a given section says all stiffnesses and masses itself; leave it out")
         return {**given, "material": None}
+
+    def sized(self, target: "Target") -> "RodTable":
+        """A radius left to the target's size decided: rods are then as slender as the paper's on its hemisphere."""
+        if getattr(self.section, "radius", None) == "auto":
+            return self.model_copy(
+                update={"section": self.section.model_copy(update={"radius": SLENDER * target.size})}
+            )
+        return self
 
     def build(self) -> "Rod":
         from gridshell.rods.section import Material, Rod

@@ -231,6 +231,10 @@ class Case(Table):
                 content["target"][key] = str(Path(content["target"][key]).absolute())
         return toml_text(content)
 
+    def sized(self, target: "Target") -> "Case":
+        """The same case with a rod that fits its target, where that was left to it."""
+        return self.model_copy(update={"rod": self.rod.sized(target)})
+
     @property
     def undecided(self) -> bool:
         """Whether anchor or heading are to be searched for."""
@@ -259,7 +263,7 @@ class Case(Table):
         options["fall"] = drape.fall() if drape.method == "paper" else None
         options["joint"] = self.joint.build()
         target = self.target.build()
-        return Built(target, self.layout.build(target), self.rod.build(), options)
+        return Built(target, self.layout.build(target), self.rod.sized(target).build(), options)
 
     def build_sewn(self) -> Built:
         """The same of a case with seams; the options are those of `gridshell.sew`.

@@ -106,7 +106,9 @@ class PlacedTable(Table):
 
 class SurfaceTable(PlacedTable):
     unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
-    object: str | None = Field(default=None, description="name of the object, of several; 3dm: or of its layer")
+    object: str | None = Field(
+        default=None, description="name, of several; 3dm: or its layer; STEP: or a face's number"
+    )
 
     def build(self) -> "Target":
         from gridshell.targets import surface_from

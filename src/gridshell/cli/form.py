@@ -93,6 +93,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
     if case.seams.lines:
         return _sew(case, folder, only=only, as_json=as_json, quiet=quiet)
     target, layout, rod, options = case.build()
+    case = case.sized(target)
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
     from gridshell.form import find_form
@@ -116,6 +117,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
 def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bool) -> int:
     """Find the form of a case with seams and write it; the exit code."""
     target, layout, rod, options = case.build_sewn()
+    case = case.sized(target)
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
     from gridshell.form import sew

@@ -16,6 +16,7 @@ from functools import cached_property
 from math import isfinite
 from typing import Any, Literal
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,7 +47,6 @@ class Touching:
     free : its free directions.
     nodes : (k,); points, normals : (k, 3) the planes [m].
     stuck : (k,) bool; nodes that friction holds in their place in the plane.
-    seen, clearance : (N, 3) a state, and (N,) distances from the target there that the nodes had at least [m].
     """
 
     supports: Any  # a solver's `Constraint`, which is defined above this floor
@@ -55,19 +55,15 @@ class Touching:
     points: Floats
     normals: Floats
     stuck: NDArray[np.bool_]
-    seen: Floats
-    clearance: Floats
 
     @staticmethod
-    def none(supports: Any, state: Floats, before: "Touching | None" = None) -> "Touching":
-        """Nothing touches; `before`: of another step, whose look at the target may spare one."""
-        seen, clearance = (state, np.zeros(len(state))) if before is None else (before.seen, before.clearance)
+    def none(supports: Any, state: Floats) -> "Touching":
+        """Nothing touches."""
         nowhere, no_nodes = np.empty((0, 3)), np.empty(0, dtype=np.intp)
-        free = supports.freedom(state)
-        return Touching(supports, free, no_nodes, nowhere, nowhere, np.empty(0, dtype=bool), seen, clearance)
+        return Touching(supports, supports.freedom(state), no_nodes, nowhere, nowhere, np.empty(0, dtype=bool))
 
     def freedom(self, state: Floats) -> Freedom:
-        return self._freedom
+        return self._turned[0]
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
         return np.asarray(self.supports.curvature(state, gradient))
@@ -76,7 +72,7 @@ class Touching:
         """The way to the planes, along the free part of their normals, besides what the supports prescribe."""
         given = self.supports.remaining(state)
         result = np.zeros_like(state) if given is None else given.copy()
-        along, cosine = self._free_normals
+        _, along, cosine = self._turned
         gap = dot(self.points - state[self.nodes] - result[self.nodes], self.normals)
         result[self.nodes] += (gap / cosine)[:, None] * along
         return result
@@ -85,32 +81,22 @@ class Touching:
         return state
 
     @cached_property
-    def _free_normals(self) -> tuple[Floats, Floats]:
-        """(k, 3) unit parts of the normals in the free directions, and (k,) their cosines with the normals."""
-        own = self.own_directions(self.nodes)
-        parts = np.einsum("kc,kcx->kx", np.einsum("kcx,kx->kc", own, self.normals), own)
-        length = np.sqrt(dot(parts, parts))
-        return parts / length[:, None], length
+    def _turned(self) -> tuple[Freedom, Floats, Floats]:
+        """The supports' directions of each node turned so that the last lies along the normal, and is blocked.
 
-    @cached_property
-    def _freedom(self) -> Freedom:
-        """The supports' directions of each node reflected so that the last lies along the normal, and is blocked."""
-        directions = self.free.directions.copy()
-        own, last = self.own_directions(self.nodes), self.free.count[self.nodes] - 1
-        rows = np.arange(len(self.nodes))
-        mirror = np.einsum("kcx,kx->kc", own, self._free_normals[0])  # a unit vector in components
-        mirror[rows, last] += np.where(mirror[rows, last] < 0, -1.0, 1.0)
-        shares = 2.0 * mirror / dot(mirror, mirror)[:, None]
-        turned = own - shares[:, :, None] * np.einsum("kc,kcx->kx", mirror, own)[:, None, :]
-        turned[rows, last] = 0.0
-        turned[self.stuck] = 0.0
-        directions[self.nodes] = turned
-        return Freedom(directions, self.free.count)
+        And (k, 3) the unit parts of the normals in the free directions, and (k,) their cosines with the normals.
+        """
+        if not len(self.nodes):
+            return self.free, self.normals, np.empty(0)
+        directions, along, cosine = self.free.directions.copy(), self.normals.copy(), np.empty(len(self.nodes))
+        _turn(directions, self.free.count, self.nodes, self.stuck, along, cosine)
+        return Freedom(directions, self.free.count), along, cosine
 
-    def own_directions(self, nodes: Ints) -> Floats:
-        """(k, 3, 3) the supports' free directions of some nodes, zero past their count."""
-        used = np.arange(3) < self.free.count[nodes][:, None]
-        return np.asarray(np.where(used[:, :, None], self.free.directions[nodes], 0.0))
+    def free_share(self, nodes: Ints, normals: Floats) -> Floats:
+        """(k,) cosines of the normals (k, 3) of some nodes with the directions that their supports leave free."""
+        along = np.einsum("kcx,kx->kc", self.free.directions[nodes], normals)
+        along[np.arange(3) >= self.free.count[nodes][:, None]] = 0.0
+        return np.asarray(np.sqrt(dot(along, along)))
 
 
 @dataclass(frozen=True)
@@ -139,9 +125,14 @@ class ModifiedMass:
         if not (isfinite(self.friction) and self.friction >= 0):
             raise InputError(f"the friction coefficient must be 0 or positive, not {self.friction}")
 
-    def touching(self, supports: Any, state: Floats, before: Touching | None = None) -> Touching:
+    @property
+    def stops_wholly(self) -> bool:
+        """Whether touching nodes lose their velocity along the surface, too."""
+        return self.stopped == "wholly" and not self.friction
+
+    def touching(self, supports: Any, state: Floats) -> Touching:
         """The constraint to start a step with: nothing touches, whatever did in the step before."""
-        return Touching.none(supports, state, before)
+        return Touching.none(supports, state)
 
     def below(self, state: Floats, touching: Touching) -> Touching | None:
         """The constraint with all nodes that are newly below the surface at `state`; None where no node is.
@@ -149,15 +140,13 @@ class ModifiedMass:
         Nodes that touch already are not looked at again: a plane's node is below a hollow by the square of its
         slide, and on the plane by round-off (ERRATA to Algorithm 1, which could loop on them).
         """
-        moved = state - touching.seen
-        clearance = touching.clearance - np.sqrt(dot(moved, moved))  # a distance changes by no more than the way
-        looked_at = self.nodes[clearance[self.nodes] <= 0]
-        open_nodes = np.setdiff1d(looked_at, touching.nodes, assume_unique=True)
+        outside = np.ones(len(state), dtype=bool)
+        outside[self.nodes] = self.target.outside(state[self.nodes])
+        outside[touching.nodes] = True
+        open_nodes = np.flatnonzero(~outside)
         gap = self.target.contact(state[open_nodes])
-        clearance[open_nodes] = gap.distance
-        own = touching.own_directions(open_nodes)
-        free_part = np.einsum("kcx,kx->kc", own, gap.normal)
-        new = (gap.distance < -ROUND_OFF * self.target.size) & (dot(free_part, free_part) > SUPPORTED**2)
+        new = gap.distance < -ROUND_OFF * self.target.size
+        new &= touching.free_share(open_nodes, gap.normal) > SUPPORTED
         if not new.any():
             return None
         points = state[open_nodes] - gap.distance[:, None] * gap.normal
@@ -169,8 +158,6 @@ class ModifiedMass:
             np.vstack([touching.points, points[new]]),
             np.vstack([touching.normals, gap.normal[new]]),
             np.append(touching.stuck, sticking),
-            state,
-            clearance,
         )
 
     def released(self, touching: Touching, reactions: Floats) -> tuple[Touching, Floats] | None:
@@ -180,6 +167,8 @@ class ModifiedMass:
 
         reactions : (N, 3) of all supports [N]; a stuck node's lies in its cone, |tangential| <= friction * normal.
         """
+        if not touching.stuck.any():
+            return None
         given = reactions[touching.nodes]
         push = np.maximum(dot(given, touching.normals), 0.0)
         across = given - dot(given, touching.normals)[:, None] * touching.normals
@@ -194,8 +183,41 @@ class ModifiedMass:
     def landed(self, velocity: Floats, touching: Touching) -> Floats:
         """(N, 3) the velocity after the inelastic impact."""
         result, nodes = velocity.copy(), touching.nodes
-        if self.stopped == "wholly" and not self.friction:
+        if self.stops_wholly:
             result[nodes] = 0.0
         else:
             result[nodes] -= dot(velocity[nodes], touching.normals)[:, None] * touching.normals
         return result
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _turn(directions, count, nodes, stuck, along, cosine):  # type: ignore[no-untyped-def]
+    """Reflect the directions of each node so that the last is the free part of the normal `along`; it becomes zero."""
+    part, mirror = np.empty(3), np.empty(3)
+    for m in range(len(nodes)):
+        d, last, length = directions[nodes[m]], count[nodes[m]] - 1, 0.0
+        for c in range(last + 1):
+            part[c] = d[c, 0] * along[m, 0] + d[c, 1] * along[m, 1] + d[c, 2] * along[m, 2]
+            length += part[c] * part[c]
+        cosine[m] = np.sqrt(length)
+        for x in range(3):
+            along[m, x] = 0.0
+            for c in range(last + 1):
+                along[m, x] += part[c] / cosine[m] * d[c, x]
+        if stuck[m]:
+            d[:] = 0.0
+            continue
+        square = 0.0
+        for c in range(last + 1):
+            part[c] /= cosine[m]
+            if c == last:
+                part[c] += -1.0 if part[c] < 0 else 1.0
+            square += part[c] * part[c]
+        for x in range(3):
+            mirror[x] = 0.0
+            for c in range(last + 1):
+                mirror[x] += part[c] * d[c, x]
+        for x in range(3):
+            for c in range(last):
+                d[c, x] -= 2.0 * part[c] / square * mirror[x]
+            d[last, x] = 0.0

@@ -79,7 +79,7 @@ def bound_drape(
         x, y, z = net.min_angle_at
         warnings.append(
             f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
-            "joints there must close far; another anchor or heading may open them"
+            "joints there must close far; another anchor or heading, a smaller part or a seam may open them"
         )
     return Draped(
         method="bound",
@@ -148,7 +148,7 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
     """Where the target curves too sharply for the spacing, which is what stops a bound drape that has a net."""
     curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
     k = int(np.argmax(curvature))
-    radius, (x, y, z) = 1.0 / curvature[k], points[k]
+    radius, (x, y, z) = 1.0 / curvature[k], np.where(np.abs(points[k]) < 1e-6 * target.size, 0.0, points[k])
     if radius > 2 * max(layout.spacing):
         return []
     return [

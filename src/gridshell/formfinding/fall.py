@@ -18,7 +18,7 @@ class Fall:
     coupling : how the rods hold together (shared DOFs, implicit or explicit penalty).
     height : of the flat grid above the target's highest point [m].
     time_step, duration : [s]; None: 10 ms and 6 s on a target of 0.2 m, and as the square root of its size; explicit
-        ties at most six tenths of their step limit. The fall ends when the grid is at rest.
+        ties nine tenths of what they bear whatever touches. The fall ends when the grid is at rest.
     stopped : what an impact takes of a node's velocity, see `ModifiedMass`.
     friction : Coulomb's coefficient between rods and target.
     drag : rate at which all velocities decay [1/s].

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.contact.modified_mass import ModifiedMass, Touching
-from gridshell.errors import ConvergenceError
+from gridshell.errors import ConvergenceError, StabilityError
 from gridshell.formfinding.draped import Draped, smallest_joint_angle
 from gridshell.formfinding.fall import Fall
 from gridshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
@@ -28,21 +28,23 @@ from gridshell.solve.forces import Damping, Gravity
 from gridshell.solve.implicit_euler import Motion
 from gridshell.solve.report import SolveReport, Status
 from gridshell.solve.simulate import simulate
-from gridshell.solve.step_limit import step_limit
+from gridshell.solve.step_limit import NO_NODES, REMEDY, ExplicitTies, step_limit
 from gridshell.solve.summed import narrow_or_dissected
 from gridshell.solve.time_series import End, Moment, TimeSeries
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 STILL = 1e-7  # kinetic energy, of weight times size
 BALANCED = 1e-3  # out-of-balance force on a node, of the weight of the heaviest
 USUAL_STEP = 0.01  # [s] on a target of 0.2 m; times go with the square root of lengths
 USUAL_DURATION = 6.0
 USUAL_SIZE = 0.2  # [m]
-OF_LIMIT = 0.6  # share of the explicit ties' step limit that is taken, below 1/sqrt(2), see `_safe_step`
+OF_LIMIT = 0.9  # share of the step that is taken of what explicit ties bear whatever touches
 UNSTABLE = -1e-3  # [1/s2]: the free turn about the vertical has 0 up to round-off
 CHECKS = 10  # moments between two looks at the rest
+LIMITS = 4  # looks at the rest between two at the step limit
 
 
 def falling_drape(
@@ -60,7 +62,7 @@ def falling_drape(
 
     Raises
     ------
-    StabilityError : the time step is beyond the limit of explicit ties.
+    StabilityError : the time step is beyond the limit of explicit ties, at the start or where the grid has landed.
     ConvergenceError : the first step fails however small. A later one ends the fall, which is then not at rest.
     """
     fall = fall or Fall()
@@ -104,14 +106,16 @@ class _Falling:
 
     def __init__(self, target: Target, shell: Shell, gravity: float, fall: Fall, progress: Progress) -> None:
         massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # linkers' own nodes, too: they fall and land
-        pull = Gravity(massive, (0.0, 0.0, -gravity))
+        every = len(massive) == len(shell.like)  # a slice is faster
+        pull = Gravity(slice(None) if every else massive, (0.0, 0.0, -gravity))
         self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
         self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
         self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)
         self._heaviest = float(-self.load[:, 2].min())
         self._weight = float(-self.load[:, 2].sum())
-        law = ModifiedMass(target, massive, fall.stopped, fall.friction)
-        self.stepper = ContactEuler(law, narrow_or_dissected(shell.places))
+        self._law = ModifiedMass(target, massive, fall.stopped, fall.friction)
+        self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.places))
+        self._ties: ExplicitTies | None = None
 
     def run(self, positions: Floats) -> TimeSeries:
         fall, slowness = self.fall, float(np.sqrt(self.target.size / USUAL_SIZE))
@@ -119,6 +123,7 @@ class _Falling:
         state = self.shell.state(positions, normals=normals)
         step = fall.time_step or min(USUAL_STEP * slowness, self._safe_step(state))
         duration = fall.duration or USUAL_DURATION * slowness
+        self._step = step
         never = int(np.ceil(duration / step)) + 1
         try:
             return simulate(
@@ -137,12 +142,26 @@ class _Falling:
             return error.report  # type: ignore[return-value]
 
     def _safe_step(self, state: Floats) -> float:
-        """A step [s] that explicit ties bear also where touching nodes are stopped.
+        """A step [s] that explicit ties bear whatever touches: without help of the rods, all nodes stopped."""
+        alone = replace(self.motion, elements=())
+        return OF_LIMIT * step_limit(alone, state, stopped=self._stopped(np.arange(len(state))))
 
-        Stopped at each step, a mode x obeys  m (x+ - x) + h^2 ki x+ + h^2 ke x = 0  in place of the equation of
-        `step_limit`, and alternates with growing amplitude from  h^2 (ke - ki) = 2m  on, in place of 4m.
-        """
-        return OF_LIMIT * step_limit(self.motion, state)
+    def _stopped(self, touching: Ints) -> Ints:
+        """Of nodes that touch, those that lose their whole velocity at each step."""
+        return touching if self._law.stops_wholly else NO_NODES
+
+    def _refuse_unstable(self, moment: Moment) -> None:
+        """Raise StabilityError where the explicit ties do not bear the step with what touches now."""
+        free = self.touching.freedom(moment.state)
+        if self._ties is None:
+            self._ties = ExplicitTies(moment.motion, free)
+        self._ties.look(moment.motion, moment.state, free, self._stopped(self.touching.nodes))
+        if self._ties.grows(self._step):
+            raise StabilityError(
+                f"explicit ties are unstable at a time step of {self._step:.4g} s once the grid has landed: at t = "
+                f"{moment.time:.3g} s, {len(self.touching.nodes)} nodes touching, the limit is "
+                f"{self._ties.limit():.4g} s: {REMEDY}"
+            )
 
     def _looking(self) -> Callable[[Moment], bool]:
         """Asked at each step: tells where it is, and from time to time whether it rests."""
@@ -153,6 +172,8 @@ class _Falling:
             count += 1
             if count % CHECKS:
                 return False
+            if moment.motion.explicit and count % (LIMITS * CHECKS) == 0:
+                self._refuse_unstable(moment)
             energy, force = self.activity(moment)
             self._progress("drape", f"falling, t = {moment.time:.3f} s, kinetic energy {energy:.1e} J", force)
             return self.fall.settle and self.rests(energy, force)

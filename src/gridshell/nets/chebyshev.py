@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 
 MARGIN = 2.3  # spacings marched past the end of the target: a cut is interpolated between nodes on both sides
 SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
+LOOSE = 0.05  # spacings: ends known no better than that are warned of
 GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count
 MOST_NODES = 4_000_000
 
@@ -103,8 +104,14 @@ def chebyshev_net(
     angle, where = _smallest_angle(target, fine, inside)
     if degrees(angle) < SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
-    ends, error = _extrapolate(target, lines, (coarse, fine), inside, GRAZING * min(layout.spacing))
+    ends, error, loosest = _extrapolate(target, lines, (coarse, fine), inside, GRAZING * min(layout.spacing))
     rods, dropped, warnings = _name_rods(layout, lines, ends)
+    if error > LOOSE * min(layout.spacing):
+        x, y, z = loosest
+        warnings.append(
+            f"rod ends on the line through ({x:.4g}, {y:.4g}, {z:.4g}) m are known within {error:.3g} m only: the "
+            "target bends too sharply for the steps of the march; use a smaller spacing or shorter edges"
+        )
     _require_length(layout, rods)
     return ChebyshevNet(
         target, layout, rods, (lines.u, lines.v), fine, error, angle, where, tuple(dropped), tuple(warnings)
@@ -215,8 +222,8 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
     x, y, z = where
     return NetLimitError(
         f"no inextensible net covers this target: near ({x:.4g}, {y:.4g}, {z:.4g}) m {what}; "
-        "use a smaller part of the target (a higher base, or seams), or another anchor or heading; a larger spacing does "
-        "not help"
+        "use a smaller part of the target (a higher base, or seams), or another anchor or heading; a larger spacing "
+        "does not help"
     )
 
 
@@ -241,7 +248,8 @@ class _Ends:
 
 def _extrapolate(
     target: Target, lines: _Lines, nets: tuple[Net, Net], inside_fine: NDArray[np.bool_], depth: float
-) -> tuple[_Ends, float]:
+) -> tuple[_Ends, float, Floats]:
+    """The pieces of all lines, the largest error of an end before extrapolation [m], and a point of that line."""
     cuts = []
     for net in nets:
         inside = inside_fine if net is nets[1] else inside_nodes(target, net)
@@ -253,13 +261,16 @@ def _extrapolate(
             )
         )
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
-    error = 0.0
+    error, where, finer = 0.0, net.points[net.origin], (net.points[:, column].transpose(1, 0, 2), net.points[row])
     families = list[list[list[Cut]]]()
-    for coarse, fine in zip(cuts[0], cuts[1], strict=True):
+    for coarse, fine, points in zip(*cuts, finer, strict=True):
         both = [extrapolated(rough, exact, step) for rough, exact in zip(coarse, fine, strict=True)]
         families.append([pieces for pieces, _ in both])
-        error = max([error, *(missed for _, missed in both)])
-    return _Ends(*families), error
+        worst = int(np.argmax([missed for _, missed in both]))
+        if both[worst][1] > error:
+            error, known = both[worst][1], points[worst][np.isfinite(points[worst][:, 0])]
+            where = known[np.argmin(np.abs(target.margin(known)))]
+    return _Ends(*families), error, where
 
 
 def _name_rods(

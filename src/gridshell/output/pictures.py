@@ -180,7 +180,7 @@ def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None
         return
     x, y = view.project(place[None])[0]
     side = -1 if x > view.size[0] / 2 else 1
-    text = f"{gap:+.3g} mm".replace("-", MINUS)
+    text = (f"{gap:+.3g} mm" if abs(gap) < 1e3 else f"{gap:+.0f} mm").replace("-", MINUS)
     _dot(pencil, np.array([x, y]), 6.0, Pen(INK, 1.1))
     anchor = "end" if side < 0 else "start"
     pencil.write(text, (x + 9 * side, y + 7), 13.0, "TITLE", anchor=anchor, bold=True, halo=PAPER)

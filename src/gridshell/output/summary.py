@@ -77,6 +77,8 @@ def _checked(result: dict[str, Any]) -> list[str]:
 
 
 def _mm(metres: float) -> str:
+    if abs(metres) >= 1.0:
+        return f"{metres:.3g} m"
     return f"{1e3 * metres:.3g} mm" if abs(metres) >= 1e-9 else "0 mm"
 
 

@@ -10,6 +10,7 @@ from gridshell.output.wording import millimetres, percent
 ENDS = ("clamped", "pinned")
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
 NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
+SPRUNG = 0.02  # of the target's size: with clamped ends a convex shell leaves a tenth of it
 
 Level = Literal["good", "caution", "bad"]
 
@@ -40,6 +41,9 @@ def verdict(archive: Archive) -> Verdict:
         return Verdict("caution", "Not checked: there is no pop-up in this result", sentences)
     if not all(known):
         return Verdict("caution", "Converged; whether it is stable was not checked", sentences)
+    left = [gap["max_relative"] for gap in entries(result, "agreement").values() if gap.get("max_relative") is not None]
+    if min(left, default=0.0) > SPRUNG:
+        return Verdict("caution", "Converged and stable, but it does not keep to the target", sentences)
     return Verdict("good", "Converged and stable", sentences)
 
 

@@ -57,6 +57,7 @@ def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no
             le2 += s[k] * s[k]
             lf2 += t[k] * t[k]
         le, lf = np.sqrt(le2), np.sqrt(lf2)
+        per_e, per_f = 1.0 / le, 1.0 / lf
         c, apart = 0.0, 0.0
         for k in range(3):
             s[k] /= le
@@ -70,18 +71,19 @@ def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no
         first = -2.0 * scale / (plus * plus)  # dE/dc
         second = 4.0 * scale / (plus * plus * plus)  # d2E/dc2
         for k in range(3):
-            ge[k] = (t[k] - c * s[k]) / le
-            gf[k] = (s[k] - c * t[k]) / lf
+            ge[k] = (t[k] - c * s[k]) * per_e
+            gf[k] = (s[k] - c * t[k]) * per_f
             gradient[i0, k] -= first * ge[k]
             gradient[i1, k] += first * (ge[k] - gf[k])
             gradient[i2, k] += first * gf[k]
         if wanted:
+            per_e2, per_f2, per_ef = per_e * per_e, per_f * per_f, per_e * per_f
             for i in range(3):
                 for j in range(3):
                     one = 1.0 if i == j else 0.0
-                    cee = -(t[i] * s[j] + s[i] * t[j] + c * one - 3.0 * c * s[i] * s[j]) / le2
-                    cff = -(s[i] * t[j] + t[i] * s[j] + c * one - 3.0 * c * t[i] * t[j]) / lf2
-                    cef = (one - s[i] * s[j] - t[i] * t[j] + c * s[i] * t[j]) / (le * lf)
+                    cee = -(t[i] * s[j] + s[i] * t[j] + c * one - 3.0 * c * s[i] * s[j]) * per_e2
+                    cff = -(s[i] * t[j] + t[i] * s[j] + c * one - 3.0 * c * t[i] * t[j]) * per_f2
+                    cef = (one - s[i] * s[j] - t[i] * t[j] + c * s[i] * t[j]) * per_ef
                     hee[i, j] = first * cee + second * ge[i] * ge[j]
                     hff[i, j] = first * cff + second * gf[i] * gf[j]
                     hef[i, j] = first * cef + second * ge[i] * gf[j]

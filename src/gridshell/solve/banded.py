@@ -54,6 +54,9 @@ class Banded:
             self.values = np.zeros((self.size + self.half_bandwidth, width))
             self._work = np.zeros(self.size + self.half_bandwidth + 1)
         self._free: Freedom | None = None
+        self._narrow = np.flatnonzero(free.count < 3)
+        self._axes = np.tile(np.eye(3), (len(free.count), 1, 1))
+        self._plain = np.ones(len(free.count), dtype=bool)
 
     def clear(self) -> None:
         self.values[:] = 0.0
@@ -61,12 +64,15 @@ class Banded:
     def add(self, which: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
         """Add element Hessians (m, 3k, 3k); of `which` set they are does not matter."""
         self._look_at(free)
-        _add(hessians, blocks, self._first, self._count, free.directions, self._along_axes, self.values)
+        _add(hessians, blocks, self._first, self._count, self._axes, self._plain, self.values)
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
-        _add_blocks(diagonal, full, self._first, self._count, free.directions, self.values)
+        self._look_at(free)
+        _add_blocks(diagonal, full, self._first, self._count, self._axes, self._plain, self.values)
 
     def factor(self) -> int:
+        if self._free is not None:
+            _turn_whole(self.values, self.half_bandwidth, self._first[self._whole], self._free.directions[self._whole])
         negative, singular = _factor(self.values, self.size, self.half_bandwidth)
         if singular >= 0:
             block = self._order[np.searchsorted(self._first[self._order], singular, side="right") - 1]
@@ -83,8 +89,13 @@ class Banded:
 
     def _look_at(self, free: Freedom) -> None:
         if free is not self._free:
-            unit = free.directions[:, np.arange(3), np.arange(3)] == 1.0
-            self._along_axes = (unit | (np.arange(3) >= free.count[:, None])).all(axis=1)
+            along = np.einsum("nkk->nk", free.directions) == 1.0
+            narrow = self._narrow
+            turned = ~along.all(axis=1)
+            turned[narrow] = False
+            self._whole = np.flatnonzero(turned)
+            self._plain[narrow] = (along[narrow] | (np.arange(3) >= free.count[narrow, None])).all(axis=1)
+            self._axes[narrow] = free.directions[narrow]
             self._free = free
 
 
@@ -108,8 +119,8 @@ def _reach(blocks: Ints, first: Ints, count: Ints) -> int:
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _add(hessians, blocks, first, count, directions, along_axes, band):  # type: ignore[no-untyped-def]
-    """Add T' H T of every element; T holds the free directions of its blocks as columns.
+def _add(hessians, blocks, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
+    """Add T' H T of every element; T holds the free directions of its blocks as columns, or leaves plain ones alone.
 
     Places are unsigned, which spares the look for negative indices: half of the time.
     """
@@ -117,10 +128,20 @@ def _add(hessians, blocks, first, count, directions, along_axes, band):  # type:
     place, component = np.empty(3 * k, dtype=np.uint64), np.empty(3 * k, dtype=np.uint64)
     turned = np.empty((3 * k, 3 * k))
     for m in range(blocks.shape[0]):
+        at, together = first[blocks[m, 0]], True
+        for a in range(k):
+            i = blocks[m, a]
+            together = together and plain_blocks[i] and count[i] == 3 and first[i] == at + 3 * a
+        if together:  # as of a rod without twist: the rows are pieces of the band's
+            for p in range(3 * k):
+                line, row = band[np.uint64(at + p)], hessians[m, p]
+                for q in range(3 * k - p):
+                    line[q] += row[p + q]
+            continue
         h, size, plain, rising = hessians[m], 0, True, True
         for a in range(k):
             i = blocks[m, a]
-            plain = plain and along_axes[i]
+            plain = plain and plain_blocks[i]
             for c in range(count[i]):
                 place[size], component[size] = first[i] + c, 3 * a + c
                 rising = rising and (size == 0 or place[size] > place[size - 1])
@@ -159,9 +180,13 @@ def _turn(h, blocks, count, directions, turned):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _add_blocks(diagonal, full, first, count, directions, band):  # type: ignore[no-untyped-def]
+def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' (diag(diagonal) + full) T of each block."""
     for i in range(len(diagonal)):
+        if plain_blocks[i] and not len(full):
+            for c in range(count[i]):
+                band[first[i] + c, 0] += diagonal[i, c]
+            continue
         for c in range(count[i]):
             for r in range(c, count[i]):
                 value = 0.0
@@ -173,6 +198,33 @@ def _add_blocks(diagonal, full, first, count, directions, band):  # type: ignore
                 if r == c and directions[i, c, 0] == directions[i, c, 1] == directions[i, c, 2] == 0.0:
                     value = 1.0  # blocked
                 band[first[i] + c, r - c] += value
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
+    """Turn rows and columns of blocks of three unknowns from x, y, z to their directions; blocked ones get a one."""
+    own = np.empty((3, 3))
+    for m in range(len(first)):
+        at, d = first[m], directions[m]
+        for j in range(max(0, at + 2 - b), at):  # to the left; what is coupled to one of the three is so to all
+            row, v0, v1, v2 = band[j], band[j, at - j], band[j, at - j + 1], band[j, at - j + 2]
+            for r in range(3):
+                row[at - j + r] = d[r, 0] * v0 + d[r, 1] * v1 + d[r, 2] * v2
+        for i in range(at + 3, at + b + 1):  # below
+            v0, v1, v2 = band[at, i - at], band[at + 1, i - at - 1], band[at + 2, i - at - 2]
+            for r in range(3):
+                band[at + r, i - at - r] = d[r, 0] * v0 + d[r, 1] * v1 + d[r, 2] * v2
+        for r in range(3):
+            for c in range(r, 3):
+                own[r, c] = own[c, r] = band[at + r, c - r]
+        for r in range(3):
+            for c in range(r, 3):
+                value = 0.0
+                for k in range(3):
+                    value += d[r, k] * (own[k, 0] * d[c, 0] + own[k, 1] * d[c, 1] + own[k, 2] * d[c, 2])
+                band[at + r, c - r] = value
+            if d[r, 0] == d[r, 1] == d[r, 2] == 0.0:
+                band[at + r, 0] = 1.0
 
 
 @nb.njit(cache=True, error_model="numpy")

@@ -34,7 +34,7 @@ P = TypeVar("P", bound=Planes)
 class ContactLaw(Protocol[P]):
     """What `contact.modified_mass.ModifiedMass` offers."""
 
-    def touching(self, supports: Constraint, state: Floats, before: P | None) -> P: ...
+    def touching(self, supports: Constraint, state: Floats) -> P: ...
     def below(self, state: Floats, touching: P) -> P | None: ...
     def released(self, touching: P, reactions: Floats) -> tuple[P, Floats] | None: ...
     def landed(self, velocity: Floats, touching: P) -> Floats: ...
@@ -54,11 +54,11 @@ class ContactEuler:
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
         law = self._law
-        touching = law.touching(motion.constraint_at(time + step), state, self.last)
+        touching = law.touching(motion.constraint_at(time + step), state)
         rubbing = np.zeros_like(state)
+        forces = motion.forces
         iterations = factorizations = 0
         for _ in range(MOST_PASSES):
-            forces = (*motion.forces, PointLoads(touching.nodes, rubbing[touching.nodes]))
             bound = replace(motion, constraint=touching, forces=forces)
             taken = self._euler.take(bound, state, velocity, time=time, step=step)
             factorizations += taken.factorizations
@@ -73,6 +73,7 @@ class ContactEuler:
             if slipping is not None:
                 touching, rubs = slipping
                 rubbing += rubs
+                forces = (*motion.forces, PointLoads(touching.nodes, rubbing[touching.nodes]))
                 continue
             self.last = touching
             landed = law.landed(taken.velocity, touching)

@@ -278,7 +278,7 @@ class _Newton:
         return (state, moved) if back is state else (back, back - self.start)
 
     def _size(self, motion: Floats) -> float:
-        return float(_mass_norm(self.motion.mass, motion))
+        return float(_mass_norm(self.motion.mass.ravel(), motion.ravel()))
 
 
 def _parts(elements: Elements, most: int) -> list[Elements]:
@@ -311,6 +311,5 @@ def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyp
 def _mass_norm(mass, motion):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(len(motion)):
-        for k in range(3):
-            total += mass[i, k] * motion[i, k] * motion[i, k]
+        total += mass[i] * motion[i] * motion[i]
     return np.sqrt(total)

@@ -238,17 +238,17 @@ def _next(problem: Problem, bend_energy: float, state: Floats, axial: Floats, *,
 
 
 def _is_neutral(problem: Problem, found: Equilibrium, bend_energy: float) -> bool:
-    """Whether the one negative mode of an equilibrium is round-off."""
+    """Whether the one negative mode of an equilibrium is round-off: along it the energy does not fall."""
     if found.mode is None or found.report.negative_modes != 1:
         return False
     curvature = 0.0
-    for part in (*found.elements, problem.stretch):
+    for part in (*found.elements, problem.stretch.with_forces(found.forces)):
         width = 3 * part.blocks.shape[1]
         hessians = np.zeros((len(part.blocks), width, width))
         part.evaluate(found.state, np.zeros_like(found.state), hessians)
         along = found.mode[part.blocks].reshape(-1, width)
         curvature += float(np.einsum("mi,mij,mj->", along, hessians, along))
-    return abs(curvature) < NEUTRAL * bend_energy
+    return curvature > -NEUTRAL * bend_energy
 
 
 def _stress_free(element: Elements, state: Floats) -> Elements:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Protocol
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +19,10 @@ class Domain(Protocol):
     @property
     def half_extent(self) -> tuple[float, float]:
         """Half the width along x and along y [m]."""
+        ...
+
+    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+        """(n,) whether the points (n, 2) [m] are inside or on the edge."""
         ...
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
@@ -38,6 +43,9 @@ class Disc:
     def half_extent(self) -> tuple[float, float]:
         return self.radius, self.radius
 
+    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+        return np.asarray(np.hypot(xy[:, 0], xy[:, 1]) <= self.radius)
+
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
         r = np.maximum(np.hypot(xy[:, 0], xy[:, 1]), 1e-300)
         n = xy / r[:, None]
@@ -56,6 +64,9 @@ class EllipseDomain:
     def half_extent(self) -> tuple[float, float]:
         return self.a, self.b
 
+    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+        return np.asarray(np.hypot(xy[:, 0] / self.a, xy[:, 1] / self.b) <= 1.0)
+
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
         axes = np.array([self.a, self.b])
         # closest point: x_k = a_k^2 p_k / (a_k^2 + t) with sum (a_k p_k / (a_k^2 + t))^2 = 1;
@@ -65,14 +76,7 @@ class EllipseDomain:
         low = np.min(axes) ** 2
         shift = axes**2 - low
         t = np.maximum(np.max(axes * p - shift, axis=1), 1e-14 * low)
-        for _ in range(60):
-            denominator = t[:, None] + shift
-            f = np.sum((axes * p / denominator) ** 2, axis=1) - 1.0
-            slope = -2.0 * np.sum((axes * p) ** 2 / denominator**3, axis=1)
-            step = np.where(slope < 0, -f / np.minimum(slope, -1e-300), 0.0)
-            t = np.maximum(t + step, 1e-14 * low)
-            if np.all(np.abs(step) <= 1e-14 * t):
-                break
+        _find_roots(axes * p, shift, 1e-14 * low, t)
         foot = np.where(xy < 0, -1.0, 1.0) * axes**2 * p / (t[:, None] + shift)
         normal = foot / axes**2
         normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
@@ -97,6 +101,9 @@ class Rectangle:
     def half_extent(self) -> tuple[float, float]:
         return self.size[0] / 2, self.size[1] / 2
 
+    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+        return np.asarray((np.abs(xy) <= self.half_extent).all(axis=1))
+
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
         q = np.abs(xy) - np.array(self.half_extent)
         outside = np.maximum(q, 0.0)
@@ -108,6 +115,22 @@ class Rectangle:
         along = np.stack([-n[:, 1], n[:, 0]], axis=1) * np.sign(xy)
         hessian = np.where(bent, 1.0 / np.maximum(corner, 1e-300), 0.0)[:, None, None]
         return d, n * np.where(xy < 0, -1.0, 1.0), hessian * along[:, :, None] * along[:, None, :]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _find_roots(ap, shift, least, t):  # type: ignore[no-untyped-def]
+    """Newton's method on  sum_k (a_k p_k / (t + shift_k))^2 = 1  for each row of ap, in place from below the root."""
+    for n in range(len(t)):
+        for _ in range(60):
+            f, slope = -1.0, 0.0
+            for k in range(2):
+                part = (ap[n, k] / (t[n] + shift[k])) ** 2
+                f += part
+                slope -= 2.0 * part / (t[n] + shift[k])
+            step = -f / min(slope, -1e-300) if slope < 0 else 0.0
+            t[n] = max(t[n] + step, least)
+            if abs(step) <= 1e-14 * t[n]:
+                break
 
 
 def require_positive(name: str, value: float) -> None:

@@ -47,7 +47,8 @@ def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats]
     first = unit(cross(axis, np.array([0.0, 1.0, 0.0]) if abs(axis[0]) > 0.7 else np.array([1.0, 0.0, 0.0])))
     plane = np.stack([first, cross(axis, first)])
     height = RBFInterpolator((around[chosen] - centre) @ plane.T, (around[chosen] - centre) @ axis, kernel="cubic")
-    steps = np.arange(-radius, radius, PITCH * spacing)
+    reach = int(radius / (PITCH * spacing))
+    steps = np.arange(-reach, reach + 1) * PITCH * spacing
     lattice = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     flat = lattice[_enclosed(lattice, (rim - centre) @ plane.T)]
     if len(flat) == 0:

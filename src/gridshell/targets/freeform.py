@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +72,8 @@ class Freeform(Target):
 
     @property
     def name(self) -> str:
-        return str(self.source.get("kind", "mesh"))
+        """Of its file, without the folder, if it has one."""
+        return Path(str(self.source.get("file", self.source.get("kind", "mesh")))).name
 
     @property
     def base(self) -> float | None:

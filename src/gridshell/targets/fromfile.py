@@ -11,15 +11,16 @@ from gridshell.targets.curvefile import read_curves
 from gridshell.targets.freeform import Freeform
 from gridshell.targets.heightgrid import GRID_FILES, read_heights
 from gridshell.targets.meshfile import MESH_FILES, in_metres, read_mesh
-from gridshell.targets.nurbs import NURBS_FILES, read_nurbs
 from gridshell.targets.placement import Placement
+from gridshell.targets.rhino import RHINO_FILES, read_3dm
+from gridshell.targets.step import STEP_FILES, read_step
 from gridshell.units import shown
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 File = str | PathLike[str]
 
-SURFACE_FILES = (*MESH_FILES, *NURBS_FILES)
+SURFACE_FILES = (*MESH_FILES, *RHINO_FILES, *STEP_FILES)
 UNMOVED = Placement()
 
 
@@ -32,12 +33,13 @@ def surface_from(
     boundary: File | None = None,
     placement: Placement = UNMOVED,
 ) -> Freeform:
-    """The surface in an OBJ, STL, PLY, OFF, glTF or 3dm file.
+    """The surface in an OBJ, STL, PLY, OFF, glTF, 3dm or STEP file.
 
     Parameters
     ----------
     unit : length of the file's unit [m]; None where the format has one of its own.
-    name : of the object (3dm: or layer) wanted, where there are several.
+    name : of the object wanted, where there are several (3dm: or of its layer; STEP: of a face or of what it
+        belongs to, or the face's number).
     base : z of a plane under which there is no shell [m], after placement.
     boundary : an OBJ or DXF with closed curves on the surface, in the same unit and placed with it: the longest
         bounds the shell, the others are openings.
@@ -50,11 +52,16 @@ def surface_from(
     curves: list[Floats] = []
     if path.suffix.lower() in MESH_FILES:
         kind, (vertices, faces) = "mesh", read_mesh(path, unit, name)
-    elif path.suffix.lower() in NURBS_FILES:
-        kind, (vertices, faces, trims, own) = "nurbs", read_nurbs(path, name)
+    elif path.suffix.lower() in RHINO_FILES:
+        kind, (vertices, faces, trims, own) = "nurbs", read_3dm(path, name)
         unit = own if unit is None else unit
         vertices = in_metres(vertices, faces, unit, path)
         curves = [trim * (unit or 1.0) for trim in trims]
+    elif path.suffix.lower() in STEP_FILES:
+        if unit is not None:
+            raise InputError(f"{path}: STEP files say their unit: leave it out, or scale the target")
+        kind, (vertices, faces, curves) = "nurbs", read_step(path, name)
+        vertices = in_metres(vertices, faces, 1.0, path)
     else:
         raise InputError(f"{path} is no surface file: give one of {', '.join(SURFACE_FILES)}")
     source: dict[str, object] = {"kind": kind, "unit": unit, "object": name}

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from gridshell.geometry.vectors import dot, unit
 from gridshell.targets.fitting import Samples
-from gridshell.targets.trianglemesh import TriangleMesh
+from gridshell.targets.trianglemesh import TriangleMesh, unique_rows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -61,7 +61,7 @@ def _thinned(points: Floats, normals: Floats, areas: Floats, apart: float) -> Sa
     points, normals, areas = points[sound], normals[sound], areas[sound]
     cell = np.floor((points - points.min(axis=0)) / apart).astype(np.int64)
     facing = (normals @ [0.577, 0.578, 0.579] > 0).astype(np.int64)  # two sheets in one cell stay two
-    _, first, place = np.unique(np.column_stack([cell, facing]), axis=0, return_index=True, return_inverse=True)
+    first, place = unique_rows(np.column_stack([cell, facing]))
     order = np.argsort(first)
-    weight = np.bincount(place.reshape(-1), areas)
+    weight = np.bincount(place, areas)
     return Samples(points[first][order], unit(normals[first][order]), np.maximum(weight, 1e-3 * weight.mean())[order])

@@ -12,21 +12,18 @@ and its gradient and Hessian are exact, which is what Newton needs; a mesh's own
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from gridshell.targets.buckets import Buckets
 from gridshell.targets.target import Floats, Implicit
-
-if TYPE_CHECKING:  # scipy.spatial costs a quarter of a second, and analytic targets do not need it
-    from scipy.spatial import cKDTree
 
 Ints = NDArray[np.intp]
 
-WIDTH = 0.7  # of the spacing of centres: weights of the blend
-NEGLIGIBLE = 20.0  # weights below exp(-20) of the largest change F by less than round-off changes a Newton step
+WIDTH = 0.5  # of the spacing of centres: weights of the blend
+NEGLIGIBLE = 16.0  # weights below exp(-16) of the largest change F by some 1e-10 of the spacing
 TERMS = 10  # of a cubic in two variables
 
 
@@ -50,133 +47,158 @@ class PatchField:
     reach: float
 
     @cached_property
-    def tree(self) -> "cKDTree":
-        from scipy.spatial import cKDTree
+    def buckets(self) -> Buckets:
+        """The centres, to be asked for the nearest."""
+        return Buckets.of(self.centres, self.spacing)
 
-        return cKDTree(self.centres)
+    @property
+    def _radius(self) -> float:
+        """How far from a centre those lie that can matter where it is nearest [m]."""
+        return self.spacing * (1.2 + WIDTH * NEGLIGIBLE**0.5)
 
     @cached_property
     def _near(self) -> tuple[Ints, Ints, Floats]:
         """Centres that can matter where a given one is nearest, nearest first: where each list begins, the lists in
         a row, and how far each centre is from the one whose list it is in [m]."""
-        radius = self.spacing * (1.2 + WIDTH * NEGLIGIBLE**0.5)
-        start, near = flat_lists(self.tree.query_ball_point(self.centres, radius))
-        owner = np.repeat(np.arange(len(self.centres)), np.diff(start))
-        away = np.linalg.norm(self.centres[near] - self.centres[owner], axis=1)
-        order = np.lexsort((away, owner))
-        return start, near[order], away[order]
+        return Buckets.of(self.centres, 0.5 * self._radius).within(self.centres, self._radius, ordered=True)
+
+    @cached_property
+    def _packed(self) -> Floats:
+        """(m, 22) all numbers of each patch in a row: centre, tangents over the spacing, normal, coefficients."""
+        tangents = self.frames[:, :2] / self.spacing
+        return np.hstack([self.centres, tangents.reshape(-1, 6), self.frames[:, 2], self.coefficients])
 
     def nearest(self, x: Floats) -> tuple[Floats, Ints]:
         """Distance (n,) [m] of the points (n, 3) to the nearest centre, and which it is."""
-        distance, index = self.tree.query(x)
-        return np.asarray(distance), np.asarray(index)
+        distance, index = self.buckets.nearest(x)
+        return distance[:, 0], index[:, 0]
 
     def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
         """F, gradient and, unless they are not needed, second derivatives at the points (n, 3)."""
-        known = np.asarray(np.isfinite(x).all(axis=1))
-        distance, nearest = self.nearest(np.where(known[:, None], x, 0.0))
+        distance, nearest = self.nearest(x)
         value, gradient, hessian = np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x) if second else 0, 3, 3))
-        start, near, away = self._near
-        _blend(
-            x, nearest, start, near, away, self.centres, self.frames, self.coefficients, self.spacing,
-            np.empty((2, int(np.diff(start).max()))), second, value, gradient, hessian,
-        )  # fmt: skip
-        value[~known | (distance > self.reach)] = np.nan
+        width2 = (WIDTH * self.spacing) ** 2
+        lists = self._radius, *self._near, self._packed
+        _blend(x, distance, nearest, *lists, width2, second, value, gradient, hessian)
+        value[~(distance <= self.reach)] = np.nan
         return Implicit(value, gradient, hessian)
 
 
-def flat_lists(lists: Any) -> tuple[Ints, Ints]:
-    """Lists in a row: where each begins (n + 1,), and their entries."""
-    start = np.zeros(len(lists) + 1, dtype=np.intp)
-    start[1:] = np.cumsum([len(entries) for entries in lists])
-    return start, np.concatenate([np.asarray(entries, dtype=np.intp) for entries in lists])
+# Places of what is known of four points in one array: what a compiler needs to see to do four sums at once.
+LANES = 4
+_X, _Y, _Z, _LEAST, _MOST, _D, _F, _GX, _GY, _GZ, _AX, _AY, _AZ = range(0, 13 * LANES, LANES)
+_DXX, _DXY, _DXZ, _DYY, _DYZ, _DZZ, _HXX, _HXY, _HXZ, _HYY, _HYZ, _HZZ = range(13 * LANES, 25 * LANES, LANES)
+_ALL = 25 * LANES
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp"})
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _blend(  # type: ignore[no-untyped-def]
-    x, nearest, start, near, away, centres, frames, coefficients,
-    spacing, room, second, value, gradient, hessian,
-):  # fmt: skip
-    """F, its gradient and Hessian. `room` (2, k): weight and Q of the patches that count.
+    x, distance, nearest, radius, start, near, away, packed, width2, second, value, gradient, hessian
+):
+    """F, its gradient and, if `second`, its Hessian, for up to four points at a time that share a list of patches.
 
-    The weights' common factor cancels, so that log w_j = a_j . x + const with a_j = 2 (c_j - c_i) / width^2:
-    grad F = sum w (grad Q + (Q - F) a) / W,
-    hess F = sum w (hess Q + sym(grad Q, a) + (Q - F) a a) / W - sym(grad F, sum w a / W).
+    The weights' common factor cancels, so that log w_j = t_j . x + const with t_j = 2 (c_j - c_i) / width^2:
+    F = N / D, N = sum w Q, D = sum w, grad N = sum w (grad Q + Q t), grad D = sum w t = A,
+    hess N = sum w (hess Q + 2 sym(grad Q, t) + Q t t), hess D = sum w t t.
     """
-    width2 = (WIDTH * spacing) ** 2
-    for n in range(len(x)):
-        i = nearest[n]
-        px, py, pz = x[n, 0], x[n, 1], x[n, 2]
-        least = (px - centres[i, 0]) ** 2 + (py - centres[i, 1]) ** 2 + (pz - centres[i, 2]) ** 2
-        total, f = 0.0, 0.0
-        furthest = np.sqrt(least) + np.sqrt(least + NEGLIGIBLE * width2)  # by the triangle's inequality
-        stop = start[i]
+    work, first = np.zeros(_ALL), 0
+    while first < len(x):
+        i = nearest[first]
+        count, furthest = _take(x, distance, first, packed[i], radius, width2, work)
         for k in range(start[i], start[i + 1]):
             if away[k] > furthest:
                 break
-            stop = k + 1
-            j = near[k]
-            dx, dy, dz = px - centres[j, 0], py - centres[j, 1], pz - centres[j, 2]
-            fade = (dx * dx + dy * dy + dz * dz - least) / width2
-            room[0, k - start[i]] = 0.0
-            if fade < NEGLIGIBLE:
-                e = frames[j]
-                a = (e[0, 0] * dx + e[0, 1] * dy + e[0, 2] * dz) / spacing
-                b = (e[1, 0] * dx + e[1, 1] * dy + e[1, 2] * dz) / spacing
-                c = coefficients[j]
-                q = c[0] + a * (c[1] + a * (c[3] + a * c[6])) + b * (c[2] + b * (c[5] + b * c[9]))
-                q += a * b * (c[4] + a * c[7] + b * c[8])
-                w = np.exp(-fade)
-                room[0, k - start[i]] = w
-                room[1, k - start[i]] = e[2, 0] * dx + e[2, 1] * dy + e[2, 2] * dz - q
-                total += w
-                f += w * room[1, k - start[i]]
-        f /= total
-        gx = gy = gz = ax = ay = az = 0.0
-        hxx = hxy = hxz = hyy = hyz = hzz = 0.0
-        for k in range(start[i], stop):
-            w = room[0, k - start[i]] / total
-            if w > 0.0:
-                j = near[k]
-                dx, dy, dz = px - centres[j, 0], py - centres[j, 1], pz - centres[j, 2]
-                e = frames[j]
-                a = (e[0, 0] * dx + e[0, 1] * dy + e[0, 2] * dz) / spacing
-                b = (e[1, 0] * dx + e[1, 1] * dy + e[1, 2] * dz) / spacing
-                c = coefficients[j]
-                qa = -(c[1] + a * (2 * c[3] + 3 * a * c[6]) + b * (c[4] + 2 * a * c[7] + b * c[8])) / spacing
-                qb = -(c[2] + b * (2 * c[5] + 3 * b * c[9]) + a * (c[4] + 2 * b * c[8] + a * c[7])) / spacing
-                ux = qa * e[0, 0] + qb * e[1, 0] + e[2, 0]
-                uy = qa * e[0, 1] + qb * e[1, 1] + e[2, 1]
-                uz = qa * e[0, 2] + qb * e[1, 2] + e[2, 2]
-                tx = 2 * (centres[j, 0] - centres[i, 0]) / width2
-                ty = 2 * (centres[j, 1] - centres[i, 1]) / width2
-                tz = 2 * (centres[j, 2] - centres[i, 2]) / width2
-                off = room[1, k - start[i]] - f
-                gx += w * (ux + off * tx)
-                gy += w * (uy + off * ty)
-                gz += w * (uz + off * tz)
-                if not second:
-                    continue
-                qaa = -w * (2 * c[3] + 6 * a * c[6] + 2 * b * c[7]) / spacing**2
-                qab = -w * (c[4] + 2 * a * c[7] + 2 * b * c[8]) / spacing**2
-                qbb = -w * (2 * c[5] + 6 * b * c[9] + 2 * a * c[8]) / spacing**2
-                ax += w * tx
-                ay += w * ty
-                az += w * tz
-                mx, my, mz = w * (2 * ux + off * tx), w * (2 * uy + off * ty), w * (2 * uz + off * tz)
-                vx, vy, vz = qaa * e[0, 0] + qab * e[1, 0], qaa * e[0, 1] + qab * e[1, 1], qaa * e[0, 2] + qab * e[1, 2]
-                sx, sy, sz = qab * e[0, 0] + qbb * e[1, 0], qab * e[0, 1] + qbb * e[1, 1], qab * e[0, 2] + qbb * e[1, 2]
-                hxx += vx * e[0, 0] + sx * e[1, 0] + mx * tx
-                hyy += vy * e[0, 1] + sy * e[1, 1] + my * ty
-                hzz += vz * e[0, 2] + sz * e[1, 2] + mz * tz
-                hxy += vx * e[0, 1] + sx * e[1, 1] + 0.5 * (mx * ty + my * tx)
-                hxz += vx * e[0, 2] + sx * e[1, 2] + 0.5 * (mx * tz + mz * tx)
-                hyz += vy * e[0, 2] + sy * e[1, 2] + 0.5 * (my * tz + mz * ty)
-        value[n] = f
-        gradient[n, 0], gradient[n, 1], gradient[n, 2] = gx, gy, gz
-        if not second:
-            continue
-        hessian[n, 0, 0], hessian[n, 1, 1], hessian[n, 2, 2] = hxx - 2 * gx * ax, hyy - 2 * gy * ay, hzz - 2 * gz * az
-        hessian[n, 0, 1] = hessian[n, 1, 0] = hxy - gx * ay - gy * ax
-        hessian[n, 0, 2] = hessian[n, 2, 0] = hxz - gx * az - gz * ax
-        hessian[n, 1, 2] = hessian[n, 2, 1] = hyz - gy * az - gz * ay
+            _add(packed[near[k]], packed[i], width2, second, work)
+        for m in range(count):
+            n, d, f = first + m, work[_D + m], work[_F + m] / work[_D + m]
+            ax, ay, az = work[_AX + m], work[_AY + m], work[_AZ + m]
+            gx, gy, gz = (work[_GX + m] - f * ax) / d, (work[_GY + m] - f * ay) / d, (work[_GZ + m] - f * az) / d
+            value[n] = f
+            gradient[n, 0], gradient[n, 1], gradient[n, 2] = gx, gy, gz
+            if not second:
+                continue
+            hessian[n, 0, 0] = (work[_HXX + m] - f * work[_DXX + m] - 2 * gx * ax) / d
+            hessian[n, 1, 1] = (work[_HYY + m] - f * work[_DYY + m] - 2 * gy * ay) / d
+            hessian[n, 2, 2] = (work[_HZZ + m] - f * work[_DZZ + m] - 2 * gz * az) / d
+            hessian[n, 0, 1] = hessian[n, 1, 0] = (work[_HXY + m] - f * work[_DXY + m] - gx * ay - gy * ax) / d
+            hessian[n, 0, 2] = hessian[n, 2, 0] = (work[_HXZ + m] - f * work[_DXZ + m] - gx * az - gz * ax) / d
+            hessian[n, 1, 2] = hessian[n, 2, 1] = (work[_HYZ + m] - f * work[_DYZ + m] - gy * az - gz * ay) / d
+        first += count
+
+
+@njit(cache=True, error_model="numpy")
+def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-untyped-def]
+    """Begin the sums of the point `first` and of those after it that its list serves: their number, and how far from
+    its patch the furthest lies that counts for one of them, by the triangle's inequality."""
+    work[:] = 0.0
+    count, furthest = 0, 0.0
+    for m in range(LANES):
+        n = min(first + m, len(x) - 1)
+        least = (x[n, 0] - centre[0]) ** 2 + (x[n, 1] - centre[1]) ** 2 + (x[n, 2] - centre[2]) ** 2
+        most = distance[n] ** 2 + NEGLIGIBLE * width2
+        reach = np.sqrt(least) + np.sqrt(most)
+        if m == count and first + m < len(x) and (m == 0 or reach <= radius):
+            count, furthest = m + 1, max(furthest, reach)
+        else:  # a lane to spare
+            n = first
+        work[_X + m], work[_Y + m], work[_Z + m] = x[n, 0], x[n, 1], x[n, 2]
+        work[_LEAST + m], work[_MOST + m] = least, (most - least) / width2
+    return count, furthest
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
+    """One patch's part of the sums of four points; see `PatchField._packed` for its numbers."""
+    x, y, z = p[0], p[1], p[2]
+    tx, ty, tz = (x - centre[0]) * 2 / width2, (y - centre[1]) * 2 / width2, (z - centre[2]) * 2 / width2
+    e0, e1, e2, e3, e4, e5, n0, n1, n2 = p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = p[12], p[13], p[14], p[15], p[16], p[17], p[18], p[19], p[20], p[21]
+    for m in range(LANES):
+        dx, dy, dz = work[_X + m] - x, work[_Y + m] - y, work[_Z + m] - z
+        fade = (dx * dx + dy * dy + dz * dz - work[_LEAST + m]) / width2
+        w = _exponential(fade) if fade < work[_MOST + m] else 0.0
+        a, b = e0 * dx + e1 * dy + e2 * dz, e3 * dx + e4 * dy + e5 * dz
+        q = c0 + a * (c1 + a * (c3 + a * c6)) + b * (c2 + b * (c5 + b * c9)) + a * b * (c4 + a * c7 + b * c8)
+        q = w * (n0 * dx + n1 * dy + n2 * dz - q)
+        qa = w * (c1 + a * (2 * c3 + 3 * a * c6) + b * (c4 + 2 * a * c7 + b * c8))
+        qb = w * (c2 + b * (2 * c5 + 3 * b * c9) + a * (c4 + 2 * b * c8 + a * c7))
+        ux, uy, uz = w * n0 - qa * e0 - qb * e3, w * n1 - qa * e1 - qb * e4, w * n2 - qa * e2 - qb * e5
+        work[_D + m] += w
+        work[_F + m] += q
+        work[_GX + m] += ux + q * tx
+        work[_GY + m] += uy + q * ty
+        work[_GZ + m] += uz + q * tz
+        work[_AX + m] += w * tx
+        work[_AY + m] += w * ty
+        work[_AZ + m] += w * tz
+        if second:
+            qaa, qbb = w * (2 * c3 + 6 * a * c6 + 2 * b * c7), w * (2 * c5 + 6 * b * c9 + 2 * a * c8)
+            qab = w * (c4 + 2 * a * c7 + 2 * b * c8)
+            mx, my, mz = 2 * ux + q * tx, 2 * uy + q * ty, 2 * uz + q * tz
+            vx, vy, vz = qaa * e0 + qab * e3, qaa * e1 + qab * e4, qaa * e2 + qab * e5
+            sx, sy, sz = qab * e0 + qbb * e3, qab * e1 + qbb * e4, qab * e2 + qbb * e5
+            work[_DXX + m] += w * tx * tx
+            work[_DXY + m] += w * tx * ty
+            work[_DXZ + m] += w * tx * tz
+            work[_DYY + m] += w * ty * ty
+            work[_DYZ + m] += w * ty * tz
+            work[_DZZ + m] += w * tz * tz
+            work[_HXX + m] += mx * tx - vx * e0 - sx * e3
+            work[_HYY + m] += my * ty - vy * e1 - sy * e4
+            work[_HZZ + m] += mz * tz - vz * e2 - sz * e5
+            work[_HXY + m] += 0.5 * (mx * ty + my * tx) - vx * e1 - sx * e4
+            work[_HXZ + m] += 0.5 * (mx * tz + mz * tx) - vx * e2 - sx * e5
+            work[_HYZ + m] += 0.5 * (my * tz + mz * ty) - vy * e2 - sy * e5
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _exponential(fade):  # type: ignore[no-untyped-def]
+    """exp(-fade) by arithmetic alone, to 1e-9 up to a fade of 16: the series of its 64th root, squared six times."""
+    y = fade / -64.0
+    root = 1.0 + y * (1.0 + y / 2 * (1.0 + y / 3 * (1.0 + y / 4 * (1.0 + y / 5 * (1.0 + y / 6 * (1.0 + y / 7))))))
+    root *= root
+    root *= root
+    root *= root
+    root *= root
+    root *= root
+    return root * root

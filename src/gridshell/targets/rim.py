@@ -4,22 +4,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from gridshell.geometry.curves import on_curve
 from gridshell.geometry.vectors import cross, dot, unit
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 CORNER = 0.5  # cosine of 60 degrees between edges of a loop: it is not rounded there
 POINTS = 1500  # on each loop
+IN_A_BALL = 32  # of these
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,26 +56,66 @@ class Rim:
         return result
 
     @cached_property
-    def _tree(self) -> "cKDTree":
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.points)
+    def _balls(self) -> tuple[Ints, Floats, Floats]:
+        """Balls around a few points in a row each: where these begin (k + 1,), centres (k, 3) and radii (k,) [m]."""
+        start = np.append(np.arange(0, len(self.points), IN_A_BALL), len(self.points))
+        parts = [self.points[a:b] for a, b in pairwise(start.tolist())]
+        centres = np.array([part.mean(axis=0) for part in parts])
+        radii = [np.linalg.norm(part - centre, axis=1).max() for part, centre in zip(parts, centres, strict=True)]
+        return start, centres, np.array(radii)
 
     def distance(self, x: Floats) -> Floats:
         """Signed distance (n,) of points near the surface to the nearest loop [m], positive inside."""
-        nearest = self._tree.query(x)[1]
-        start = np.stack([nearest, self._before[nearest]])
-        a, b = self.points[start], self.points[self.after[start]]
-        along = b - a
-        share = np.clip(np.einsum("kni,kni->kn", x - a, along) / np.einsum("kni,kni->kn", along, along), 0.0, 1.0)
-        off = x - a - share[..., None] * along
-        which = np.argmin(np.einsum("kni,kni->kn", off, off), axis=0)
-        pick = np.arange(len(x))
-        edge, share, off = start[which, pick], share[which, pick], off[which, pick]
-        inward = self.inward[edge]
-        for at_end, neighbour in ((share <= 0.0, self._before), (share >= 1.0, self.after)):
-            inward = np.where(at_end[:, None], inward + self.inward[neighbour[edge]], inward)  # beside a corner
-        return dot(off, inward) / np.linalg.norm(inward, axis=1)
+        result = np.empty(len(x))
+        _distance(x, self.points, self.inward, self.after, self._before, *self._balls, result)
+        return result
+
+
+@njit(cache=True, error_model="numpy")
+def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
+    """From the edge that is nearest of those two that meet in the nearest point; beside a corner both count."""
+    nearest = 0
+    for n in range(len(x)):
+        px, py, pz = x[n, 0], x[n, 1], x[n, 2]
+        # where the last point's nearest is near too, most balls are too far away to be looked into
+        least = _square(px, py, pz, points, nearest)
+        far = np.sqrt(least)
+        for ball in range(len(radii)):
+            if _square(px, py, pz, centres, ball) < (far + radii[ball]) ** 2:
+                for k in range(start[ball], start[ball + 1]):
+                    square = _square(px, py, pz, points, k)
+                    if square < least:
+                        least, nearest = square, k
+                far = np.sqrt(least)
+        least, edge, along = np.inf, nearest, 0.0
+        for k in (nearest, before[nearest]):
+            ex, ey, ez = _edge(points, k, after[k])
+            share = (px - points[k, 0]) * ex + (py - points[k, 1]) * ey + (pz - points[k, 2]) * ez
+            share = min(max(share / (ex * ex + ey * ey + ez * ez), 0.0), 1.0)
+            square = _square(px - share * ex, py - share * ey, pz - share * ez, points, k)
+            if square < least:
+                least, edge, along = square, k, share
+        ex, ey, ez = _edge(points, edge, after[edge])
+        ix, iy, iz = inward[edge]
+        if along <= 0.0 or along >= 1.0:
+            beside = before[edge] if along <= 0.0 else after[edge]
+            ix, iy, iz = ix + inward[beside, 0], iy + inward[beside, 1], iz + inward[beside, 2]
+        ox, oy, oz = (
+            px - along * ex - points[edge, 0],
+            py - along * ey - points[edge, 1],
+            pz - along * ez - points[edge, 2],
+        )
+        result[n] = (ox * ix + oy * iy + oz * iz) / np.sqrt(ix * ix + iy * iy + iz * iz)
+
+
+@njit(cache=True)
+def _square(px, py, pz, points, k):  # type: ignore[no-untyped-def]
+    return (px - points[k, 0]) ** 2 + (py - points[k, 1]) ** 2 + (pz - points[k, 2]) ** 2
+
+
+@njit(cache=True)
+def _edge(points, k, after):  # type: ignore[no-untyped-def]
+    return points[after, 0] - points[k, 0], points[after, 1] - points[k, 1], points[after, 2] - points[k, 2]
 
 
 def _rounded(loop: Floats) -> Floats:

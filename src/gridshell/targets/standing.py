@@ -34,6 +34,11 @@ class Standing(Target):
             return x[:, 2] - self.base
         return -self.plan.distance(x[:, :2])[0]
 
+    def outside(self, x: Floats) -> NDArray[np.bool_]:
+        """(n,) points that are outside the body, as far as signs alone tell."""
+        over, beside = self.level(x)[0] > 0, ~self.plan.holds(x[:, :2])
+        return over | beside if self.base is None else np.where(x[:, 2] < self.base, beside, over)
+
     def contact(self, x: Floats) -> Gap:
         """Signed distance (n,) to the body that a falling grid meets: surface, and wall below its rim."""
         y = self.closest(x)
@@ -42,16 +47,19 @@ class Standing(Target):
         hessian = offset_shape(shape, distance)
         ended = ~(self.margin(y) >= 0)
         # beside the wall, which stands under the base or the rim, the nearer of surface and wall counts
-        low = np.flatnonzero(distance < 0 if self.base is None else x[:, 2] < self.base)
-        across, from_surface = self.plan.distance(x[low, :2])[0], distance[low]
-        ended[low] |= np.where(from_surface < 0, across > from_surface, across < from_surface)
-        if ended.any():
-            distance[ended], n[ended], hessian[ended] = self._wall(x[ended], ~(distance[ended] <= 0))
+        low = distance < 0 if self.base is None else x[:, 2] < self.base
+        near = np.flatnonzero(ended | low)
+        if len(near):
+            edge, from_surface = self.plan.distance(x[near, :2]), distance[near]
+            nearer = np.where(from_surface < 0, edge[0] > from_surface, edge[0] < from_surface)
+            which = np.flatnonzero(ended[near] | (low[near] & nearer))
+            at, beside = near[which], Gap(*(one[which] for one in edge))
+            distance[at], n[at], hessian[at] = self._wall(x[at], beside, ~(distance[at] <= 0))
         return Gap(distance, n, hessian)
 
-    def _wall(self, x: Floats, over: NDArray[np.bool_]) -> Gap:
-        """The wall under the rim, or its upper corner; `over`: above the continued surface."""
-        across, normal, bend = self.plan.distance(x[:, :2])
+    def _wall(self, x: Floats, beside: Gap, over: NDArray[np.bool_]) -> Gap:
+        """The wall under the rim, or its upper corner; `beside`: the plan's edge; `over`: above the surface."""
+        across, normal, bend = beside
         foot = x[:, :2] - across[:, None] * normal
         rim = np.full(len(x), self.base) if self.base is not None else self.height(foot)
         n = np.column_stack([normal, np.zeros(len(x))])

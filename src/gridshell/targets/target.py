@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError
+from gridshell.targets.closest import newton_to_closest, shape_operators
 
 Floats = NDArray[np.float64]
 
@@ -103,35 +104,46 @@ class Target(ABC):
     def on_surface(self, x: Floats) -> Gap:
         """Normal and shape operator at points (n, 3) that lie on the surface; the distance is taken as 0."""
         _, gradient, hessian = self.implicit(x)
-        return Gap(np.zeros(len(x)), *_normal_and_shape(gradient, hessian))
+        normal, shape = np.empty_like(gradient), np.empty_like(hessian)
+        shape_operators(gradient, hessian, normal, shape)
+        return Gap(np.zeros(len(x)), normal, shape)
 
     def closest(self, x: Floats) -> Floats:
         """Closest points (n, 3) of the continued surface [m]; a local minimum beyond a centre of curvature."""
+        return self._closest(x)[0]
+
+    def _closest(self, x: Floats) -> tuple[Floats, Floats]:
+        """Closest points (n, 3), and the gradient there but for an error like theirs before the last step."""
         with np.errstate(all="ignore"):  # NaN, far out where the surface has no continuation
-            y = self.retract(x)
+            y, gradient = self.retract(x, 1), np.empty_like(x)
             left = np.arange(len(x))
             for _ in range(12):
-                step, convex = self._newton_to_closest(x[left], y[left], 0.0)
+                step, convex, gradient[left] = self._newton_to_closest(x[left], y[left])
                 length = np.linalg.norm(step, axis=1)
                 y[left] += step * np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
                 left = left[~(convex & (length <= NEARLY * self.size))]
                 if len(left) == 0:
-                    return y
+                    return y, gradient
             y[left] = self._descend_to_closest(x[left])
-            return y
+            gradient[left] = self.level(y[left])[1]
+            return y, gradient
 
-    def _newton_to_closest(self, x: Floats, y: Floats, damping: float | Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """One step (n, 3) of Newton on y + F'(y) t = x, F(y) = 0; and whether the distance is convex at y."""
-        value, gradient, hessian = self.implicit(y)
-        damped = np.broadcast_to(damping, len(x))
-        return _closest_step(x, y, value, gradient, hessian, damped)
+    def _newton_to_closest(
+        self, x: Floats, y: Floats, damping: Floats | None = None
+    ) -> tuple[Floats, NDArray[np.bool_], Floats]:
+        """One step (n, 3) of Newton from y towards the points closest to x, whether the distance is convex at y, and
+        the gradient there."""
+        step, convex = np.empty_like(x), np.empty(len(x), dtype=bool)
+        at = self.implicit(y)
+        newton_to_closest(x, y, *at, np.zeros(len(x)) if damping is None else damping, step, convex)
+        return step, convex, at.gradient
 
     def _descend_to_closest(self, x: Floats) -> Floats:
         """The same with steps that are damped until they lead closer: for points beyond a centre of curvature."""
         y = self.retract(x, 20)
         damping = np.ones(len(x))
         for _ in range(60):
-            step, convex = self._newton_to_closest(x, y, damping)
+            step, convex, _ = self._newton_to_closest(x, y, damping)
             trial = self.retract(y + step)
             nearer = convex & (np.linalg.norm(x - trial, axis=1) < np.linalg.norm(x - y, axis=1))
             y[nearer] = trial[nearer]
@@ -139,17 +151,27 @@ class Target(ABC):
             if np.all(~nearer & (damping > 1e3)):
                 break
         for _ in range(2):  # comparing distances finds a minimum to half the digits only
-            step, convex = self._newton_to_closest(x, y, 0.0)
+            step, convex, _ = self._newton_to_closest(x, y)
             near = convex & (np.linalg.norm(step, axis=1) < 1e-3 * self.size)
             y[near] += step[near]
         return y
 
+    def distance(self, x: Floats) -> Floats:
+        """Signed distance (n,) of the points (n, 3) to the continued surface, positive outside [m]."""
+        y, gradient = self._closest(x)
+        away = x - y
+        return np.copysign(np.linalg.norm(away, axis=1), np.einsum("ij,ij->i", away, gradient))
+
     def gap(self, x: Floats) -> Gap:
-        """Signed distance of the points (n, 3) to the continued surface, positive outside [m]."""
+        """As `distance`, with its gradient and Hessian."""
         y = self.closest(x)
         _, n, shape = self.on_surface(y)
         distance = np.einsum("ij,ij->i", x - y, n)
         return Gap(distance, n, offset_shape(shape, distance))
+
+    def outside(self, x: Floats) -> NDArray[np.bool_]:
+        """(n,) points that are outside the body of `contact` as far as signs alone tell; of others it knows."""
+        return np.zeros(len(x), dtype=bool)
 
     def contact(self, x: Floats) -> Gap:
         """Signed distance (n,) to the body that a falling grid meets.
@@ -175,27 +197,6 @@ class Target(ABC):
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _normal_and_shape(gradient, hessian):  # type: ignore[no-untyped-def]
-    """Unit normals n (m, 3), and (m, 3, 3) P H P / |grad F| with P = 1 - n n'."""
-    normal, shape = np.empty_like(gradient), np.empty_like(hessian)
-    for m in range(len(gradient)):
-        g, n, h, s = gradient[m], normal[m], hessian[m], shape[m]
-        length = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-        across = 0.0
-        for i in range(3):
-            n[i] = g[i] / length
-        for i in range(3):
-            for j in range(3):
-                across += n[i] * h[i, j] * n[j]
-        for i in range(3):
-            hn_i = h[i, 0] * n[0] + h[i, 1] * n[1] + h[i, 2] * n[2]
-            for j in range(3):
-                hn_j = h[j, 0] * n[0] + h[j, 1] * n[1] + h[j, 2] * n[2]
-                s[i, j] = (h[i, j] - hn_i * n[j] - n[i] * hn_j + across * n[i] * n[j]) / length
-    return normal, shape
-
-
-@nb.njit(cache=True, error_model="numpy")
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
     """Hessians (n, 3, 3) of the distance at points `distance` (n,) away from a surface: S (I + d S)^-1."""
     result, a, adjugate = np.empty_like(shape), np.empty((3, 3)), np.empty((3, 3))
@@ -215,59 +216,3 @@ def offset_shape(shape: Floats, distance: Floats) -> Floats:
                     total += shape[m, i, k] * adjugate[k, j]
                 result[m, i, j] = total / volume
     return result
-
-
-@nb.njit(cache=True, error_model="numpy")
-def _closest_step(x, y, value, gradient, hessian, damping):  # type: ignore[no-untyped-def]
-    """See `Target._newton_to_closest`. A singular system (a centre of curvature) takes its least-squares solution."""
-    step, convex = np.empty_like(x), np.empty(len(x), dtype=np.bool_)
-    system, right = np.zeros((4, 4)), np.empty(4)
-    for m in range(len(x)):
-        g = gradient[m]
-        square, t = 0.0, 0.0
-        for i in range(3):
-            square += g[i] * g[i]
-            t += (x[m, i] - y[m, i]) * g[i]
-        t /= square
-        trace, normal = 0.0, 0.0
-        for i in range(3):
-            right[i] = x[m, i] - y[m, i] - t * g[i]
-            system[i, 3] = system[3, i] = g[i]
-            for j in range(3):
-                system[i, j] = t * hessian[m, i, j] + (1.0 + damping[m] if i == j else 0.0)
-                normal += g[i] * system[i, j] * g[j]
-            trace += system[i, i]
-        right[3] = -value[m]
-        both = trace - normal / square  # sum of the two tangential eigenvalues; the determinant's sign their product's
-        solution, determinant = _solve(system, right)
-        convex[m] = determinant < 0.0 and both > 0.0
-        step[m] = solution[:3] if determinant != 0.0 else (np.linalg.pinv(system) @ right)[:3]
-    return step, convex
-
-
-@nb.njit(cache=True, error_model="numpy")
-def _solve(system, right):  # type: ignore[no-untyped-def]
-    """Elimination with pivoting; also the determinant."""
-    a, b, determinant = system.copy(), right.copy(), 1.0
-    n = len(b)
-    for k in range(n):
-        p = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[p, k]):
-                p = i
-        if p != k:
-            determinant = -determinant
-            b[k], b[p] = b[p], b[k]
-            for j in range(n):
-                a[k, j], a[p, j] = a[p, j], a[k, j]
-        determinant *= a[k, k]
-        for i in range(k + 1, n):
-            factor = a[i, k] / a[k, k]
-            for j in range(k, n):
-                a[i, j] -= factor * a[k, j]
-            b[i] -= factor * b[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            b[k] -= a[k, j] * b[j]
-        b[k] /= a[k, k]
-    return b, determinant

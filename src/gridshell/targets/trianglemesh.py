@@ -125,17 +125,30 @@ def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
     if not extent > 0:
         raise InputError(f"{name} has no extent: all its vertices coincide")
     rounded = np.round((vertices[used] - vertices[used].min(axis=0)) / (WELD * extent)).astype(np.int64)
-    _, first, place = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    first, place = unique_rows(rounded)
     number = np.zeros(len(vertices), dtype=np.intp)
-    number[used] = place.reshape(-1)
+    number[used] = place
     faces = number[faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
-    _, once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    once, _ = unique_rows(np.sort(faces, axis=1))
     mesh = TriangleMesh(vertices[used][first], faces[np.sort(once)])
     if len(mesh.faces) == 0 or mesh.areas.sum() < 1e-9 * extent**2:
         raise InputError(f"{name} has no area: all its faces are degenerate")
     return mesh
+
+
+def unique_rows(rows: NDArray[np.int64]) -> tuple[Ints, Ints]:
+    """Of rows (n, k) of integers from 0 on: the first of each kind (m,), and of which kind each is (n,)."""
+    key, kinds = np.zeros(len(rows), dtype=np.int64), 1
+    for column in rows.T:
+        more = int(column.max(initial=0)) + 1
+        if kinds * more >= 2**63:
+            key = np.unique(key, return_inverse=True)[1].reshape(-1)
+            kinds = int(key.max()) + 1
+        key, kinds = key * more + column, kinds * more
+    _, first, kind = np.unique(key, return_index=True, return_inverse=True)
+    return first, kind.reshape(-1)
 
 
 def _edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:

@@ -1,0 +1,203 @@
+"""Neighbours of points: points of a surface in the cells of a lattice, looked up by compiled loops.
+
+Points of a surface lie evenly, which is all that a lattice of cells needs to beat a tree.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+MOST_CELLS = 64  # for each point
+
+
+@dataclass(frozen=True, eq=False)
+class Buckets:
+    """Points (n, 3) sorted into cells.
+
+    Parameters
+    ----------
+    low : (3,) corner of the first cell [m]; shape : (3,) number of cells; cell : their width [m].
+    start : where the points of each cell begin in `order`, cells counted with z fastest; order : (n,) points by cell.
+    """
+
+    points: Floats
+    low: Floats
+    shape: Ints
+    cell: float
+    start: Ints
+    order: Ints
+
+    @staticmethod
+    def of(points: Floats, cell: float) -> "Buckets":
+        """Into cells of the width `cell` [m], or wider ones where there would be too many."""
+        low, shape, cell = _lattice_over(points, cell)
+        return Buckets(points, low, shape, cell, *_sorted(points, low, shape, cell))
+
+    @property
+    def _lattice(self) -> tuple[Floats, Floats, Ints, float, Ints, Ints]:
+        return self.points, self.low, self.shape, self.cell, self.start, self.order
+
+    def nearest(self, x: Floats, count: int = 1, limit: float = np.inf) -> tuple[Floats, Ints]:
+        """Distances and indices (n, count) of the points nearest to each of (n, 3), nearest first.
+
+        Those further than `limit` [m] need not be found; their distance is then infinite.
+        """
+        distance, index = np.full(len(x) * count, np.inf), np.zeros(len(x) * count, dtype=np.intp)
+        _nearest(x, *self._lattice, count, limit, distance, index)
+        return np.sqrt(distance).reshape(-1, count), index.reshape(-1, count)
+
+    def within(self, x: Floats, radius: float, *, ordered: bool = False) -> tuple[Ints, Ints, Floats]:
+        """Points within `radius` [m] of each of (m, 3), nearest first if `ordered`.
+
+        Returns where each list begins (m + 1,), the lists in a row, and how far these points are [m].
+        """
+        most = _most_within(x, *self._lattice, radius)
+        begin, near, away = np.zeros(len(x) + 1, dtype=np.intp), np.empty(most, dtype=np.intp), np.empty(most)
+        _within(x, *self._lattice, radius, ordered, begin, near, away)
+        return begin, near[: begin[-1]], away[: begin[-1]]
+
+    def spread(self, distance: float) -> Ints:
+        """Indices of points no two of which are closer than `distance` [m], every other being closer to one."""
+        free = np.ones(len(self.points), dtype=bool)
+        _thin(*self._lattice, distance, free)
+        return np.flatnonzero(free)
+
+
+@njit(cache=True)
+def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
+    """Corner, number of cells each way, and their width, for a lattice that holds all points."""
+    low, high = points[0].copy(), points[0].copy()
+    for n in range(len(points)):
+        for k in range(3):
+            low[k], high[k] = min(low[k], points[n, k]), max(high[k], points[n, k])
+    while True:
+        shape = np.floor((high - low) / cell) + 1.0
+        if shape[0] * shape[1] * shape[2] <= MOST_CELLS * len(points):
+            return low, shape.astype(np.intp), cell
+        cell *= 1.3
+
+
+@njit(cache=True)
+def _sorted(points, low, shape, cell):  # type: ignore[no-untyped-def]
+    """Points counted into their cells."""
+    own = np.zeros(len(points), dtype=np.intp)
+    start = np.zeros(shape[0] * shape[1] * shape[2] + 1, dtype=np.intp)
+    for n in range(len(points)):
+        for k in range(3):
+            own[n] = own[n] * shape[k] + int(np.floor((points[n, k] - low[k]) / cell))
+        start[own[n] + 1] += 1
+    for k in range(1, len(start)):
+        start[k] += start[k - 1]
+    place, order = start[:-1].copy(), np.empty(len(points), dtype=np.intp)
+    for n in range(len(points)):
+        order[place[own[n]]] = n
+        place[own[n]] += 1
+    return start, order
+
+
+@njit(cache=True)
+def _box(x, n, low, shape, cell, reach):  # type: ignore[no-untyped-def]
+    """First and last cell plus one along x, y and z, of those up to `reach` cells from that of the n-th point."""
+    i, j, k = (
+        int(np.floor((x[n, 0] - low[0]) / cell)), int(np.floor((x[n, 1] - low[1]) / cell)),
+        int(np.floor((x[n, 2] - low[2]) / cell)),
+    )  # fmt: skip
+    k_from, k_stop = max(k - reach, 0), max(min(k + reach + 1, shape[2]), 0)
+    i_from = max(i - reach, 0) if k_from < k_stop else shape[0]
+    return i_from, min(i + reach + 1, shape[0]), max(j - reach, 0), min(j + reach + 1, shape[1]), k_from, k_stop
+
+
+@njit(cache=True)
+def _square(x, n, points, c):  # type: ignore[no-untyped-def]
+    """Of the distance between the n-th and the c-th point."""
+    return (x[n, 0] - points[c, 0]) ** 2 + (x[n, 1] - points[c, 1]) ** 2 + (x[n, 2] - points[c, 2]) ** 2
+
+
+@njit(cache=True)
+def _keep(distance, index, first, last, d, c):  # type: ignore[no-untyped-def]
+    """Insert c at the distance d into the places `first` to `last`, which are in order; the last is given up."""
+    k = last
+    while k > first and distance[k - 1] > d:
+        distance[k], index[k] = distance[k - 1], index[k - 1]
+        k -= 1
+    distance[k], index[k] = d, c
+
+
+@njit(cache=True)
+def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, index):  # type: ignore[no-untyped-def]
+    """Squares of distances. What lies within as many widths as there are cells looked at each way is nearest."""
+    for n in range(len(x)):
+        if not np.isfinite(x[n, 0] + x[n, 1] + x[n, 2]):
+            continue
+        first, last = n * count, (n + 1) * count - 1
+        reach, found = 1, False
+        while not found and (2 * reach + 1) ** 2 < len(points):  # to look into more rows of cells would be slower
+            distance[first : last + 1] = np.inf
+            i_from, i_stop, j_from, j_stop, k_from, k_stop = _box(x, n, low, shape, cell, reach)
+            for i in range(i_from, i_stop):
+                for j in range(j_from, j_stop):
+                    row = (i * shape[1] + j) * shape[2]
+                    for q in range(start[row + k_from], start[row + k_stop]):
+                        d = _square(x, n, points, order[q])
+                        if d < distance[last]:
+                            _keep(distance, index, first, last, d, order[q])
+            found = reach * cell >= min(limit, np.sqrt(distance[last]))
+            reach *= 2
+        if not found:
+            distance[first : last + 1] = np.inf
+            for c in range(len(points)):
+                d = _square(x, n, points, c)
+                if d < distance[last]:
+                    _keep(distance, index, first, last, d, c)
+
+
+@njit(cache=True)
+def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ignore[no-untyped-def]
+    """How many entries all lists together cannot exceed."""
+    count, reach = 0, int(np.ceil(radius / cell))
+    for n in range(len(x)):
+        i_from, i_stop, j_from, j_stop, k_from, k_stop = _box(x, n, low, shape, cell, reach)
+        for i in range(i_from, i_stop):
+            for j in range(j_from, j_stop):
+                row = (i * shape[1] + j) * shape[2]
+                count += start[row + k_stop] - start[row + k_from]
+    return count
+
+
+@njit(cache=True)
+def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, near, away):  # type: ignore[no-untyped-def]
+    """List the neighbours one after the other, where each list begins in `begin` (n + 1,)."""
+    reach = int(np.ceil(radius / cell))
+    for n in range(len(x)):
+        last = begin[n]
+        i_from, i_stop, j_from, j_stop, k_from, k_stop = _box(x, n, low, shape, cell, reach)
+        for i in range(i_from, i_stop):
+            for j in range(j_from, j_stop):
+                row = (i * shape[1] + j) * shape[2]
+                for q in range(start[row + k_from], start[row + k_stop]):
+                    d = _square(x, n, points, order[q])
+                    if d <= radius * radius:
+                        _keep(away, near, begin[n] if ordered else last, last, np.sqrt(d), order[q])
+                        last += 1
+        begin[n + 1] = last
+
+
+@njit(cache=True)
+def _thin(points, low, shape, cell, start, order, distance, free):  # type: ignore[no-untyped-def]
+    """Each point in turn that is still free takes the later ones that are too close to it."""
+    reach = int(np.ceil(distance / cell))
+    for n in range(len(points)):
+        if not free[n]:
+            continue
+        i_from, i_stop, j_from, j_stop, k_from, k_stop = _box(points, n, low, shape, cell, reach)
+        for i in range(i_from, i_stop):
+            for j in range(j_from, j_stop):
+                row = (i * shape[1] + j) * shape[2]
+                for q in range(start[row + k_from], start[row + k_stop]):
+                    if order[q] > n and _square(points, n, points, order[q]) <= distance * distance:
+                        free[order[q]] = False

@@ -1,0 +1,42 @@
+"""Points of NURBS surfaces against closed forms."""
+
+import numpy as np
+import pytest
+
+from gridshell.targets.nurbs import Nurbs, splines
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 5])
+def test_splines_sum_to_one_and_reproduce_their_parameter(degree):
+    """Greville's abscissae as coefficients give back t, on knots of any multiplicity, up to both ends."""
+    knots = np.concatenate([[0.0] * (degree + 1), [0.3, 0.5, 0.5, 0.9], [2.0] * (degree + 1)])
+    t = np.linspace(0, 2, 41)
+    values = splines(knots, degree, t)
+    greville = np.array([knots[k + 1 : k + degree + 1].mean() for k in range(len(knots) - degree - 1)])
+    assert values.min() >= 0
+    assert values.sum(axis=1) == pytest.approx(1.0, abs=1e-14)
+    assert values @ greville == pytest.approx(t, abs=1e-14)
+
+
+def test_a_cubic_spline_is_that_of_its_truncated_powers():
+    """On uniform knots B(t) = sum (-1)^k C(4, k) (t - k)+^3 / 6."""
+    t = np.linspace(3, 4, 11)
+    middle = splines(np.arange(8.0), 3, t)
+    for k in range(4):
+        powers = sum(c * np.maximum(t - k - j, 0) ** 3 for j, c in enumerate((1, -4, 6, -4, 1))) / 6
+        assert middle[:, k] == pytest.approx(powers, abs=1e-14)
+
+
+def test_a_rational_surface_lies_on_its_torus():
+    """Circles of four quadratic arcs around the tube and around the axis; knots that are not clamped would end it."""
+    root = np.sqrt(0.5)
+    circle = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], dtype=float)
+    weight = np.array([1, root, 1, root, 1, root, 1, root, 1])
+    knots = np.array([0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4], dtype=float)
+    r, z = 3 + circle[:, 0], circle[:, 1]
+    x = np.stack(np.broadcast_arrays(r[:, None] * circle[:, 0], r[:, None] * circle[:, 1], z[:, None]), axis=2)
+    w = weight[:, None] * weight
+    torus = Nurbs((2, 2), (knots, knots), np.concatenate([w[..., None] * x, w[..., None]], axis=2))
+    points, faces = torus.triangles()
+    assert np.hypot(np.hypot(points[:, 0], points[:, 1]) - 3, points[:, 2]) == pytest.approx(1.0, abs=1e-14)
+    assert len(faces) == 2 * (round(len(points) ** 0.5) - 1) ** 2
