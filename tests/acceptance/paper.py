@@ -195,7 +195,7 @@ def pop_up_rows() -> Iterator[Row]:
 
 
 def time_rows() -> Iterator[Row]:
-    """Fig 8's own runs: 2 s of fall against our drape, trim and map back; without pop-up, both warm, one thread."""
+    """Fig 8's own runs: 2 s of fall against our drape, trim and map back; both warm, processor time."""
     coupling = ExplicitPenalty(C1=C1)
     fig8.timed_fall(fig8.CASES[0], coupling, fig8.USUAL_STEP, 0.05, silent)  # compiles
     for case in fig8.CASES:

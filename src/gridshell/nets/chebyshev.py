@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 
 MARGIN = 2.3  # spacings marched past the end of the target: a cut is interpolated between nodes on both sides
 SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
+SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further
 LOOSE = 0.05  # spacings: ends known no better than that are warned of
 GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count
 MOST_NODES = 4_000_000
@@ -96,10 +97,17 @@ def chebyshev_net(
             f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
             "use a smaller spacing"
         )
-    lines, rough = _find_lines(target, layout, start, heading, near.net if near else None)
-    coarse = _march_lines(target, layout, lines, start, heading, 1, rough)
-    fine = _march_lines(target, layout, lines, start, heading, 2, coarse)
-    inside = inside_nodes(target, fine)
+    for parts in SEARCHES:
+        lines, rough = _find_lines(target, layout, start, heading, near.net if near else None, parts)
+        coarse = _march_lines(target, layout, lines, start, heading, 1, rough)
+        fine = _march_lines(target, layout, lines, start, heading, 2, coarse)
+        inside = inside_nodes(target, fine)
+        if not (inside[[0, -1]].any() or inside[:, [0, -1]].any()):
+            break
+    else:
+        raise InputError(
+            f"the target bends too sharply for a spacing of {max(layout.spacing):g} m: use a smaller spacing"
+        )
     _refuse_holes(fine, inside)
     angle, where = _smallest_angle(target, fine, inside)
     if degrees(angle) < SMALLEST_ANGLE:
@@ -110,7 +118,8 @@ def chebyshev_net(
         x, y, z = loosest
         warnings.append(
             f"rod ends on the line through ({x:.4g}, {y:.4g}, {z:.4g}) m are known within {error:.3g} m only: the "
-            "target bends too sharply for the steps of the march; use a smaller spacing or shorter edges"
+            "target bends too sharply for the steps of the march, or the line runs along its end; use a smaller "
+            "spacing or shorter edges"
         )
     _require_length(layout, rods)
     return ChebyshevNet(
@@ -138,14 +147,16 @@ class _Lines:
 
 
 def _find_lines(
-    target: Target, layout: GridLayout, start: Floats, heading: Floats, near: Net | None
+    target: Target, layout: GridLayout, start: Floats, heading: Floats, near: Net | None, parts: int
 ) -> tuple[_Lines, Net]:
-    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them."""
-    step = np.array(layout.spacing[::-1]) / 2  # along u, the lines of family v: their spacing
+    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them, in
+    so many parts of a spacing."""
+    step = np.array(layout.spacing[::-1]) / parts  # along u, the lines of family v: their spacing
+    spare = MARGIN * parts * np.repeat(step, 2)
     if near is not None:  # towards -u, +u, -v, +v
         reach = np.minimum([-near.u[0], near.u[-1], -near.v[0], near.v[-1]], 4 * target.size)
     else:
-        reach = _length_of_axes(target, start, heading) + 2 * MARGIN * np.repeat(step, 2)
+        reach = _length_of_axes(target, start, heading) + spare
     for _ in range(12):
         u, v = (
             np.arange(-np.ceil(reach[2 * k] / step[k]), np.ceil(reach[2 * k + 1] / step[k]) + 1) * step[k]
@@ -153,7 +164,8 @@ def _find_lines(
         )
         if len(u) * len(v) > MOST_NODES / 10:
             raise InputError(
-                f"the net needs more than {len(u) // 2} x {len(v) // 2} lines: use a larger spacing or a smaller target"
+                f"the net needs more than {len(u) // parts} x {len(v) // parts} lines: use a larger spacing or a "
+                "smaller target"
             )
         net = march_near(target, u, v, start, heading, near) if near else march(target, u, v, start, heading)
         inside = inside_nodes(target, net)
@@ -161,7 +173,7 @@ def _find_lines(
             raise InputError("no node of the net lies inside the target: move the anchor away from the rim")
         touched_u, touched_v = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
         needed = np.array([-u[touched_u[0]], u[touched_u[-1]], -v[touched_v[0]], v[touched_v[-1]]])
-        needed += 2 * MARGIN * np.repeat(step, 2)
+        needed += spare
         if np.all(needed <= reach + 1e-12):
             break
         reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)

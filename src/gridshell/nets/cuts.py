@@ -111,7 +111,7 @@ def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[
 
     Each end is matched with the nearest of its kind in the coarse march, within a `step` [m]: where a line grazes
     the end, the marches may find different pieces. An end that only one of them finds stays where it is; its
-    error is at most about half the gap or piece that the other march does not see.
+    error is at most about half the gap or piece that the other march does not see, or the way to its nearest end.
     """
     ends, error = np.array(fine).ravel(), 0.0
     better = ends.copy()
@@ -122,7 +122,7 @@ def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[
             better[k] = end + change / 3
             error = max(error, abs(change) / 3)
         else:
-            error = max(error, 0.5 * float(np.abs(np.delete(ends, k) - end).min()))
+            error = max(error, min(abs(change), 0.5 * float(np.abs(np.delete(ends, k) - end).min())))
     if not np.all(np.diff(better) > 0):
         return fine, max(error, step)
     return [Cut(float(start), float(end)) for start, end in better.reshape(-1, 2)], error
