@@ -27,6 +27,7 @@ from tests.paper.falls import HEMISPHERE, PAPER_ROD
 SMALL = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)
 POPULATION, MOST, SEED = 6, 3, 3
 LEANING = gs.HeightField(formula="0.12 + 0.2*x - 2.5*x^2 - 2*y^2", domain=gs.Disc(0.2))
+LEANS = Case("d", LEANING, (5, 5), spacing=0.06, edge=0.03)
 
 
 @cache
@@ -77,7 +78,7 @@ MIRROR_X, MIRROR_Y, SWAP = np.diag([-1.0, 1.0]), np.diag([1.0, -1.0]), np.array(
         (CASES[0], 9, [MIRROR_X, MIRROR_Y, SWAP], []),  # rods at 0, 30, ..., 240 mm, both families alike
         (CASES[1], 8, [MIRROR_X, MIRROR_Y, SWAP], []),
         (CASES[2], 6 + 8, [MIRROR_X, MIRROR_Y], [SWAP]),
-        (Case("d", LEANING, (5, 5), 0.06, 0.03), 3 * 2 + 5, [MIRROR_Y], [MIRROR_X, SWAP]),
+        (LEANS, 3 * 2 + 5, [MIRROR_Y], [MIRROR_X, SWAP]),
     ],
     ids=["hemisphere", "paraboloid", "ellipsoid", "leaning"],
 )
@@ -91,10 +92,12 @@ def test_random_footprints_have_the_symmetry_of_their_target_and_no_other(
     assert not any(same_set(points @ turn.T, points) for turn in broken)
 
 
-def test_a_variable_moves_only_its_own_rod_ends_and_along_their_rods() -> None:
-    one = design(CASES[2])
+@pytest.mark.parametrize("case", [CASES[2], LEANS], ids=["ellipsoid", "leaning"])
+def test_a_variable_moves_only_its_own_rod_ends_and_along_their_rods(case: Case) -> None:
+    one = design(case)
     variables = 0.5 * (one.lower + one.upper)
     before = one.footprint(variables).points
+    np.testing.assert_allclose(reach(one.footprint(variables)), variables[one.orbit], rtol=1e-12)
     for k in range(len(variables)):
         moved = one.footprint(variables + 1e-3 * (np.arange(len(variables)) == k)).points - before
         np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 1e-3 * (one.orbit == k), atol=1e-12)
@@ -162,6 +165,9 @@ def test_random_footprints_are_smooth_but_for_the_roughness_and_within_bounds() 
     assert np.allclose(np.diff(offsets), offsets[1])
     rough = (one.random(np.random.default_rng(5), 200, 0.04) - one.lower) / (one.upper - one.lower)
     assert 0.019 < np.abs(rough - shares).max() <= 0.02 + 1e-12
+    roughest = one.random(np.random.default_rng(5), 200, 1.0)
+    assert np.array_equal(roughest.min(axis=0), one.lower)
+    np.testing.assert_allclose(roughest.max(axis=0), one.upper, rtol=1e-15)
 
 
 def test_a_search_from_the_same_seed_is_the_same_and_from_another_is_not(whole: History, tmp_path: Path) -> None:

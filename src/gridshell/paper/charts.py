@@ -85,8 +85,9 @@ def _scale(values: Floats, room: float) -> Callable[[Floats | float], Floats]:
 
 
 def _ticks(values: Floats) -> Floats:
-    """Powers of ten between the smallest and the largest value; twos and fives, too, where these are few."""
+    """Powers of ten between the smallest and the largest value, and numbers between them where these are few."""
     low, high = float(values.min()), float(values.max())
     decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
-    steps = decades if high > 300 * low else np.outer(decades, (1, 2, 5)).ravel()
+    between = (1,) if high > 300 * low else (1, 2, 5) if high > 8 * low else (1, 2, 3, 4, 6, 8)
+    steps = np.outer(decades, between).ravel()
     return np.asarray(steps[(steps >= 0.999 * low) & (steps <= 1.001 * high)])

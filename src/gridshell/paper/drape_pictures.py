@@ -13,7 +13,7 @@ from gridshell.paper.panels import FINAL, FLAT, INK, Place, closed, dots, from_a
 Floats = NDArray[np.float64]
 
 TITLES = ("1  the flat grid above the target", "2  draped", "3  trimmed", "4  G0 (dots), the exact net (dashed)")
-SOUGHT = ", genetic (violet)"
+WITH_SOUGHT = "4  G0 (dots), net (dashed), genetic (violet)"
 
 
 def rows_svg(drapes: Sequence[Drape]) -> str:
@@ -22,7 +22,7 @@ def rows_svg(drapes: Sequence[Drape]) -> str:
     for one in drapes:
         name, spacing = one.case.target.name, 1e3 * one.case.spacing
         title = f"({one.case.label})  {name}, spacing {spacing:g} mm: {WORDS[one.method]}"
-        captions = (*TITLES[:3], TITLES[3] + ("" if _sought(one) is None else SOUGHT))
+        captions = TITLES if _sought(one) is None else (*TITLES[:3], WITH_SOUGHT)
         rows.append((title, list(zip(captions, _panels(one), strict=True))))
     return rows_of_panels(rows)
 
@@ -47,7 +47,7 @@ def _plan(one: Drape) -> list[str]:
     place = Place(np.vstack([ends, net, *others]))
     dashed = closed(place(net), INK, stroke_dasharray="5 3")
     found = [closed(place(other), FINAL) for other in others]
-    return [*rods(mesh, place(from_above(mesh.flat))), dashed, *found, *dots(place(ends), FLAT)]
+    return [*rods(mesh, place(from_above(mesh.flat))), *found, dashed, *dots(place(ends), FLAT)]
 
 
 def _sought(one: Drape) -> Floats | None:
