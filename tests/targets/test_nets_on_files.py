@@ -6,7 +6,7 @@ import pytest
 import gridshell as gs
 from gridshell.nets.cuts import _region
 from gridshell.targets import Freeform
-from tests.targets.meshes import PARTS, Mesh, lattice
+from tests.targets.meshes import PARTS, Mesh, lattice, sheet
 
 
 def tent() -> Mesh:
@@ -19,7 +19,7 @@ def tent() -> Mesh:
 TARGETS: dict[str, gs.Target] = {
     "opening": Freeform.of(*tent()),
     "base": Freeform.of(*PARTS["ball"](), base=-0.2),
-    "negative": Freeform.of(*PARTS["torus"]()),
+    "negative": Freeform.of(*PARTS["saddle"]()),
     "disc": gs.HeightField(formula="0.1 - x^2 - 2*y^2", domain=gs.Disc(0.2)),
 }
 
@@ -53,13 +53,21 @@ def test_a_net_across_an_opening_keeps_the_symmetry_of_the_target():
 
 def test_rod_ends_that_two_marches_place_differently_are_warned_of():
     """A peak much sharper than the spacing; the sentence names the place and what helps, and comes true."""
-    peak = gs.HeightField(formula="5*exp(-(x^2 + y^2)/1.62)", domain=gs.Rectangle((12.0, 12.0)))
-    net = gs.chebyshev_net(peak, gs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
+    sharp = Freeform.of(*sheet(lambda x, y: 5 * np.exp(-(x**2 + y**2) / 1.62), 6.0, 121))
+    net = gs.chebyshev_net(sharp, gs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
     said = [sentence for sentence in net.warnings if "are known within" in sentence]
     assert len(said) == 1
     assert "use a smaller spacing or shorter edges" in said[0]
     assert f"{net.error_estimate:.3g} m" in said[0]
-    finer = gs.chebyshev_net(peak, gs.GridLayout.orthogonal(spacing=0.7, edge=0.02))
+    finer = gs.chebyshev_net(sharp, gs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 12))
     assert finer.error_estimate < 0.1 * net.error_estimate
-    calm = gs.chebyshev_net(TARGETS["disc"], gs.GridLayout.orthogonal(spacing=0.04, edge=0.01))
-    assert not any("are known within" in sentence for sentence in calm.warnings)
+    assert not any("are known within" in sentence for sentence in finer.warnings)
+
+
+def test_lines_that_a_rough_march_misses_are_found_by_a_finer_one():
+    """Over a peak with a radius of a seventh of the spacing the march in half spacings ends two lines too early."""
+    target = gs.HeightField(formula="6*exp(-(x^2 + y^2)/1.2)", domain=gs.Disc(6.0))
+    net = gs.chebyshev_net(target, gs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
+    finer = gs.chebyshev_net(target, gs.GridLayout.orthogonal(spacing=0.35, edge=0.7 / 12))
+    assert max(rod.end for rod in net.rods) == pytest.approx(max(rod.end for rod in finer.rods), rel=1e-3)
+    assert net.min_angle == pytest.approx(finer.min_angle, rel=2e-3)

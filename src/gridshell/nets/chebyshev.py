@@ -115,7 +115,7 @@ def chebyshev_net(
     ends, error, loosest = _extrapolate(target, lines, (coarse, fine), inside, GRAZING * min(layout.spacing))
     rods, dropped, warnings = _name_rods(layout, lines, ends)
     if error > LOOSE * min(layout.spacing):
-        x, y, z = loosest
+        x, y, z = np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest)
         warnings.append(
             f"rod ends on the line through ({x:.4g}, {y:.4g}, {z:.4g}) m are known within {error:.3g} m only: the "
             "target bends too sharply for the steps of the march, or the line runs along its end; use a smaller "
