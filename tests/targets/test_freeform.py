@@ -255,11 +255,6 @@ def test_an_anchor_is_lifted_to_the_uppermost_sheet():
         target.lift(np.array([[1.2, 0.0]]))
 
 
-def test_nothing_falls_on_a_mesh():
-    with pytest.raises(gs.InputError, match='use drape method "bound"'):
-        gs.drape(layout(length=1.0), ROD, Freeform.of(*PARTS["bowl"]()), method="gravity")
-
-
 # What is refused
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gridshell.targets import Freeform
-from gridshell.targets.fitting import Samples, fit_field
+from gridshell.targets.fitting import Samples, _ring, fit_field
 from gridshell.targets.patches import PatchField
 from tests.targets.meshes import PARTS, Floats, capped_sphere, sheet, strewn
 
@@ -175,3 +175,15 @@ def test_points_may_come_in_any_order_and_number(off):
     assert level.gradient == pytest.approx(whole.gradient, abs=1e-12)
     for k in range(0, len(x), 29):
         assert patches.implicit(x[k : k + 1]).hessian[0] == pytest.approx(whole.hessian[k], abs=1e-11 * size)
+
+
+def test_a_new_patch_lies_in_the_mean_of_what_its_neighbours_say():
+    """Three level patches in a row, the outer two higher by 0.2 spacings: between two of them it is half way up."""
+    centres = np.array([[-1.0, 0.0, 0.2], [0.0, 0.0, 0.0], [1.0, 0.0, 0.2]])
+    patches = PatchField(centres, np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 10)), 1.0, 5.0)
+    added = _ring(patches, np.array([[0.5, 0.0, 0.7], [0.0, 0.3, 0.0]]))
+    near, far = np.exp(-np.array([0.5**2 + 0.5**2, 1.5**2 + 0.5**2]) / 1.44)
+    above = np.exp(-(0.5**2 + 0.7**2) / 1.44)
+    assert added.centres[0] == pytest.approx([0.5, 0.0, 0.2 * (near + far) / (near + far + above)])
+    assert added.frames[:, 2] == pytest.approx(np.tile([0.0, 0.0, 1.0], (2, 1)))
+    assert not added.coefficients.any()

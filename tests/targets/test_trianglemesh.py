@@ -19,3 +19,11 @@ def test_equal_rows_are_of_one_kind_however_large_their_numbers(largest):
     assert len(set(zip(kind.tolist(), number.reshape(-1).tolist(), strict=True))) == len(expected)
     for one in range(len(first)):
         assert first[one] == np.flatnonzero(kind == one)[0]
+
+
+def test_rows_that_a_key_of_64_bits_would_take_for_one_are_two():
+    most = 2**32 - 1
+    rows = np.array([[0, most, most], [1, 5, 7], [2, 5, 7], [1, 5, 7]])
+    first, kind = unique_rows(rows)
+    assert sorted(first.tolist()) == [0, 1, 2]
+    assert kind[1] == kind[3] != kind[2]

@@ -102,6 +102,7 @@ def _meshes() -> None:
     points = np.column_stack([x, y, 0.15 - 1.5 * x**2 - y**2])
     target = gs.Freeform.of(points, faces.reshape(-1, 3))
     gs.find_form(target, gs.GridLayout.orthogonal(spacing=0.07, edge=0.035), _rod())
+    target.contact(points)
 
 
 def _gravity() -> None:

@@ -6,7 +6,7 @@ are made, or gone on with, here. It seeks the best popped-up shape, the direct m
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from time import process_time
@@ -102,8 +102,8 @@ class Comparison:
             "direct": {"rms": self.direct.rms, "max": self.direct.max},
             "best": None if best is None else {"rms": best.rms, "max": best.max},
             "apart_max": float(self.apart.max()), "apart_rms": float(np.sqrt(np.mean(self.apart**2))),
-            "last_gain": history.last_gain, "variables": history.variables.tolist(),
-            "generations": [asdict(one) for one in history.generations],
+            "generations": len(history.generations), "last_gain": history.last_gain,
+            "variables": history.variables.tolist(),
         }  # fmt: skip
 
 
@@ -126,11 +126,12 @@ class Genetic:
         """The table as text."""
         head = "The genetic algorithm [HQK 3.2] beside the direct method: ends pinned, 15 mm edges, every run from flat"
         gains = (
-            f"{one.case.target.name} {one.direct.rms / one.best.rms:.2f} times at {one.history.runs} times the runs"
+            f"{one.case.target.name} {one.direct.rms / one.best.rms:.2f}, for {one.history.runs} times the runs"
             for one in self.comparisons
             if one.best is not None
         )
-        return "\n".join([head, "", aligned(COLUMNS, self.rows()), "", f"nearer to the target: {'; '.join(gains)}"])
+        foot = f"rms of the direct method over that of the genetic algorithm: {'; '.join(gains)}"
+        return "\n".join([head, "", aligned(COLUMNS, self.rows()), "", foot])
 
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
@@ -217,7 +218,7 @@ def compare(case: Case, history: History) -> Comparison:
 
 
 def convergence_svg(comparisons: Sequence[Comparison]) -> str:
-    """Best and mean of each search against its forward runs, and the direct method's error as a level."""
+    """The best of each search against its forward runs, and the direct method's error as a level."""
     series, legend = list[Series](), list[tuple[str, str]]()
     for one in comparisons:
         colour = COLOURS.get(one.case.target.name, INK)
@@ -225,8 +226,9 @@ def convergence_svg(comparisons: Sequence[Comparison]) -> str:
         runs, ends = [g.runs for g in made], [made[0].runs, made[-1].runs]
         series.append(Series(runs, [1e3 * g.best for g in made], colour, "", lined=True))
         series.append(Series(ends, [1e3 * one.direct.rms] * 2, colour, "\N{WHITE DIAMOND}", lined=True))
-        legend.append((f"{one.case.target.name}; diamonds: the direct method, one run", colour))
-    return charts_svg([Chart(series, "forward runs", "popped shape off the target, rms [mm]", legend)])
+        legend.append((one.case.target.name, colour))
+    chart = Chart(series, "forward runs", "best popped shape off the target, rms [mm]", legend)
+    return charts_svg([chart], "\N{WHITE DIAMOND} the direct method, one run")
 
 
 def _direct(case: Case) -> FoundForm:

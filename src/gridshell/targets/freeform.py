@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,11 @@ from gridshell.targets.fitting import fit_field, patch_spacing
 from gridshell.targets.meshsamples import mesh_samples
 from gridshell.targets.patches import PatchField
 from gridshell.targets.rim import Rim
-from gridshell.targets.target import Floats, Implicit, Target
+from gridshell.targets.target import Floats, Gap, Implicit, Target
 from gridshell.targets.trianglemesh import TriangleMesh, sound_mesh
+
+if TYPE_CHECKING:
+    from gridshell.targets.footing import Footing
 
 PAST = 0.6  # of the size: how far the surface is continued past an open rim
 LOST = 0.005  # of the size: a vertex this far off its smooth field is not followed by it
@@ -89,7 +93,7 @@ class Freeform(Target):
     @cached_property
     def size(self) -> float:
         """Half the largest extent of the shell [m]."""
-        known = np.vstack([self.surface.vertices, *(rim.points for rim in self._rims)])
+        known = np.vstack([self.surface.vertices, *(rim.points for rim in self.rims)])
         inside = self.margin(known) > -1e-6 * self._extent
         return 0.5 * float(np.ptp(known[inside], axis=0).max())
 
@@ -120,7 +124,8 @@ class Freeform(Target):
         return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted[1])
 
     @cached_property
-    def _rims(self) -> tuple[Rim, ...]:
+    def rims(self) -> tuple[Rim, ...]:
+        """The open boundary, and the curves, as far as there are any."""
         rims = []
         if self.surface.loops:
             rims.append(self._rim([self.surface.vertices[loop] for loop in self.surface.loops]))
@@ -140,10 +145,36 @@ class Freeform(Target):
 
     def margin(self, x: Floats) -> Floats:
         """(n,) how far inside the nearest of base plane, open boundary and curves the points (n, 3) are [m]."""
-        margins = [rim.distance(x) for rim in self._rims]
+        margins = [rim.distance(x) for rim in self.rims]
         if self.base_height is not None:
             margins.append(x[:, 2] - self.base_height)
         return np.min(margins, axis=0)
+
+    def section(self, z: float) -> Rim:
+        """The loops in which the plane at height `z` [m] cuts the smooth surface, counter-clockwise seen from above."""
+
+        def onto(x: Floats) -> Floats:
+            for _ in range(4):
+                value, gradient = self.level(x)
+                across = gradient * [1.0, 1.0, 0.0]
+                x = x - (value / dot(across, across))[:, None] * across
+            return x
+
+        return Rim.of(
+            [_turning(loop, False) for loop in self.surface.section(z)], onto, lambda x: unit(self.level(x)[1])
+        )
+
+    @cached_property
+    def _footing(self) -> "Footing":
+        from gridshell.targets.footing import footing
+
+        return footing(self)
+
+    def outside(self, x: Floats) -> NDArray[np.bool_]:
+        return self._footing.outside(x)
+
+    def contact(self, x: Floats) -> Gap:
+        return self._footing.contact(x)
 
     def height(self, xy: Floats) -> Floats:
         """z (n,) of the uppermost surface over the plan points (n, 2) [m]; NaN where there is none."""

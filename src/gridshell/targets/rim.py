@@ -49,6 +49,10 @@ class Rim:
         x, along = np.vstack(points), np.vstack(edges)
         return Rim(x, unit(cross(normal(x + 0.5 * along), along)), np.concatenate(after))
 
+    @property
+    def loops(self) -> int:
+        return int(np.count_nonzero(self.after <= np.arange(len(self.after))))
+
     @cached_property
     def _before(self) -> Ints:
         result = np.empty_like(self.after)
@@ -70,42 +74,68 @@ class Rim:
         _distance(x, self.points, self.inward, self.after, self._before, *self._balls, result)
         return result
 
+    def feet(self, x: Floats) -> tuple[Ints, Floats]:
+        """The edge (n,) nearest to each point (n, 3), and the share (n,) of it that lies before the nearest point."""
+        edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
+        _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
+        return edge, share
+
+    def at(self, edge: Ints, share: Floats) -> Floats:
+        """Points (n, 3) on the edges [m]."""
+        first = self.points[edge]
+        return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
+
 
 @njit(cache=True, error_model="numpy")
 def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
-    """From the edge that is nearest of those two that meet in the nearest point; beside a corner both count."""
-    nearest = 0
+    """From the nearest edge; beside a corner both edges count."""
+    edge = 0
     for n in range(len(x)):
-        px, py, pz = x[n, 0], x[n, 1], x[n, 2]
-        # where the last point's nearest is near too, most balls are too far away to be looked into
-        least = _square(px, py, pz, points, nearest)
-        far = np.sqrt(least)
-        for ball in range(len(radii)):
-            if _square(px, py, pz, centres, ball) < (far + radii[ball]) ** 2:
-                for k in range(start[ball], start[ball + 1]):
-                    square = _square(px, py, pz, points, k)
-                    if square < least:
-                        least, nearest = square, k
-                far = np.sqrt(least)
-        least, edge, along = np.inf, nearest, 0.0
-        for k in (nearest, before[nearest]):
-            ex, ey, ez = _edge(points, k, after[k])
-            share = (px - points[k, 0]) * ex + (py - points[k, 1]) * ey + (pz - points[k, 2]) * ez
-            share = min(max(share / (ex * ex + ey * ey + ez * ez), 0.0), 1.0)
-            square = _square(px - share * ex, py - share * ey, pz - share * ez, points, k)
-            if square < least:
-                least, edge, along = square, k, share
+        edge, along = _nearest(x, n, points, after, before, start, centres, radii, edge)
         ex, ey, ez = _edge(points, edge, after[edge])
         ix, iy, iz = inward[edge]
         if along <= 0.0 or along >= 1.0:
             beside = before[edge] if along <= 0.0 else after[edge]
             ix, iy, iz = ix + inward[beside, 0], iy + inward[beside, 1], iz + inward[beside, 2]
         ox, oy, oz = (
-            px - along * ex - points[edge, 0],
-            py - along * ey - points[edge, 1],
-            pz - along * ez - points[edge, 2],
+            x[n, 0] - along * ex - points[edge, 0],
+            x[n, 1] - along * ey - points[edge, 1],
+            x[n, 2] - along * ez - points[edge, 2],
         )
         result[n] = (ox * ix + oy * iy + oz * iz) / np.sqrt(ix * ix + iy * iy + iz * iz)
+
+
+@njit(cache=True, error_model="numpy")
+def _feet(x, points, after, before, start, centres, radii, edges, shares):  # type: ignore[no-untyped-def]
+    edge = 0
+    for n in range(len(x)):
+        edge, shares[n] = _nearest(x, n, points, after, before, start, centres, radii, edge)
+        edges[n] = edge
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest(x, n, points, after, before, start, centres, radii, guess):  # type: ignore[no-untyped-def]
+    """That edge of those two that meet in the point nearest to the n-th which is nearer, and the share of it that lies
+    before the foot. Where the `guess` is near, most balls are too far away to be looked into."""
+    px, py, pz = x[n, 0], x[n, 1], x[n, 2]
+    nearest, least = guess, _square(px, py, pz, points, guess)
+    far = np.sqrt(least)
+    for ball in range(len(radii)):
+        if _square(px, py, pz, centres, ball) < (far + radii[ball]) ** 2:
+            for k in range(start[ball], start[ball + 1]):
+                square = _square(px, py, pz, points, k)
+                if square < least:
+                    least, nearest = square, k
+            far = np.sqrt(least)
+    least, edge, along = np.inf, nearest, 0.0
+    for k in (nearest, before[nearest]):
+        ex, ey, ez = _edge(points, k, after[k])
+        share = (px - points[k, 0]) * ex + (py - points[k, 1]) * ey + (pz - points[k, 2]) * ez
+        share = min(max(share / (ex * ex + ey * ey + ez * ez), 0.0), 1.0)
+        square = _square(px - share * ex, py - share * ey, pz - share * ez, points, k)
+        if square < least:
+            least, edge, along = square, k, share
+    return edge, along
 
 
 @njit(cache=True)

@@ -63,6 +63,29 @@ class TriangleMesh:
             loops.append(np.array(loop, dtype=np.intp))
         return sorted(loops, key=lambda loop: -self.length(loop))
 
+    def section(self, z: float) -> list[Floats]:
+        """Closed polylines (n, 3) in which the plane at height `z` [m] cuts the surface."""
+        above = self.vertices[:, 2] > z
+        cut = above[self.faces].any(axis=1) & ~above[self.faces].all(axis=1)
+        a, b = self.faces[cut], np.roll(self.faces[cut], -1, axis=1)
+        crossed = above[a] != above[b]
+        ends = np.column_stack([np.minimum(a, b)[crossed], np.maximum(a, b)[crossed]])
+        first, kind = unique_rows(ends.astype(np.int64))
+        low, high = self.vertices[ends[first].T]
+        points = low + ((z - low[:, 2]) / (high[:, 2] - low[:, 2]))[:, None] * (high - low)
+        beside: list[list[int]] = [[] for _ in points]
+        for one, other in kind.reshape(-1, 2).tolist():
+            beside[one].append(other)
+            beside[other].append(one)
+        loops, left = list[Floats](), set(range(len(points)))
+        while left:
+            loop = [left.pop()]
+            while onward := [k for k in beside[loop[-1]] if k in left]:
+                loop.append(onward[0])
+                left.remove(onward[0])
+            loops.append(points[loop])
+        return loops
+
     def length(self, loop: Ints) -> float:
         """Of a closed loop of vertices [m]."""
         x = self.vertices[loop]
