@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gridshell.contact.bound import BoundToTarget
 from gridshell.formfinding.draped import Draped
+from gridshell.formfinding.natural import with_natural_ends
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from gridshell.layout.flatgrid import whole_rods
@@ -61,7 +62,7 @@ def bound_drape(
     )
     found = find_equilibrium(
         problem,
-        target.retract(start),
+        with_natural_ends(target, mesh, start),
         np.zeros(len(mesh.edges)),
         progress=lambda k, step: progress("drape", f"bound, iteration {k}", step),
     )

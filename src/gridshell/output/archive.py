@@ -2,12 +2,13 @@
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import wraps
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from gridshell.output.beside import beside
 from gridshell.output.folder import put, read_json, replacing
 
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
+T = TypeVar("T")
 GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
 
 
@@ -37,6 +39,7 @@ class Archive:
     result: dict[str, Any]
     states: dict[str, NDArray[Any]]
     case_toml: str = ""
+    _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def as_stored(self) -> "Archive":
         """The archive as a reader will see it: the result in JSON's own types."""
@@ -62,6 +65,19 @@ class Archive:
     def final(self) -> str | None:
         """The best state in space that there is: clamped, else pinned, else draped."""
         return next((state for state in reversed(SHELLS) if state in self.states), None)
+
+
+def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
+    """`make`, whose result is kept with the archive: many files are made from the same rods. It is not to be changed."""
+
+    @wraps(make)
+    def kept(archive: Archive) -> T:
+        if make not in archive._made:
+            archive._made[make] = make(archive)
+        found: T = archive._made[make]
+        return found
+
+    return kept
 
 
 def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:

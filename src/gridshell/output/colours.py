@@ -1,5 +1,7 @@
 """Colours of numbers: three maps of even lightness steps, given by a few control points."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,8 @@ def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
     return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(channels).astype(int).T.tolist()]
 
 
+@lru_cache(maxsize=4096)
 def mixed(colour: str, other: str, share: float) -> str:
     """`colour` with a `share` of the `other`, 0 to 1."""
-    return hex_colours((colour, other), np.array([share]))[0]
+    pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
+    return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.layout.outline import opens
-from gridshell.output.archive import SHELLS, Archive
+from gridshell.output.archive import SHELLS, Archive, made_once
 from gridshell.output.colours import mixed
-from gridshell.output.drawing import Drawing, Pen, Pencil
+from gridshell.output.drawing import Drawing, Path, Pen, Pencil
 from gridshell.output.rods import RodRecord, outlines_of, rods_of
 from gridshell.output.scale import FINEST, Colour, Scale, colour_bar, scale_of
 from gridshell.output.shapes import Shape, shape_of
@@ -31,9 +31,17 @@ FADE = 0.42  # share of paper in the colour of the farthest rods
 
 @dataclass(frozen=True)
 class Pieces:
-    """Parts of rods between two drawn nodes, rod by rod: entries (s, 2) of `rod_nodes`, rod index (s,)."""
+    """Parts of rods between two drawn nodes, rod by rod.
 
-    entries: Ints
+    Parameters
+    ----------
+    drawn : (d,) entries of `rod_nodes` that are drawn.
+    first : (s,) at which of them each piece begins; it ends at the next.
+    rod : (s,) index of its rod.
+    """
+
+    drawn: Ints
+    first: Ints
     rod: Ints
 
 
@@ -59,9 +67,10 @@ def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     front = view.depth(points[ends]) > 0.5
     ground_axes(pencil, view, SOFT, 12.5)
     _ground_curves(pencil, view, shape, rods)
-    _rods(pencil, view, shape, rods, scale, range(LAYERS // 2))
+    drawn = _Rods.of(archive, view, shape, scale)
+    drawn.draw(pencil, range(LAYERS // 2))
     _supports(pencil, view, points[ends[~front]], state, len(ends))
-    _rods(pencil, view, shape, rods, scale, range(LAYERS // 2, LAYERS))
+    drawn.draw(pencil, range(LAYERS // 2, LAYERS))
     _supports(pencil, view, points[ends[front]], state, len(ends))
     if colour == "gap" and shape.gap is not None and scale is not None:
         _largest(pencil, archive, shape, view)
@@ -78,63 +87,91 @@ def _view(archive: Archive, shape: Shape) -> View:
     """One view for all shapes in space, and one for the flat grid; stages spread further than the final shell."""
     if shape.flat:
         return View.of(shape.positions, WIDTH)
+    return _view_of_shells(archive) if shape.name in SHELLS else _view_of_all(archive)
+
+
+@made_once
+def _view_of_shells(archive: Archive) -> View:
+    return View.of(np.concatenate([archive.states[name] for name in SHELLS if name in archive.states]), WIDTH)
+
+
+@made_once
+def _view_of_all(archive: Archive) -> View:
     shells = [archive.states[name] for name in SHELLS if name in archive.states]
-    if shape.name not in SHELLS:
-        shells = [*shells, *archive.states["history"]]
-    return View.of(np.concatenate(shells), WIDTH)
+    return View.of(np.concatenate([*shells, *archive.states["history"]]), WIDTH)
 
 
-def _pieces(rods: list[RodRecord]) -> Pieces:
+@made_once
+def _pieces(archive: Archive) -> Pieces:
     """At most about SEGMENTS pieces: of finely divided rods, nodes are left out evenly."""
-    stride = max(1, -(-sum(len(rod.nodes) for rod in rods) // SEGMENTS))
-    pairs, owner, first = [np.empty((0, 2), dtype=np.intp)], [np.empty(0, dtype=np.intp)], 0
-    for k, rod in enumerate(rods):
-        last = max(len(rod.nodes) - 1, 0)
-        entries = first + np.unique([*range(0, last, stride), last])
-        pairs.append(np.column_stack([entries[:-1], entries[1:]]))
-        owner.append(np.full(len(pairs[-1]), k))
-        first += len(rod.nodes)
-    return Pieces(np.concatenate(pairs), np.concatenate(owner))
+    lengths = [len(rod.nodes) for rod in rods_of(archive)]
+    stride, drawn, first = max(1, -(-sum(lengths) // SEGMENTS)), [np.empty(0, dtype=np.intp)], 0
+    for length in lengths:
+        drawn.append(first + np.unique([*range(0, length - 1, stride), length - 1][:length]))
+        first += length
+    owner = np.repeat(np.arange(len(lengths)), [len(own) for own in drawn[1:]])
+    begins = np.flatnonzero(owner[1:] == owner[:-1])
+    return Pieces(np.concatenate(drawn).astype(np.intp), begins, owner[begins])
 
 
-def _rods(pencil: Pencil, view: View, shape: Shape, rods: list[RodRecord], scale: Scale | None, layers: range) -> None:
-    """The rods of some layers from far to near, each layer over a halo of paper that sets it off."""
-    nodes = np.concatenate([np.empty(0, dtype=np.intp), *(rod.nodes for rod in rods)])
-    pieces, plane = _pieces(rods), view.project(shape.positions)[nodes]
-    nearness = view.depth(shape.positions)[nodes[pieces.entries]].mean(axis=1)
-    layer = np.minimum((nearness * LAYERS).astype(np.intp), LAYERS - 1)
-    if scale is None:
-        families = np.array([rod.family == "v" for rod in rods], dtype=np.intp)
-        colour, palette, fade = families[pieces.rod], list(FAMILIES), 0.0 if shape.flat else FADE
-    else:
-        colour = np.rint(scale.bins[pieces.entries].mean(axis=1)).astype(np.intp)
-        palette, fade = scale.palette, FADE
-    pen = float(np.clip(0.12 * WIDTH / max(len(rods), 1), 0.45, 1.7))
-    for depth in layers:
-        mine = np.flatnonzero(layer == depth)
-        near = (depth + 0.5) / LAYERS
-        width = pen * (0.75 + 0.4 * near)
-        for chain in _chains(pieces, mine):
-            pencil.line(plane[chain], "CUT", pen=Pen(PAPER, 2.2 * width))
-        for shade in np.unique(colour[mine]):
-            ink = mixed(palette[shade], PAPER, fade * (1 - near) ** 1.3)
-            for chain in _chains(pieces, mine[colour[mine] == shade]):
-                pencil.line(plane[chain], "CUT", pen=Pen(ink, width))
+@dataclass(frozen=True)
+class _Rods:
+    """The rods of a picture, layer by layer.
 
+    Parameters
+    ----------
+    plane : (d, 2) the drawn nodes.
+    layer, shade : (s,) of each piece, 0 the farthest layer; index in the palette.
+    fade : share of paper in the farthest colours.
+    pen : width of the rods in the middle [drawing units].
+    """
 
-def _chains(pieces: Pieces, chosen: Ints) -> list[Ints]:
-    """Entries of the chosen pieces; pieces that follow each other on a rod are one polyline."""
-    if not len(chosen):
-        return []
-    apart = (np.diff(chosen) > 1) | (np.diff(pieces.rod[chosen]) != 0)
-    stops = np.append(np.flatnonzero(apart) + 1, len(chosen))
-    entries = np.insert(pieces.entries[chosen, 0], stops, pieces.entries[chosen[stops - 1], 1])
-    begin = 0
-    chains = list[Ints]()
-    for stop in (stops + np.arange(1, len(stops) + 1)).tolist():
-        chains.append(entries[begin:stop])
-        begin = stop
-    return chains
+    pieces: Pieces
+    plane: Floats
+    layer: Ints
+    shade: Ints
+    palette: list[str]
+    fade: float
+    pen: float
+
+    @staticmethod
+    def of(archive: Archive, view: View, shape: Shape, scale: Scale | None) -> "_Rods":
+        rods, pieces = rods_of(archive), _pieces(archive)
+        nodes = np.concatenate([np.empty(0, dtype=np.intp), *(rod.nodes for rod in rods)])[pieces.drawn]
+        nearness = view.depth(shape.positions)[nodes]
+        near = 0.5 * (nearness[pieces.first] + nearness[pieces.first + 1])
+        layer = np.minimum((near * LAYERS).astype(np.intp), LAYERS - 1)
+        if scale is None:
+            shade = np.array([rod.family == "v" for rod in rods], dtype=np.intp)[pieces.rod]
+            palette, fade = list(FAMILIES), 0.0 if shape.flat else FADE
+        else:
+            bins = scale.bins[pieces.drawn]
+            shade = np.rint(0.5 * (bins[pieces.first] + bins[pieces.first + 1])).astype(np.intp)
+            palette, fade = scale.palette, FADE
+        pen = float(np.clip(0.12 * WIDTH / max(len(rods), 1), 0.45, 1.7))
+        return _Rods(pieces, view.project(shape.positions)[nodes], layer, shade, palette, fade, pen)
+
+    def draw(self, pencil: Pencil, layers: range) -> None:
+        """Some layers from far to near, each over a halo of paper that sets it off."""
+        for depth in layers:
+            mine = np.flatnonzero(self.layer == depth)
+            near = (depth + 0.5) / LAYERS
+            width = self.pen * (0.75 + 0.4 * near)
+            self._lines(pencil, mine, Pen(PAPER, 2.2 * width))
+            shades = self.shade[mine]
+            for shade in np.unique(shades).tolist():
+                ink = mixed(self.palette[shade], PAPER, self.fade * (1 - near) ** 1.3)
+                self._lines(pencil, mine[shades == shade], Pen(ink, width))
+
+    def _lines(self, pencil: Pencil, chosen: Ints, pen: Pen) -> None:
+        """The chosen pieces; those that follow each other on a rod are one polyline."""
+        if not len(chosen):
+            return
+        first = self.pieces.first[chosen]
+        stops = np.flatnonzero(np.append(first[1:] > first[:-1] + 1, True))
+        begins = first[np.append(0, stops[:-1] + 1)]
+        for begin, stop in zip(begins.tolist(), (first[stops] + 2).tolist(), strict=True):
+            pencil.paths.append(Path(self.plane[begin:stop], "CUT", pen=pen))
 
 
 def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[RodRecord]) -> None:

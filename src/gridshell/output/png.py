@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +22,25 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
     size = np.rint(scale * (high - low)).astype(int).tolist()
     image = Image.new("RGB", (size[0], size[1]), "white")
     canvas = ImageDraw.Draw(image)
+    cloud = np.concatenate([np.empty((0, 2)), *(path.points for path in drawing.paths)])
+    pixels, begin = (scale * (cloud - (low[0], high[1])) * (1, -1)).ravel().tolist(), 0
     for path in drawing.paths:
-        pen = drawing.pen(path)
-        pixels = scale * (path.points - (low[0], high[1])) * (1, -1)
-        points = [tuple(point) for point in pixels.tolist()]
+        pen, stop = drawing.pen(path), begin + path.points.size
+        points, begin = pixels[begin:stop], stop
         if path.closed and pen.fill:
-            canvas.polygon(points, fill=pen.fill)
+            canvas.polygon(points, fill=_ink(pen.fill))
         if pen.width:
-            whole = [*points, points[0]] if path.closed else points
-            canvas.line(whole, fill=pen.colour, width=max(round(scale * pen.width), 1))
+            whole = points + points[:2] if path.closed else points
+            canvas.line(whole, fill=_ink(pen.colour), width=max(round(scale * pen.width), 1))
     for text in drawing.texts:
         _write(canvas, text, scale, low, high)
     return _file(np.asarray(image.reduce(FINER)))
+
+
+@lru_cache(maxsize=4096)
+def _ink(colour: str) -> tuple[int, ...]:
+    """ "#rrggbb" as three numbers."""
+    return tuple(int(colour[k : k + 2], 16) for k in (1, 3, 5))
 
 
 def _file(pixels: NDArray[np.uint8]) -> bytes:
@@ -52,12 +60,17 @@ def _file(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def _write(canvas, text: Text, scale: float, low: np.ndarray, high: np.ndarray) -> None:  # type: ignore[no-untyped-def]
-    from PIL import ImageFont  # its own font has no minus sign
-
-    font = ImageFont.load_default(scale * text.size)
+    font = _font(scale * text.size)
     x, y = scale * (text.at - (low[0], high[1])) * (1, -1)
     anchor = {"start": "l", "middle": "m", "end": "r"}[text.anchor] + "s"
     canvas.text(
         (x, y), text.text.replace(MINUS, "-"), fill=text.colour or LAYERS[text.layer].colour, font=font, anchor=anchor,
         stroke_width=round(2 * scale) if text.halo else 0, stroke_fill=text.halo or None,
     )  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def _font(size: float):  # type: ignore[no-untyped-def]
+    from PIL import ImageFont
+
+    return ImageFont.load_default(size)

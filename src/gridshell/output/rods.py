@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.layout.outline import outlines
-from gridshell.output.archive import Archive, printable
+from gridshell.output.archive import Archive, made_once, printable
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +74,7 @@ class JointRecord:
         return low.id if low.layer > high.layer else high.id
 
 
+@made_once
 def rods_of(archive: Archive) -> list[RodRecord]:
     """All rods, in the order of the result."""
     nodes = _nodes(archive)
@@ -98,14 +99,20 @@ def joints_of(rods: list[RodRecord]) -> list[JointRecord]:
 
 def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
     """Place (3,) [m] in a shape (n, 3) of each joint that has a node there, by its id."""
+    return {name: positions[node] for name, node in _joint_nodes(archive).items()}
+
+
+@made_once
+def _joint_nodes(archive: Archive) -> dict[str, int]:
+    """The node of each joint that has one, by its id."""
     rods, flat = rods_of(archive), archive.states.get("flat")
-    places = dict[str, Floats]()
+    nodes = dict[str, int]()
     for joint in joints_of(rods):
         rod, at = rods[joint.rods[0]], joint.at[0]
         if flat is not None and len(rod.nodes):
             stations = np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[0]], axis=1)
-            places[joint.id] = positions[rod.nodes[int(np.abs(stations - at).argmin())]]
-    return places
+            nodes[joint.id] = int(rod.nodes[int(np.abs(stations - at).argmin())])
+    return nodes
 
 
 def outlines_of(rods: list[RodRecord]) -> list[NDArray[np.intp]]:

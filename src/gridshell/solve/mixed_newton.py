@@ -5,6 +5,8 @@ a strain that is not yet equilibrated is wild. Here each edge carries its force 
 the linearised strain; the same iteration serves elastic edges (N = EA eps at the end) and inextensible ones
 (eps = 0 at the end, EA being a penalty that any size serves). On a curved constraint it is the SQP method on
 a manifold: steps in the tangent directions, the constraint's curvature in the Hessian, a retraction after.
+
+Near the end a factorisation serves for the steps after it, too, which then cost a gradient and a solve (chord steps).
 """
 
 import time
@@ -16,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.model import Assembly, Freedom
-from gridshell.rods.elements import Elements
+from gridshell.rods.elements import NO_HESSIANS, Elements
 from gridshell.rods.stretch import Stretch
 from gridshell.solve.constraint import Constraint
 from gridshell.solve.linear import LinearSolver, Qdldl, SingularError
@@ -67,13 +69,17 @@ class Equilibrium:
     mode: Floats | None = None
 
 
-STEP_TOLERANCE = 1e-6  # of the length; Newton's next error is its square
+TOLERANCE = 2e-11  # of the length: estimate of the error that is left
+CURVED = 20.0  # what is left after Newton's step is its square, times this: the most on smooth targets
+FORCE_TOLERANCE = 1e-6  # of the largest axial force, or of the
+LEAST_FORCE = 1e-6  # of EA, estimated likewise
 STRAIN_TOLERANCE = 2e-6
 LONGEST_STEP = 0.15  # of the length
 NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
-FORCE_TOLERANCE = 1e-3  # of the largest axial force: by more they must not change in the last step, since the
-LEAST_FORCE = 1e-9  # of EA           negative modes are counted with those from before it
+SAME_FORCES = 0.01  # of the largest axial force: no more they may change after the negative modes are counted
+CHORD = 1e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
+SLOW = 0.1  # of the last step: chord steps that are longer do not pay
 SHIFT_GROWTH = 8.0
 
 
@@ -100,7 +106,6 @@ def find_equilibrium(
     for iteration in range(1, most_iterations + 1):
         try:
             moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
-            settled = _settled(problem, forces, forces_next)
         except SingularError:
             status = Status.DIVERGED
             break
@@ -110,7 +115,7 @@ def find_equilibrium(
         state, forces = state_next, forces_next
         if progress is not None:
             progress(iteration, moved / problem.length)
-        if moved < STEP_TOLERANCE * problem.length and mismatch < STRAIN_TOLERANCE and settled:
+        if step.settled and mismatch < STRAIN_TOLERANCE:
             status = Status.CONVERGED
             break
         step.refresh(state)
@@ -160,12 +165,6 @@ def find_stable(
     return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))
 
 
-def _settled(problem: Problem, before: Floats, after: Floats) -> bool:
-    """Whether the axial forces hardly changed."""
-    size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE / FORCE_TOLERANCE * problem.stretch.stiffness.max())
-    return float(np.abs(after - before).max(initial=0.0)) <= FORCE_TOLERANCE * size
-
-
 def linear_solver(
     indptr: NDArray[np.int64], indices: NDArray[np.int64], free: Freedom, places: Floats | None
 ) -> LinearSolver:
@@ -191,6 +190,9 @@ class _Step:
         self.factorizations = 0
         self.negative_modes = 0
         self._shift = 0.0
+        self._factored = state, np.empty(0)  # where the matrix is from
+        self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
+        self._chord = self.settled = False
 
     def refresh(self, state: Floats) -> None:
         self.elements = tuple(element.refreshed(state) for element in self.elements)
@@ -206,17 +208,24 @@ class _Step:
     def take(self, state: Floats, forces: Floats, descend: bool) -> tuple[float, Floats, Floats, float]:
         """Length of the step, the next state and forces, and how far these are from matching the strains."""
         problem = self._problem
+        if not self._chord:
+            self._factored = state, forces
+        at, strains = self._factored[0], problem.stretch.strains(state)
         base = forces if problem.inextensible else np.zeros_like(forces)
         stretch = problem.stretch.with_forces(forces, multipliers=base)
         self._free = free = problem.constraint.freedom(state)
         gradient = np.zeros_like(state) if problem.load is None else -problem.load
         for element, hessians in zip(self.elements, self._hessians, strict=False):
-            element.evaluate(state, gradient, hessians)
-        by_force = gradient.copy()
-        stretch.add_axial(state, forces, by_force)
-        stretch.evaluate(state, gradient, self._hessians[-2])
-        curvature = problem.constraint.curvature(state, by_force)
-        self._hessians[-1][:] = curvature if len(curvature) else 0.0
+            element.evaluate(state, gradient, NO_HESSIANS if self._chord else hessians)
+        if self._chord:  # what the edges lack acts along those of the matrix, else strains do not settle
+            stretch.add_axial(state, forces, gradient)
+            stretch.add_axial(at, base + stretch.stiffness * strains - forces, gradient)
+        else:
+            by_force = gradient.copy()
+            stretch.add_axial(state, forces, by_force)
+            stretch.evaluate(state, gradient, self._hessians[-2])
+            curvature = problem.constraint.curvature(state, by_force)
+            self._hessians[-1][:] = curvature if len(curvature) else 0.0
         prescribed = problem.constraint.remaining(state)
         if prescribed is not None:
             gradient += self._times(prescribed)
@@ -225,13 +234,27 @@ class _Step:
             motion += prescribed
         reach = float(np.sqrt(np.einsum("ij,ij->i", motion, motion).max()))
         share = min(1.0, LONGEST_STEP * problem.length / reach) if reach > 0 else 1.0
-        strains = problem.stretch.strains(state) + problem.stretch.elongation(state, motion)
-        forces_next = forces + share * (base + problem.stretch.stiffness * strains - forces)
+        strains += stretch.elongation(at, motion)
+        forces_next = forces + share * (base + stretch.stiffness * strains - forces)
         state_next = problem.constraint.retract(state + share * motion)
         left = problem.stretch.strains(state_next)
         if not problem.inextensible:
             left = left - forces_next / problem.stretch.stiffness
+        self._judge(reach / problem.length, forces, forces_next)
         return reach, state_next, forces_next, float(np.abs(left).max())
+
+    def _judge(self, moved: float, before: Floats, after: Floats) -> None:
+        """Whether the error that is left is small enough, and whether the factorisation serves for another step.
+
+        After Newton's step the error is about its square; after a chord step it shrinks as from the last step to this.
+        """
+        size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE * float(self._problem.stretch.stiffness.max()))
+        changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
+        rates = (moved / self._last[0], changed / self._last[1]) if self._chord else (CURVED * moved, changed)
+        self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < SAME_FORCES
+        slow = self._chord and max(rates) > SLOW
+        self._chord = moved < CHORD and since < SAME_FORCES and not slow and not self.negative_modes
+        self._last = moved, changed
 
     def _times(self, motion: Floats) -> Floats:
         """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""
@@ -248,6 +271,8 @@ class _Step:
 
     def _direction(self, right: Floats, descend: bool) -> Floats:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian."""
+        if self._chord:
+            return self._solver.solve(right)
         self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
         self.factorizations += 1
         self.negative_modes = self._solver.factor(self._data)
