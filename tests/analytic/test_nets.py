@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from gridshell.errors import InputError, NetLimitError
 from gridshell.layout import GridLayout
 from gridshell.nets import ChebyshevNet, chebyshev_net, geodesics, march, sphere_net_end, sphere_net_rod
-from gridshell.nets.cuts import Cut, cut_lines, extrapolated, inside_nodes
+from gridshell.nets.cuts import Cut, Lines, cut_lines, extrapolated, inside_nodes
 from gridshell.nets.sphere import LIMIT, crossing_angle
 from gridshell.targets import Cap, Disc, Ellipsoid, HeightField, Hemisphere, Paraboloid, Rectangle, Target
 
@@ -291,7 +291,7 @@ def test_error_estimate_on_spheres_is_the_error_before_extrapolation(name):
     ):
         offsets, _ = ends_of(net, family)
         rows = np.abs(across - offsets[:, None]).argmin(axis=1)
-        cuts = cut_lines(net.target, s, lines[rows], mask[rows])
+        (cuts,) = cut_lines(net.target, [Lines(s, lines[rows], mask[rows])])
         marched = np.array([(cut.start, cut.end) for (cut,) in cuts])
         worst = max(worst, np.abs(marched - exact_ends(net, offsets)).max())
     assert net.error_estimate == pytest.approx(worst, rel=0.03)  # 0.9 % measured where rods graze, else 0.1 %
@@ -516,14 +516,14 @@ def test_lines_are_cut_wherever_they_cross_the_base():
         (s + 0.83) * (s - 0.76) * (s - 2), -1 + 0 * s,
         -(s + 0.81) * (s + 0.42) * (s - 0.11) * (s - 0.93), -(s + 0.81) * (s + 0.02) * (s - 0.11) * (s - 0.73),
     ])  # fmt: skip
-    one, none, *both = cut_lines(HEMISPHERE, s, lines_at(heights, s), heights > 0)
+    ((one, none, *both),) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights, s), heights > 0)])
     # a cubic is its own interpolant; the cubic misses a quartic by h^4 or so: 4e-5 measured, where its slope is small
     assert one == [(pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13))]
     assert none == []
     assert np.array(both) == pytest.approx(
         np.array([[[-0.81, -0.42], [0.11, 0.93]], [[-0.81, -0.02], [0.11, 0.73]]]), abs=1e-4
     )
-    mirrored = cut_lines(HEMISPHERE, s, lines_at(heights[:, ::-1], s), heights[:, ::-1] > 0)
+    (mirrored,) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights[:, ::-1], s), heights[:, ::-1] > 0)])
     assert np.array(mirrored[2]) == pytest.approx(np.array([[-0.93, -0.11], [0.42, 0.81]]), abs=1e-4)
 
 
@@ -536,7 +536,7 @@ def test_a_line_that_stops_just_past_the_base_is_cut_from_within(beyond):
     first, last = np.flatnonzero(inside)[[0, -1]]
     line = lines_at(heights[None], s)
     line[0, : first - beyond] = line[0, last + 1 + beyond :] = np.nan
-    (cuts,) = cut_lines(HEMISPHERE, s, line, inside[None])
+    ((cuts,),) = cut_lines(HEMISPHERE, [Lines(s, line, inside[None])])
     assert cuts == [(pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13))]
 
 

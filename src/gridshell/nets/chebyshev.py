@@ -10,18 +10,18 @@ from dataclasses import dataclass
 from math import cos, degrees, sin
 from string import ascii_lowercase
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError, NetLimitError
 from gridshell.geometry.curves import on_curve
-from gridshell.geometry.vectors import cross, dot
 from gridshell.layout import FlatRod, GridLayout
 from gridshell.layout.flatgrid import Family
 from gridshell.layout.gridlayout import rod_name
 from gridshell.layout.mesh import edge_counts
 from gridshell.nets.compass import Net, axes, geodesics, march
-from gridshell.nets.cuts import Cut, cut_lines, extrapolated, inside_nodes
+from gridshell.nets.cuts import Cut, Lines, cut_lines, extrapolated, inside_nodes
 from gridshell.nets.nearby import march_near
 from gridshell.targets import Target
 
@@ -100,7 +100,7 @@ def chebyshev_net(
     for parts in SEARCHES:
         lines, rough = _find_lines(target, layout, start, heading, near.net if near else None, parts)
         coarse = _march_lines(target, layout, lines, start, heading, 1, rough)
-        fine = _march_lines(target, layout, lines, start, heading, 2, coarse)
+        fine = _march_lines(target, layout, lines, start, heading, 2, coarse, rough)
         inside = inside_nodes(target, fine)
         if not (inside[[0, -1]].any() or inside[:, [0, -1]].any()):
             break
@@ -199,12 +199,12 @@ def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> 
 
 
 def _march_lines(
-    target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int, near: Net
+    target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int, *near: Net
 ) -> Net:
     u, v = (_subdivide(offsets, layout.edge, refine) for offsets in (lines.u, lines.v))
     if len(u) * len(v) > MOST_NODES:
         raise InputError(f"the net would have {len(u)} x {len(v)} nodes: use longer edges or a larger spacing")
-    return march_near(target, u, v, start, heading, near)
+    return march_near(target, u, v, start, heading, *near)
 
 
 def _subdivide(offsets: Floats, edge: float, refine: int) -> Floats:
@@ -241,13 +241,26 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
 
 def _smallest_angle(target: Target, net: Net, inside: NDArray[np.bool_]) -> tuple[float, tuple[float, float, float]]:
     """Smallest angle between the families over the inside nodes [rad], from central differences."""
-    i, j = np.nonzero(inside)
-    along = net.points[i + 1, j] - net.points[i - 1, j]
-    across = net.points[i, j + 1] - net.points[i, j - 1]
-    angle = np.arctan2(np.linalg.norm(cross(along, across), axis=1), np.abs(dot(along, across)))
-    k = int(np.argmin(angle))
-    x, y, z = net.points[i[k], j[k]].tolist()
-    return float(angle[k]), (x, y, z)
+    i, j = _sharpest(net.points, inside)
+    along, across = net.points[i + 1, j] - net.points[i - 1, j], net.points[i, j + 1] - net.points[i, j - 1]
+    x, y, z = net.points[i, j].tolist()
+    return float(np.arctan2(np.linalg.norm(np.cross(along, across)), abs(along @ across))), (x, y, z)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _sharpest(points, inside):  # type: ignore[no-untyped-def]
+    """Indices of the inside node with the smallest angle, which has the largest cosine."""
+    i_found, j_found, largest = 0, 0, -1.0
+    for i in range(1, len(inside) - 1):
+        for j in range(1, inside.shape[1] - 1):
+            if inside[i, j]:
+                aa, ab, bb = 0.0, 0.0, 0.0
+                for k in range(3):
+                    a, b = points[i + 1, j, k] - points[i - 1, j, k], points[i, j + 1, k] - points[i, j - 1, k]
+                    aa, ab, bb = aa + a * a, ab + a * b, bb + b * b
+                if ab * ab > largest * aa * bb:
+                    i_found, j_found, largest = i, j, ab * ab / (aa * bb)
+    return i_found, j_found
 
 
 @dataclass(frozen=True)
@@ -262,20 +275,17 @@ def _extrapolate(
     target: Target, lines: _Lines, nets: tuple[Net, Net], inside_fine: NDArray[np.bool_], depth: float
 ) -> tuple[_Ends, float, Floats]:
     """The pieces of all lines, the largest error of an end before extrapolation [m], and a point of that line."""
-    cuts = []
+    sets = list[Lines]()
     for net in nets:
         inside = inside_fine if net is nets[1] else inside_nodes(target, net)
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
-        cuts.append(
-            (
-                cut_lines(target, net.u, net.points[:, column].transpose(1, 0, 2), inside[:, column].T, depth=depth),
-                cut_lines(target, net.v, net.points[row], inside[row], depth=depth),
-            )
-        )
+        sets.append(Lines(net.u, net.points[:, column].transpose(1, 0, 2), inside[:, column].T))
+        sets.append(Lines(net.v, net.points[row], inside[row]))
+    cuts = cut_lines(target, sets, depth=depth)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
-    error, where, finer = 0.0, net.points[net.origin], (net.points[:, column].transpose(1, 0, 2), net.points[row])
+    error, where = 0.0, nets[1].points[nets[1].origin]
     families = list[list[list[Cut]]]()
-    for coarse, fine, points in zip(*cuts, finer, strict=True):
+    for coarse, fine, (_, points, _) in zip(cuts[:2], cuts[2:], sets[2:], strict=True):
         both = [extrapolated(rough, exact, step) for rough, exact in zip(coarse, fine, strict=True)]
         families.append([pieces for pieces, _ in both])
         worst = int(np.argmax([missed for _, missed in both]))

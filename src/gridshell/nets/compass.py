@@ -138,40 +138,52 @@ def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # ty
 
 
 def fill_quadrants(target: Target, net: Net) -> None:
-    """What is not known of all four quadrants, one anti-diagonal at a time: its nodes depend only on earlier ones."""
-    i0, j0 = net.origin
-    unknown = np.argwhere(np.isnan(net.points[:, :, 0])) - (i0, j0)
-    for diagonal in np.unique(np.abs(unknown).sum(axis=1)).tolist():
-        i, j, a, b, d, from_a, from_b, side = _next_nodes(net.points, net.u, net.v, i0, j0, diagonal)
-        if len(i):
-            net.points[i, j] = _compass(target, a, b, d, from_a, from_b, side)
+    """What is not known of all four quadrants: first all nodes whose neighbours are known, and then, since a node depends
+    only on those of earlier anti-diagonals, what follows from them, one anti-diagonal at a time."""
+    tried = np.zeros(net.points.shape[:2], dtype=bool)
+    found = _next_nodes(net.points, tried, net.u, net.v, *net.origin, 2, len(net.u) + len(net.v))
+    diagonal = 2
+    while len(found[1]):
+        diagonal, i, j, *rest = found
+        tried[i, j] = True
+        net.points[i, j] = _compass(target, *rest)
+        found = _next_nodes(net.points, tried, net.u, net.v, *net.origin, diagonal, 1)
 
 
 @nb.njit(cache=True)
-def _next_nodes(points, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
-    """Indices of the nodes of an anti-diagonal whose neighbours are known: A towards the u axis, B towards the v axis,
-    D across; the two chords, and the side of the net's quadrant."""
+def _next_nodes(points, tried, u, v, i0, j0, diagonal, some):  # type: ignore[no-untyped-def]
+    """Of the first anti-diagonals from `diagonal` on that have any, `some` at a time: the nodes that are unknown, not
+    `tried`, and whose neighbours are known. Where to go on; their indices; the neighbours A towards the u axis, B towards
+    the v axis, and D across; the two chords; and the side of the net's quadrant."""
     nu, nv = len(u), len(v)
-    most = 4 * diagonal
-    i, j, side = np.empty(most, dtype=np.intp), np.empty(most, dtype=np.intp), np.empty(most)
-    a, b, d = np.empty((most, 3)), np.empty((most, 3)), np.empty((most, 3))
-    from_a, from_b = np.empty(most), np.empty(most)
-    count = 0
-    for quadrant in range(4):
-        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-        for along in range(1, diagonal):
-            p, q = i0 + i_side * along, j0 + j_side * (diagonal - along)
-            if not (0 <= p < nu and 0 <= q < nv) or np.isfinite(points[p, q, 0]):
-                continue
-            p_back, q_back = p - i_side, q - j_side
-            if not np.isfinite(points[p, q_back, 0] + points[p_back, q, 0] + points[p_back, q_back, 0]):
-                continue
-            i[count], j[count], side[count] = p, q, i_side * j_side
-            a[count], b[count], d[count] = points[p, q_back], points[p_back, q], points[p_back, q_back]
-            from_a[count], from_b[count] = abs(v[q] - v[q_back]), abs(u[p] - u[p_back])
-            count += 1
+    last, most = nu + nv - 2, nu * nv
+    while True:
+        stop = min(diagonal + some - 1, last)
+        room = min(most, 4 * stop * (stop - diagonal + 1)) if stop >= diagonal else 0
+        i, j, side = np.empty(room, dtype=np.intp), np.empty(room, dtype=np.intp), np.empty(room)
+        a, b, d = np.empty((room, 3)), np.empty((room, 3)), np.empty((room, 3))
+        from_a, from_b = np.empty(room), np.empty(room)
+        count = 0
+        for quadrant in range(4):
+            i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
+            rows, columns = (nu - 1 - i0 if i_side > 0 else i0), (nv - 1 - j0 if j_side > 0 else j0)
+            for along in range(max(1, diagonal - columns), min(rows, stop - 1) + 1):
+                for across in range(max(1, diagonal - along), min(columns, stop - along) + 1):
+                    p, q = i0 + i_side * along, j0 + j_side * across
+                    p_back, q_back = p - i_side, q - j_side
+                    if tried[p, q] or np.isfinite(points[p, q, 0]):
+                        continue
+                    if not np.isfinite(points[p, q_back, 0] + points[p_back, q, 0] + points[p_back, q_back, 0]):
+                        continue
+                    i[count], j[count], side[count] = p, q, i_side * j_side
+                    a[count], b[count], d[count] = points[p, q_back], points[p_back, q], points[p_back, q_back]
+                    from_a[count], from_b[count] = abs(v[q] - v[q_back]), abs(u[p] - u[p_back])
+                    count += 1
+        if count or stop >= last:
+            break
+        diagonal = stop + 1
     return (
-        i[:count], j[:count], a[:count], b[:count], d[:count], from_a[:count], from_b[:count], side[:count]
+        diagonal, i[:count], j[:count], a[:count], b[:count], d[:count], from_a[:count], from_b[:count], side[:count]
     )  # fmt: skip
 
 

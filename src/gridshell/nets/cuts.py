@@ -1,6 +1,6 @@
 """Where the lines of a net leave a target: runs of inside nodes, and cuts between nodes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -78,32 +78,48 @@ def _fill_runs(region: Mask, seeds: Mask) -> Mask:
     return np.asarray((seeded[run].reshape(fenced.shape) & fenced)[:, :-1])
 
 
-def cut_lines(target: Target, s: Floats, lines: Floats, inside: Mask, *, depth: float = 0.0) -> list[list[Cut]]:
-    """Cut lines of a net at the target's end, to fourth order between nodes.
+class Lines(NamedTuple):
+    """Lines of a net: material coordinates `s` (n,) along them [m], `points` (m, n, 3) of each, NaN where there are none,
+    and which are `inside` (m, n)."""
+
+    s: Floats
+    points: Floats
+    inside: Mask
+
+
+def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[list[list[Cut]]]:
+    """Cut lines of nets at the target's end, to fourth order between nodes.
 
     Parameters
     ----------
-    s : (n,) material coordinates along the lines [m].
-    lines : (m, n, 3) points of each line, NaN where there are none; inside : (m, n).
     depth : pieces that lie nowhere further inside than this [m] only graze the end and do not count.
 
     Returns
     -------
-    m lists of the pieces of each line, in its direction; empty for a line without inside nodes.
+    For each set and each of its lines the pieces, in its direction; none for a line without inside nodes.
     """
-    margin = np.zeros(inside.shape)
-    margin[inside] = target.margin(lines[inside])
-    windows = list[tuple[int, int, int]]()
-    for k, mask in enumerate(inside):
-        steps = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
-        for first, last in zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1) - 1, strict=True):
-            if margin[k, first : last + 1].max() > depth:
-                windows += [(k, int(first) - 1, -1), (k, int(last), 1)]
-    ends = _roots(target, s, lines, windows)
-    cuts: list[list[Cut]] = [[] for _ in lines]
-    for (k, _, _), (start, end) in zip(windows[::2], ends.reshape(-1, 2).tolist(), strict=True):
-        cuts[k].append(Cut(start, end))
-    return cuts
+    runs = [_runs(target, lines, depth) for lines in sets]
+    ends = _roots(target, sets, runs).reshape(-1, 2).tolist()
+    result, done = list[list[list[Cut]]](), 0
+    for lines, (row, _, _) in zip(sets, runs, strict=True):
+        cuts: list[list[Cut]] = [[] for _ in lines.points]
+        for k, (start, end) in zip(row.tolist(), ends[done : done + len(row)], strict=True):
+            cuts[k].append(Cut(start, end))
+        result.append(cuts)
+        done += len(row)
+    return result
+
+
+def _runs(target: Target, lines: Lines, depth: float) -> tuple[Ints, Ints, Ints]:
+    """The line, and the first and the last node, of each run of inside nodes that is `depth` [m] inside somewhere."""
+    change = np.diff(lines.inside.astype(np.int8), axis=1, prepend=0, append=0)
+    (row, first), last = np.nonzero(change == 1), np.nonzero(change == -1)[1] - 1
+    margin = np.append(np.full(lines.inside.shape, -np.inf), -np.inf)  # of a run that ends with the last line
+    margin[:-1][lines.inside.ravel()] = target.margin(lines.points[lines.inside])
+    begin = row * len(lines.s)
+    bounds = np.column_stack([begin + first, begin + last + 1]).ravel()
+    deep = np.maximum.reduceat(margin, bounds)[::2] > depth if len(row) else np.empty(0, dtype=bool)
+    return row[deep], first[deep], last[deep]
 
 
 def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[Cut], float]:
@@ -128,23 +144,21 @@ def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[
     return [Cut(float(start), float(end)) for start, end in better.reshape(-1, 2)], error
 
 
-def _roots(target: Target, s: Floats, lines: Floats, windows: list[tuple[int, int, int]]) -> Floats:
-    """Where each line crosses the end, by a cubic through four nodes.
-
-    Each window (line, i, side) lies between nodes i and i + 1, its outer node being i + 1 for side 1, i for side -1.
-    """
-    if not windows:
-        return np.empty(0)
-    row, i, side = np.array(windows).T
-    first = np.clip(i - 1, 0, len(s) - 4)
-    for shift in (-1, 1):  # next to the net's limit, four nodes further in
-        lost = ~np.isfinite(lines[row[:, None], first[:, None] + np.arange(4), 0]).all(axis=1)
-        first = np.where(lost, np.clip(i - 1 + shift, 0, len(s) - 4), first)
-    nodes = first[:, None] + np.arange(4)
-    points, knots = lines[row[:, None], nodes], s[nodes]
-    return _bracketed(
-        lambda at, which: target.margin(lagrange(knots[which], points[which], at)), s[i + (side > 0)], s[i + (side < 0)]
-    )
+def _roots(target: Target, sets: Sequence[Lines], runs: Sequence[tuple[Ints, Ints, Ints]]) -> Floats:
+    """Where each run's line crosses the end before and after it, by a cubic through four nodes."""
+    gathered = list[tuple[Floats, Floats, Floats, Floats]]()
+    for (s, points, _), (line, first, last) in zip(sets, runs, strict=True):
+        row = np.repeat(line, 2)
+        i = np.column_stack([first - 1, last]).ravel()  # the cut is between nodes i and i + 1
+        side = np.tile([-1, 1], len(line))
+        window = np.clip(i - 1, 0, len(s) - 4)
+        for shift in (-1, 1):  # next to the net's limit, four nodes further in
+            lost = ~np.isfinite(points[row[:, None], window[:, None] + np.arange(4), 0]).all(axis=1)
+            window = np.where(lost, np.clip(i - 1 + shift, 0, len(s) - 4), window)
+        nodes = window[:, None] + np.arange(4)
+        gathered.append((s[nodes], points[row[:, None], nodes], s[i + (side > 0)], s[i + (side < 0)]))
+    knots, points, outer, inner = (np.concatenate(part) for part in zip(*gathered, strict=True))
+    return _bracketed(lambda at, which: target.margin(lagrange(knots[which], points[which], at)), outer, inner)
 
 
 def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: Floats) -> Floats:

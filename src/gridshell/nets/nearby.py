@@ -22,10 +22,18 @@ EXACT = 1e-13  # of the step, on a local model
 BEYOND = 0.1  # of the known net's extent that a guess may lie outside it
 
 
-def march_near(target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, near: Net) -> Net:
-    """As `march`, from a guess taken out of a net `near`; any guess is safe, a bad one is only of no use."""
-    guess = interpolated(near, u, v)
-    net = Net(u, v, guess)
+def march_near(
+    target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, near: Net, coarser: Net | None = None
+) -> Net:
+    """As `march`, from a guess taken out of a net `near`; any guess is safe, a bad one is only of no use.
+
+    coarser : the same net as `near` in longer steps: what the two differ by tells by how much this one will.
+    """
+    net = Net(u, v, interpolated(near, u, v))
+    if coarser is not None:
+        change = net.points - interpolated(coarser, u, v)
+        own, once, twice = (np.ptp(one.u) * np.ptp(one.v) / (len(one.u) * len(one.v)) for one in (net, near, coarser))
+        net.points[:] += np.where(np.isfinite(change), (once - own) / (twice - once) * change, 0.0)
     if not _settle_axes(target, net, anchor, heading):
         lay_axes(target, net, anchor, heading)
     _settle(target, net)
@@ -41,17 +49,20 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
 
 @nb.njit(cache=True)
 def _interpolate(points, rows, along, columns, across):  # type: ignore[no-untyped-def]
-    lines = np.zeros((len(rows), points.shape[1], 3))
+    line, result = np.empty(3 * points.shape[1]), np.empty((len(rows), 3 * len(columns)))
     for i in range(len(rows)):
+        line[:] = 0.0
         for k in range(rows.shape[1]):
-            lines[i] += along[i, k] * points[rows[i, k]]
-    result = np.zeros((len(rows), len(columns), 3))
-    for i in range(len(rows)):
+            share, row = along[i, k], points[rows[i, k]].reshape(-1)
+            for m in range(len(line)):
+                line[m] += share * row[m]
         for j in range(len(columns)):
+            x, y, z = 0.0, 0.0, 0.0
             for k in range(columns.shape[1]):
-                for d in range(3):
-                    result[i, j, d] += across[j, k] * lines[i, columns[j, k], d]
-    return result
+                share, c = across[j, k], 3 * columns[j, k]
+                x, y, z = x + share * line[c], y + share * line[c + 1], z + share * line[c + 2]
+            result[i, 3 * j], result[i, 3 * j + 1], result[i, 3 * j + 2] = x, y, z
+    return result.reshape(len(rows), len(columns), 3)
 
 
 def _settle_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
@@ -127,24 +138,27 @@ def _settle(target: Target, net: Net) -> None:
     A round asks the target only where the last one moved a node: elsewhere its model is still good.
     """
     (i0, j0), shape = net.origin, net.points.shape[:2]
-    models, value, gradient = net.points.copy(), np.full(shape, np.nan), np.full((*shape, 3), np.nan)
-    hessian = np.full((*shape, 3, 3), np.nan)
-    moved = np.full(shape, np.inf)
+    models, flat = net.points.copy(), net.points.reshape(-1, 3)
+    known = np.flatnonzero(np.isfinite(flat[:, 0]))
+    row = np.full(len(flat), -1)
+    row[known] = np.arange(len(known))
+    value, gradient, hessian = target.implicit(flat[known])
+    moved, new = np.zeros(shape), np.ones(shape, dtype=bool)
     for _ in range(ROUNDS):
-        asked = np.isfinite(net.points[:, :, 0]) & ~(moved < SETTLED * target.size)
-        models[asked] = net.points[asked]
-        value[asked], gradient[asked], hessian[asked] = target.implicit(models[asked])
-        moved[i0], moved[:, j0] = 0.0, 0.0
-        _sweep(net.points, models, value, gradient, hessian, net.u, net.v, i0, j0, moved)
-        if np.nanmax(moved, initial=0.0) < SETTLED * target.size:
+        _sweep(net.points, models, row.reshape(shape), value, gradient, hessian, net.u, net.v, i0, j0, new, moved)
+        new = moved >= SETTLED * target.size
+        if not new.any():
             return
+        models[new], rows = net.points[new], row[new.ravel()]
+        value[rows], gradient[rows], hessian[rows] = target.implicit(models[new])
     _forget(net.points, moved >= SETTLED * target.size, i0, j0)
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _sweep(points, models, value, gradient, hessian, u, v, i0, j0, moved):  # type: ignore[no-untyped-def]
-    """One march of the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), from which they then lie
-    away by `moved` (nu, nv).
+def _sweep(points, models, row, value, gradient, hessian, u, v, i0, j0, new, moved):  # type: ignore[no-untyped-def]
+    """One march of the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), whose values, gradients and
+    Hessians are in the rows `row` (nu, nv), -1 where there is none; from them the points then lie away by `moved`
+    (nu, nv). Nodes whose models and neighbours are not `new` (nu, nv) stay.
 
     As `compass`: the three equations are |p - a| = from_a, |p - b| = from_b and f(p) = 0.
     """
@@ -156,15 +170,22 @@ def _sweep(points, models, value, gradient, hessian, u, v, i0, j0, moved):  # ty
         for i in range(i0 + i_side, i_stop, i_side):
             from_b = abs(u[i] - u[i - i_side])
             for j in range(j0 + j_side, j_stop, j_side):
+                new[i, j] |= new[i, j - j_side] | new[i - i_side, j] | new[i - i_side, j - j_side]
+                if not new[i, j]:
+                    continue
+                r = row[i, j]
+                if r < 0:
+                    moved[i, j] = np.nan
+                    continue
                 from_a = abs(v[j] - v[j - j_side])
                 a, b, d = points[i, j - j_side], points[i - i_side, j], points[i - i_side, j - j_side]
-                slope, bend, here = gradient[i, j], hessian[i, j], models[i, j]
+                slope, bend, here = gradient[r], hessian[r], models[i, j]
                 for k in range(3):  # as far from its model as its neighbours are from theirs
                     p[k] = here[k] + (a[k] - models[i, j - j_side, k]) + (b[k] - models[i - i_side, j, k])
                     p[k] -= d[k] - models[i - i_side, j - j_side, k]
                 change, tries = np.inf, 0
                 while change > 1e-10 and tries < NEWTON_STEPS:
-                    ra, rb, level, volume = -from_a * from_a, -from_b * from_b, value[i, j], 0.0
+                    ra, rb, level, volume = -from_a * from_a, -from_b * from_b, value[r], 0.0
                     for k in range(3):
                         away[k], x[k], y[k] = p[k] - here[k], p[k] - a[k], p[k] - b[k]
                         ra += x[k] * x[k]

@@ -91,7 +91,8 @@ def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str]
     """
     from gridshell.output.files import ASIDE, DEFAULT, files_of
 
-    archive = archive.as_stored()
+    text = json_text(archive.result)
+    archive = replace(archive, result=json.loads(text))
     wanted = list(DEFAULT if kinds is None else kinds)
     aside = [kind for kind in wanted if kind in ASIDE]
 
@@ -100,7 +101,7 @@ def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str]
             put(temporary / name, content)
 
     with replacing(folder) as temporary, beside(lambda: make(aside)) if aside else nullcontext():
-        put(temporary / "result.json", json_text(archive.result))
+        put(temporary / "result.json", text)
         if archive.case_toml:
             put(temporary / "case.toml", archive.case_toml)
         make(kind for kind in wanted if kind not in ASIDE)

@@ -132,7 +132,9 @@ class Drawing:
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest x and y of all that is in the plane (2,), (2,)."""
         parts = [np.zeros((0, 2)), *(path.points for path in self.paths if path.flat)]
-        parts += [(mark.at + side * mark.radius)[None] for mark in self.marks for side in (-1.0, 1.0)]
+        if self.marks:
+            at, radius = np.array([mark.at for mark in self.marks]), np.array([[mark.radius] for mark in self.marks])
+            parts += [at - radius, at + radius]
         parts += [text.box() for text in self.texts]
         cloud = np.concatenate(parts)
         return (cloud.min(axis=0), cloud.max(axis=0)) if len(cloud) else (np.zeros(2), np.ones(2))
@@ -154,19 +156,24 @@ class Drawing:
                 Mark(scale * mark.at + shift, scale * mark.radius, mark.layer, pen[mark.pen], mark.note)
                 for mark in self.marks
             ),
-            tuple(replace(text, at=scale * text.at + shift, size=scale * text.size) for text in self.texts),
+            tuple(
+                Text(t.text, scale * t.at + shift, scale * t.size, t.layer, t.anchor, t.angle, t.bold, t.colour, t.halo)
+                for t in self.texts
+            ),
         )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
-        """What is inside a rectangle; marks and texts that cross its border are left out."""
+        """What is inside a rectangle; marks and texts that cross its border, and paths in space, are left out."""
         paths = [
             replace(path, points=part, closed=False)
             for path in self.paths
+            if path.flat and np.all((path.points.max(axis=0) >= low) & (path.points.min(axis=0) <= high))
             for part in _inside(np.vstack([path.points, path.points[:1]]) if path.closed else path.points, low, high)
         ]
-        marks = (m for m in self.marks if np.all(m.at - m.radius >= low) and np.all(m.at + m.radius <= high))
-        texts = (t for t in self.texts if np.all(t.box() >= low) and np.all(t.box() <= high))
-        return replace(self, paths=tuple(paths), marks=tuple(marks), texts=tuple(texts))
+        boxes = [np.array([mark.at - mark.radius, mark.at + mark.radius]) for mark in self.marks]
+        marks = tuple(mark for mark, box in zip(self.marks, boxes, strict=True) if _within(box, low, high))
+        texts = tuple(text for text in self.texts if _within(text.box(), low, high))
+        return replace(self, paths=tuple(paths), marks=marks, texts=texts)
 
     def __add__(self, other: "Drawing") -> "Drawing":
         """This one with the other's content on top."""
@@ -200,12 +207,19 @@ def _scaled(pen: Pen | None, scale: float) -> Pen | None:
     return pen and replace(pen, width=scale * pen.width, dash=tuple(scale * dash for dash in pen.dash))
 
 
+def _within(box: Floats, low: Floats, high: Floats) -> bool:
+    """Whether all points (k, 2) lie in a rectangle."""
+    (left, bottom), (right, top) = low.tolist(), high.tolist()
+    return all(left <= x <= right and bottom <= y <= top for x, y in box.tolist())
+
+
 def _inside(points: Floats, low: Floats, high: Floats) -> Iterator[Floats]:
     """The pieces of a polyline (k, 2) inside a rectangle [Liang and Barsky 1984]."""
     piece: list[Floats] = []
     for a, b in pairwise(points):
         enter, leave = 0.0, 1.0
-        for slope, room in zip(np.append(a - b, b - a), np.append(a - low, high - a), strict=True):
+        slopes, rooms = (*(a - b).tolist(), *(b - a).tolist()), (*(a - low).tolist(), *(high - a).tolist())
+        for slope, room in zip(slopes, rooms, strict=True):
             if slope == 0:
                 enter = enter if room >= 0 else 2.0
             elif slope < 0:

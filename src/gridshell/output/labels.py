@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from gridshell.output.drawing import BELOW, LETTER, LINE, Text
 
 Floats = NDArray[np.float64]
+Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 NEAR, FAR = 14, 150  # places that are tried at an end: where no rod is covered either; at all
@@ -48,20 +49,33 @@ class Room:
 
     def __init__(self, square: float) -> None:
         self._square = square
-        self._taken: dict[tuple[int, int], list[Floats]] = {}
+        self._taken: dict[tuple[int, int], list[tuple[Extent, Floats]]] = {}
 
     def free(self, box: Floats) -> bool:
         """Whether no box that was taken is met."""
-        near = [other for key in self._keys(box) for other in self._taken.get(key, ())]
+        extent = left, low, right, high = _extent(box)
+        near = [
+            other
+            for key in self._keys(extent)
+            for (x0, y0, x1, y1), other in self._taken.get(key, ())
+            if x0 < right and left < x1 and y0 < high and low < y1
+        ]
         return not near or not boxes_meet(box, np.array(near))
 
     def take(self, box: Floats) -> None:
-        for key in self._keys(box):
-            self._taken.setdefault(key, []).append(box)
+        extent = _extent(box)
+        for key in self._keys(extent):
+            self._taken.setdefault(key, []).append((extent, box))
 
-    def _keys(self, box: Floats) -> Iterator[tuple[int, int]]:
-        columns, rows = (sorted([int(value // self._square) for value in axis]) for axis in box.T.tolist())
-        return ((x, y) for x in range(columns[0], columns[-1] + 1) for y in range(rows[0], rows[-1] + 1))
+    def _keys(self, extent: Extent) -> list[tuple[int, int]]:
+        left, low, right, high = (int(value // self._square) for value in extent)
+        return [(x, y) for x in range(left, right + 1) for y in range(low, high + 1)]
+
+
+def _extent(box: Floats) -> Extent:
+    """Lowest x and y, highest x and y."""
+    (a, b, c, d), (e, f, g, h) = box.T.tolist()
+    return min(a, b, c, d), min(e, f, g, h), max(a, b, c, d), max(e, f, g, h)
 
 
 def place(texts: Sequence[str], rods: Floats, size: float, *, both: bool = True) -> list[Label]:
@@ -157,14 +171,11 @@ def boxes_meet(box: Floats, others: Floats) -> bool:
 
 
 def lines_meet(box: Floats, lines: Floats) -> bool:
-    """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2)."""
-    middle, sides = box.mean(axis=0), box[[1, 3]] - box[0]
-    local = np.einsum("mpc,ac->mpa", lines - middle, sides / np.sum(sides**2, axis=1)[:, None])  # box: +-1/2
-    start, along = local[:, 0], local[:, 1] - local[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        hits = (np.array([-0.5, 0.5])[:, None, None] - start) / along  # (2, m, axis) parameters on the line
-    outside = (along == 0) & (np.abs(start) > 0.5)
-    hits = np.where(along == 0, np.array([-np.inf, np.inf])[:, None, None], hits)
-    enter = np.maximum(hits.min(axis=0).max(axis=1), 0.0)
-    leave = np.minimum(hits.max(axis=0).min(axis=1), 1.0)
-    return bool(np.any((enter < leave) & ~outside.any(axis=1)))
+    """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2): no axis separates them."""
+    sides = box[[1, 3]] - box[0]
+    axes = (2.0 * sides / np.sum(sides**2, axis=1)[:, None]).T
+    ends = (lines - box.mean(axis=0)) @ axes  # in which the rectangle is +-1
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    off = ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 0, 1] * ends[:, 1, 0]
+    apart = (low >= 1.0).any(axis=1) | (high <= -1.0).any(axis=1) | (np.abs(off) >= (high - low).sum(axis=1))
+    return not apart.all()

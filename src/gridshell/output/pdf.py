@@ -11,7 +11,12 @@ from math import cos, sin
 from gridshell.output.drawing import LAYERS, Drawing, Mark, Path, Pen, Text
 
 POINTS = 72 / 25.4  # of a millimetre
-ROUND = 0.5522847  # handles of four cubics that make a circle, over its radius
+_H = 0.5522847  # handles of four cubics that make a circle, over its radius
+ROUND = (
+    (1, 0), (1, _H), (_H, 1), (0, 1), (-_H, 1), (-1, _H), (-1, 0), (-1, -_H), (-_H, -1), (0, -1), (_H, -1), (1, -_H),
+    (1, 0),
+)  # fmt: skip
+CIRCLE = "%.3f %.3f m" + 4 * (3 * " %.3f %.3f" + " c")
 
 # widths of Helvetica's letters from the space to the tilde, in thousandths of its size [Adobe's font metrics]
 WIDTHS = dict(enumerate([
@@ -94,25 +99,20 @@ def _pen(pen: Pen) -> str:
 
 def _outline(item: Path | Mark) -> str:
     if isinstance(item, Path):
-        (x, y), *rest = item.points.tolist()
-        lines = "".join(f" {x:.3f} {y:.3f} l" for x, y in rest)
-        return f"{x:.3f} {y:.3f} m{lines}" + (" h" if item.closed else "")
+        lines = " l ".join(["%.3f %.3f"] * len(item.points)) % tuple(item.points.ravel().tolist())
+        return lines.replace(" l ", " m ", 1) + (" l h" if item.closed else " l")
     (x, y), r = item.at.tolist(), item.radius
-    words, (c, s) = [f"{x + r:.3f} {y:.3f} m"], (1.0, 0.0)
-    for _ in range(4):  # a quarter from (c, s) to (-s, c)
-        points = ((c - ROUND * s, s + ROUND * c), (-s + ROUND * c, c + ROUND * s), (-s, c))
-        words.append(" ".join(f"{x + r * a:.3f} {y + r * b:.3f}" for a, b in points) + " c")
-        c, s = -s, c
-    return " ".join(words)
+    return CIRCLE % tuple([at + r * share for shares in ROUND for at, share in zip((x, y), shares, strict=True)])
 
 
 def _text(text: Text) -> str:
-    (x, y), c, s = text.at.tolist(), cos(text.angle), sin(text.angle)
+    (x, y), angle, size = text.at.tolist(), text.angle, text.size
+    c, s = (cos(angle), sin(angle)) if angle else (1.0, 0.0)
     if text.anchor != "start":
-        back = (0.5 if text.anchor == "middle" else 1.0) * _width(text.text) * text.size
+        back = (0.5 if text.anchor == "middle" else 1.0) * _width(text.text) * size
         x, y = x - back * c, y - back * s
     words = _string(text.text).decode("cp1252", "replace")
-    return f"BT /F{int(text.bold)} {text.size:.3f} Tf {c:.5f} {s:.5f} {-s:.5f} {c:.5f} {x:.3f} {y:.3f} Tm {words} Tj ET"
+    return f"BT /F{int(text.bold)} {size:.3f} Tf {c:.5f} {s:.5f} {-s:.5f} {c:.5f} {x:.3f} {y:.3f} Tm {words} Tj ET"
 
 
 def _width(text: str) -> float:

@@ -153,25 +153,30 @@ class _Rods:
 
     def draw(self, pencil: Pencil, layers: range) -> None:
         """Some layers from far to near, each over a halo of paper that sets it off."""
+        halos, lines = (self._lines(key) for key in (0 * self.shade, self.shade))
         for depth in layers:
-            mine = np.flatnonzero(self.layer == depth)
             near = (depth + 0.5) / LAYERS
             width = self.pen * (0.75 + 0.4 * near)
-            self._lines(pencil, mine, Pen(PAPER, 2.2 * width))
-            shades = self.shade[mine]
-            for shade in np.unique(shades).tolist():
-                ink = mixed(self.palette[shade], PAPER, self.fade * (1 - near) ** 1.3)
-                self._lines(pencil, mine[shades == shade], Pen(ink, width))
+            halo = Pen(PAPER, 2.2 * width)
+            pencil.paths += [Path(self.plane[chain], "CUT", pen=halo) for _, chain in halos[depth]]
+            pens = {
+                shade: Pen(mixed(self.palette[shade], PAPER, self.fade * (1 - near) ** 1.3), width)
+                for shade in {shade for shade, _ in lines[depth]}
+            }
+            pencil.paths += [Path(self.plane[chain], "CUT", pen=pens[shade]) for shade, chain in lines[depth]]
 
-    def _lines(self, pencil: Pencil, chosen: Ints, pen: Pen) -> None:
-        """The chosen pieces; those that follow each other on a rod are one polyline."""
-        if not len(chosen):
-            return
-        first = self.pieces.first[chosen]
-        stops = np.flatnonzero(np.append(first[1:] > first[:-1] + 1, True))
-        begins = first[np.append(0, stops[:-1] + 1)]
-        for begin, stop in zip(begins.tolist(), (first[stops] + 2).tolist(), strict=True):
-            pencil.paths.append(Path(self.plane[begin:stop], "CUT", pen=pen))
+    def _lines(self, shade: Ints) -> list[list[tuple[int, slice]]]:
+        """For each layer the shades, ascending, and drawn nodes of its polylines: pieces that follow each other on a
+        rod in one layer and shade."""
+        order = np.lexsort((shade, self.layer))
+        first, key = self.pieces.first[order], np.column_stack([self.layer, shade])[order]
+        ends = np.flatnonzero(np.any(np.diff(key, axis=0), axis=1) | (np.diff(first) > 1))
+        stop = first[np.append(ends, len(first) - 1)[: len(first)]] + 2
+        begin = np.append(0, ends + 1)[: len(first)]
+        lines: list[list[tuple[int, slice]]] = [[] for _ in range(LAYERS)]
+        for (layer, own), low, high in zip(key[begin].tolist(), first[begin].tolist(), stop.tolist(), strict=True):
+            lines[layer].append((own, slice(low, high)))
+        return lines
 
 
 def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[RodRecord]) -> None:

@@ -87,9 +87,9 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
     """The map with its ticks and its caption, ending at x = `right`, ticks' baseline at `y`."""
     length = 200.0
     left, step = right - length, length / BINS
-    for k, colour in enumerate(scale.palette):  # each up to the end: no seams
-        x = left + k * step
-        corners = [(x, y + 14), (right, y + 14), (right, y + 22), (x, y + 22)]
+    for k, colour in enumerate(scale.palette):  # each under the next: no seams
+        x, stop = left + k * step, min(left + (k + 2) * step, right)
+        corners = [(x, y + 14), (stop, y + 14), (stop, y + 22), (x, y + 22)]
         pencil.line(corners, "TITLE", closed=True, pen=Pen(colour, 0.0, fill=colour))
     for value in nice_ticks(scale.low, scale.high, 4):
         x = left + length * (value - scale.low) / (scale.high - scale.low)

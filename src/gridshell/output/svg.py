@@ -12,6 +12,7 @@ from gridshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Te
 
 ZEROS = re.compile(r"\.00(?!\d)|(\.\d)0(?!\d)")
 MINUS_ZERO = re.compile(r"-0(?![.\d])")
+FLIP = np.array([1.0, -1.0])
 SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
 
 
@@ -83,17 +84,17 @@ def _shapes(drawing: Drawing) -> Iterator[str]:
         members = list(group)
         anonymous = [item for item in members if isinstance(item, Path) and not (item.name or item.note)]
         if len(anonymous) == len(members):
-            yield tag("path", d="".join(map(_data, anonymous)), class_=layer, **_look(pen))
+            yield tag("path", d=_short("".join(map(_data, anonymous))), class_=layer, **_look(pen))
         else:
             shapes = [_path(item) if isinstance(item, Path) else _mark(item) for item in members]
             yield tag("g", *shapes, class_=layer, **_look(pen))
 
 
 def _data(path: Path) -> str:
-    """Data of an anonymous path, to 0.01 of a unit."""
-    flipped = (path.points * (1.0, -1.0)).ravel().tolist()
+    """Data of an anonymous path, to 0.01 of a unit, not yet shortened."""
+    flipped = (path.points * FLIP).ravel().tolist()
     words = "L".join(["%.2f %.2f"] * len(path.points)) % tuple(flipped)
-    return "M" + _short(words) + ("Z" if path.closed else "")
+    return f"M{words}Z" if path.closed else f"M{words}"
 
 
 def _short(words: str) -> str:

@@ -26,9 +26,9 @@ from gridshell.paper.genetic_kept import Evaluate, Judged, Kept
 
 Floats = NDArray[np.float64]
 
-POPULATION = 60
+POPULATION = 100
 MOST = 300  # generations
-DIFFERENCE, CROSSED = 0.65, 0.97  # at 0.5 a population draws together before it has found the best
+DIFFERENCE, CROSSED = 0.6, 0.9  # smaller steps or populations draw together in a worse minimum
 ROUGHNESS = 0.04  # of the first footprints; rougher ones stand more rarely, and after many more iterations
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LEAF = 6  # blocks that are not divided further
+LEAF = 12  # blocks that are not divided further
 UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
 
 
@@ -23,60 +23,61 @@ def dissect(places: Floats, start: Ints, neighbours: Ints) -> Ints:
     -------
     (n,) blocks in the order of their elimination.
     """
-    return np.asarray(_dissect(np.ascontiguousarray(places, dtype=np.float64), start, neighbours))
+    along = np.argsort(places, axis=0, kind="stable").T.astype(np.int64)
+    return np.asarray(_dissect(np.ascontiguousarray(places, dtype=np.float64), along, start, neighbours))
 
 
 @nb.njit(cache=True)
-def _dissect(places, start, neighbours):  # type: ignore[no-untyped-def]
-    """Segments of `order` are divided in place until they are small; `segment` tells which one a block is in."""
+def _dissect(places, along, start, neighbours):  # type: ignore[no-untyped-def]
+    """Segments of the rows of `along` (d, n), blocks sorted by each coordinate, are divided in place until they are
+    small, and stay sorted; `segment` tells which one a block is in."""
     n = len(places)
-    order, segment = np.arange(n), np.zeros(n, dtype=np.int64)
+    segment = np.zeros(n, dtype=np.int64)
     rank, crossing, part = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int8)
+    kept, size = np.empty((3, n), dtype=np.int64), np.zeros(3, dtype=np.int64)
     begins, ends = [0], [n]
     newest = 0
     while len(begins) > 0:
         begin, end = begins.pop(), ends.pop()
         if end - begin <= LEAF:
             continue
-        here = segment[order[begin]]
-        blocks = _by_place(places, order[begin:end].copy())
+        here = segment[along[0, begin]]
+        blocks = along[_longest(places, along, begin, end), begin:end].copy()
         for k in range(len(blocks)):
             rank[blocks[k]] = k
         best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing)
         _separate(blocks, segment, here, rank, best, start, neighbours, part)
+        for row in along:
+            size[:] = 0
+            for b in row[begin:end]:
+                side = part[b]
+                kept[side, size[side]] = b
+                size[side] += 1
+            at = begin
+            for side in range(3):
+                row[at : at + size[side]] = kept[side, : size[side]]
+                at += size[side]
         newest += 2
         at = begin
         for side in range(3):
-            first = at
-            for k in range(len(blocks)):
-                if part[blocks[k]] == side:
-                    order[at] = blocks[k]
-                    at += 1
-            if side < 2 and at > first:
-                for k in range(first, at):
-                    segment[order[k]] = newest - side
-                begins.append(first)
-                ends.append(at)
-            elif side == 2:
-                for k in range(first, at):
-                    segment[order[k]] = -1
-    return order
+            for b in along[0, at : at + size[side]]:
+                segment[b] = newest - side if side < 2 else -1
+            if side < 2 and size[side] > 0:
+                begins.append(at)
+                ends.append(at + size[side])
+            at += size[side]
+    return along[0].copy()
 
 
 @nb.njit(cache=True)
-def _by_place(places, blocks):  # type: ignore[no-untyped-def]
-    """The blocks along their longest extent."""
+def _longest(places, along, begin, end):  # type: ignore[no-untyped-def]
+    """The coordinate in which a segment is longest."""
     axis, longest = 0, -1.0
-    for d in range(places.shape[1]):
-        low, high = np.inf, -np.inf
-        for b in blocks:
-            low, high = min(low, places[b, d]), max(high, places[b, d])
-        if high - low > longest:
-            axis, longest = d, high - low
-    x = np.empty(len(blocks))
-    for k in range(len(blocks)):
-        x[k] = places[blocks[k], axis]
-    return blocks[np.argsort(x, kind="mergesort")]
+    for d in range(len(along)):
+        extent = places[along[d, end - 1], d] - places[along[d, begin], d]
+        if extent > longest:
+            axis, longest = d, extent
+    return axis
 
 
 @nb.njit(cache=True)

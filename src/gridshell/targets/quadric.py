@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, sqrt
 
+import numba as nb
 import numpy as np
 
 from gridshell.errors import InputError
@@ -37,23 +38,16 @@ class _Quadric(Standing):
         return 0.0, 0.0
 
     def implicit(self, x: Floats) -> Implicit:
-        hessian = np.empty((len(x), 3, 3))
-        hessian[:] = self._form[2]
-        return Implicit(*self.level(x), hessian)
+        return Implicit(*_implicit(x, *self._form))
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
-        weights, slope, _ = self._form
-        gradient = x * weights
-        value = np.einsum("ij,ij->i", x, gradient) + (slope * x[:, 2] - self.scale)
-        gradient *= 2.0
-        gradient[:, 2] += slope
+        value, gradient = _level(x, *self._form)
         return value, gradient
 
     @cached_property
-    def _form(self) -> tuple[Floats, float, Floats]:
-        """Weights and slope times the scale, and the Hessian: the march asks for them thousands of times."""
-        weights = self.scale * np.array(self.weights)
-        return weights, self.scale * self.slope, np.diag(2.0 * weights)
+    def _form(self) -> tuple[Floats, float, float]:
+        """Weights and slope times the scale, and the scale: the march asks for them thousands of times."""
+        return self.scale * np.array(self.weights), self.scale * self.slope, self.scale
 
     def height(self, xy: Floats) -> Floats:
         w = self.weights
@@ -61,6 +55,29 @@ class _Quadric(Standing):
         if w[2] == 0.0:
             return rest / self.slope
         return np.sqrt(np.where(rest >= 0.0, rest, np.nan) / w[2])
+
+
+@nb.njit(cache=True)
+def _level(x, weights, slope, scale):  # type: ignore[no-untyped-def]
+    value, gradient = np.empty(len(x)), np.empty((len(x), 3))
+    for n in range(len(x)):
+        total = slope * x[n, 2] - scale
+        for k in range(3):
+            total += weights[k] * x[n, k] * x[n, k]
+            gradient[n, k] = 2.0 * weights[k] * x[n, k]
+        gradient[n, 2] += slope
+        value[n] = total
+    return value, gradient
+
+
+@nb.njit(cache=True)
+def _implicit(x, weights, slope, scale):  # type: ignore[no-untyped-def]
+    value, gradient = _level(x, weights, slope, scale)
+    hessian = np.zeros((len(x), 3, 3))
+    for n in range(len(x)):
+        for k in range(3):
+            hessian[n, k, k] = 2.0 * weights[k]
+    return value, gradient, hessian
 
 
 @dataclass(frozen=True)

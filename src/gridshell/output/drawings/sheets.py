@@ -62,7 +62,7 @@ def tiled(compose: Compose, paper: tuple[float, float]) -> Iterator[Sheet]:
         for column in range(count[0]):
             corner = origin + size * (column, count[1] - 1 - row)
             shift = low + OVERLAP - corner
-            part = drawing.placed(1.0, shift).clipped(low, high)
+            part = drawing.clipped(low - shift, high - shift).placed(1.0, shift)
             lines = _match_lines(low + OVERLAP, high - OVERLAP, (row, column), count, part.texts)
             yield Sheet(
                 f"{drawing.title} 1:1, part {_part(row, column)} of {_part(*(count[::-1] - 1))}", part + lines, 1

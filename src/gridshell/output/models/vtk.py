@@ -15,6 +15,8 @@ from gridshell.output.rods import rods_of
 from gridshell.output.shapes import STAGE, Shape, shape_names, shape_of
 from gridshell.output.svg import tag
 
+LEVEL = 3  # of compression: half the time of 6, for files that are 5 % longer
+
 
 def vtp_text(archive: Archive, name: str) -> str:
     """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`."""
@@ -59,7 +61,7 @@ def _known(shape: Shape, nodes: NDArray[np.intp]) -> Iterator[tuple[str, NDArray
 def _array(name: str, values: NDArray[np.generic], **attributes: str) -> str:
     kind = {"f": "Float64", "i": "Int64"}[values.dtype.kind]
     data = np.ascontiguousarray(values).tobytes()
-    packed = zlib.compress(data, 6)
+    packed = zlib.compress(data, LEVEL)
     header = np.array([1, len(data), len(data), len(packed)], dtype=np.uint32).tobytes()
     text = (base64.b64encode(header) + base64.b64encode(packed)).decode()
     return tag("DataArray", text, type=kind, Name=name, format="binary", **attributes)
