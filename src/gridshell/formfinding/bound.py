@@ -16,6 +16,7 @@ from gridshell.formfinding.natural import with_natural_ends
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from gridshell.layout.flatgrid import whole_rods
+from gridshell.layout.mesh import nodes_along
 from gridshell.model import Shell
 from gridshell.nets import ChebyshevNet, chebyshev_net
 from gridshell.nets.apron import with_apron
@@ -136,13 +137,11 @@ def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
 
 def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> NDArray[np.intp]:
     """Nodes between the ends of some rod: all but the apron's."""
-    chosen = []
-    for k, pieces in enumerate(cuts):
-        for cut in pieces:
-            s = mesh.stations[mesh.rod_slice(k)]
-            tiny = 1e-9 * cut.length
-            chosen.append(mesh.nodes_of(k)[(s >= cut.start - tiny) & (s <= cut.end + tiny)])
-    return np.unique(np.concatenate(chosen))
+    whole = np.repeat(np.arange(len(cuts)), [len(pieces) for pieces in cuts])
+    _, _, nodes = nodes_along(mesh, [cut for pieces in cuts for cut in pieces], whole)
+    on = np.zeros(mesh.node_count, dtype=bool)
+    on[nodes] = True
+    return np.flatnonzero(on)
 
 
 def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[str]:

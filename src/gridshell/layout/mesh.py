@@ -125,25 +125,8 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
 
     `marks`, for each rod the material coordinates [m] of further points that must be nodes.
     """
-    joints_on = [list[tuple[float, int]]() for _ in grid.rods]
     merged = _merge_joints(grid)
-    for node, pair, at in zip(merged.tolist(), grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True):
-        for k, s in zip(pair, at, strict=True):
-            joints_on[k].append((s, node))
-    count = int(merged.max(initial=-1)) + 1
-    fixed, starts = list[tuple[float, int]](), list[int]()
-    for k, (rod, joints) in enumerate(zip(grid.rods, joints_on, strict=True)):
-        tiny = 1e-9 * rod.length
-        joints.sort()
-        here = [mark for n, mark in enumerate(joints) if n == 0 or mark[1] != joints[n - 1][1]]
-        for s in (rod.start, *(marks[k] if marks is not None else ()), rod.end):
-            if all(abs(s - other) > tiny for other, _ in here):
-                here.append((s, count))
-                count += 1
-        starts.append(len(fixed))
-        fixed += sorted(here)
-    s, nodes = np.array([s for s, _ in fixed]), np.array([node for _, node in fixed], dtype=np.intp)
-    rod_of = np.repeat(np.arange(len(starts)), np.diff([*starts, len(fixed)]))
+    rod_of, s, nodes, count = _fixed_points(grid, merged, marks)
     edges = np.ones(len(s), dtype=np.intp)  # from each fixed point to the next of its rod, and one place for the last
     spans = np.flatnonzero(rod_of[1:] == rod_of[:-1])
     edges[spans] = edge_counts(s[spans + 1] - s[spans], edge)
@@ -157,7 +140,38 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
     origin, direction = np.array([rod.origin for rod in grid.rods]), np.array([rod.direction for rod in grid.rods])
     line = rod_of[after]
     flat[rod_nodes, :2] = origin[line] + stations[:, None] * direction[line]
+    starts = np.searchsorted(rod_of, np.arange(len(grid.rods)))
     return GridMesh(grid, flat, rod_nodes, first[starts], stations, merged)
+
+
+def _fixed_points(
+    grid: FlatGrid, merged: Ints, marks: Sequence[Sequence[float]] | None
+) -> tuple[Ints, Floats, Ints, int]:
+    """What must be a node, along one rod after the other: rod, material coordinate [m] and node; and how many nodes.
+
+    Joints of nodes `merged`, each once; then ends and marks, each a node of its own unless one is there already.
+    """
+    given = [[rod.start, *(marks[k] if marks is not None else ()), rod.end] for k, rod in enumerate(grid.rods)]
+    own_rod = np.repeat(np.arange(len(given)), [len(places) for places in given])
+    own = np.array([s for places in given for s in places])
+    rod, s, nodes = grid.crossings.rods.ravel(), grid.crossings.at.ravel(), np.repeat(merged, 2)
+    order = np.lexsort((s, nodes, rod))
+    once = order[np.diff(rod[order] * len(rod) + nodes[order], prepend=-1) > 0]  # three rods make three crossings
+    rod, s = np.concatenate([rod[once], own_rod]), np.concatenate([s[once], own])
+    nodes = np.concatenate([nodes[once], np.full(len(own), -1)])
+    turn = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(own))])  # who comes first
+    order = np.lexsort((turn, s, rod))
+    rod, s, nodes, turn = rod[order], s[order], nodes[order], turn[order]
+    tiny = 1e-9 * np.array([rod.length for rod in grid.rods])
+    near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
+    out = np.zeros(len(s), dtype=bool)
+    out[1:] |= near & (turn[1:] > turn[:-1])
+    out[:-1] |= near & (turn[1:] < turn[:-1])
+    rod, s, nodes, turn = (array[~out] for array in (rod, s, nodes, turn))
+    joints = int(merged.max(initial=-1)) + 1
+    fresh = np.flatnonzero(nodes < 0)
+    nodes[fresh[np.argsort(turn[fresh])]] = joints + np.arange(len(fresh))
+    return rod, s, nodes, joints + len(fresh)
 
 
 def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
@@ -166,44 +180,49 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own, unless
     it would crowd the end, where it would make an edge far shorter and stiffer than the others.
     """
-    joint_of = {
-        tuple(pair): int(node) for pair, node in zip(mesh.grid.crossings.rods.tolist(), mesh.joint_nodes, strict=True)
-    }
-    index = whole_rods(mesh.grid.rods, rods)
+    index, count = np.array(whole_rods(mesh.grid.rods, rods)), len(mesh.grid.rods)
     grid = FlatGrid.of(rods, margin=margin)
-    known = np.array([(min(index[a], index[b]), max(index[a], index[b])) in joint_of for a, b in grid.crossings.rods])
-    grid = FlatGrid(grid.rods, grid.crossings.select(known.astype(bool)))
-    joints = [joint_of[min(index[a], index[b]), max(index[a], index[b])] for a, b in grid.crossings.rods]
-    shared = {node: k for k, node in enumerate(dict.fromkeys(joints))}
-    on_rod = [set[int]() for _ in rods]
-    for (a, b), node in zip(grid.crossings.rods, joints, strict=True):
-        on_rod[a].add(node)
-        on_rod[b].add(node)
-    source = list(shared)
-    nodes, stations, starts = list[int](), list[float](), list[int]()
-    for rod, place, joined in zip(rods, index, on_rod, strict=True):
-        starts.append(len(nodes))
-        s = mesh.stations[mesh.rod_slice(place)]
-        tiny = 1e-9 * rod.length
-        inside = np.flatnonzero((s >= rod.start - tiny) & (s <= rod.end + tiny))
-        from_end = np.minimum(s[inside] - s[inside[0]], s[inside[-1]] - s[inside])
-        crowding = (from_end < CROWDED * float(np.median(np.diff(s)))) & (from_end > 0.0)
-        here = mesh.nodes_of(place)[inside].tolist()
-        for node, station, near in zip(here, s[inside].tolist(), crowding.tolist(), strict=True):
-            if node in joined:
-                nodes.append(shared[node])
-            elif near:
-                continue
-            else:
-                nodes.append(len(source))
-                source.append(node)
-            stations.append(station)
-    chosen = np.array(source, dtype=np.intp)
-    part = GridMesh(
-        grid, mesh.flat[chosen], np.array(nodes, dtype=np.intp), np.array(starts, dtype=np.intp),
-        np.array(stations), np.array([shared[node] for node in joints], dtype=np.intp),
-    )  # fmt: skip
-    return part, chosen
+    pairs = np.sort(index[grid.crossings.rods], axis=1) @ [count, 1]
+    known = mesh.grid.crossings.rods @ [count, 1]
+    order = np.argsort(known, kind="stable")
+    found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
+    kept = known[found] == pairs
+    grid = FlatGrid(grid.rods, grid.crossings.select(kept))
+    _, first, joint = np.unique(mesh.joint_nodes[found[kept]], return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))  # joints keep the order of the crossings
+    joint = rank[joint]
+    shared = mesh.joint_nodes[found[kept]][np.sort(first)]
+    piece, s, node = nodes_along(mesh, rods, index)
+    place = np.full(len(mesh.flat), -1)
+    place[shared] = np.arange(len(shared))
+    joined = np.isin(piece * mesh.node_count + node, (grid.crossings.rods * mesh.node_count + shared[joint][:, None]))
+    starts = np.searchsorted(piece, np.arange(len(rods) + 1))
+    from_end = np.minimum(s - s[starts[piece]], s[starts[piece + 1] - 1] - s)
+    own = ~joined & ~((from_end > 0.0) & (from_end < CROWDED * _usual_edges(mesh)[index][piece]))
+    nodes = np.where(joined, place[node], len(shared) - 1 + np.cumsum(own))
+    made = joined | own
+    chosen = np.concatenate([shared, node[own]])
+    starts = np.searchsorted(piece[made], np.arange(len(rods)))
+    return GridMesh(grid, mesh.flat[chosen], nodes[made], starts, s[made], joint), chosen
+
+
+def nodes_along(mesh: GridMesh, rods: Sequence[FlatRod], whole: Ints) -> tuple[Ints, Floats, Ints]:
+    """All nodes on pieces of the rods `whole` of a mesh: piece, material coordinate [m] and node."""
+    begin, length = mesh.rod_start[whole], (mesh.rod_stop - mesh.rod_start)[whole]
+    piece = np.repeat(np.arange(len(rods)), length)
+    entry = np.arange(len(piece)) + np.repeat(begin - (np.cumsum(length) - length), length)
+    s = mesh.stations[entry]
+    start, end = np.array([(rod.start - 1e-9 * rod.length, rod.end + 1e-9 * rod.length) for rod in rods]).T
+    on = (s >= start[piece]) & (s <= end[piece])
+    return piece[on], s[on], mesh.rod_nodes[entry[on]]
+
+
+def _usual_edges(mesh: GridMesh) -> Floats:
+    """(m,) median length of the edges of each rod [m]."""
+    order = np.lexsort((mesh.edge_lengths, mesh.edge_rods))
+    count = np.bincount(mesh.edge_rods, minlength=len(mesh.grid.rods))
+    low, high = (np.cumsum(count) - count + half for half in ((count - 1) // 2, count // 2))
+    return 0.5 * (mesh.edge_lengths[order[low]] + mesh.edge_lengths[order[high]])
 
 
 def edge_counts(lengths: Floats, edge: float) -> Ints:

@@ -48,7 +48,7 @@ def with_apron(net: ChebyshevNet, clearance: float) -> FlatGrid:
     for family, table in (("u", points), ("v", points.T)):
         own = lines[family]
         for line, offset in enumerate(own.offsets.tolist()):
-            for stretch in np.unique(own.stretches[line]).tolist():
+            for stretch in range(int(own.stretches[line, 0]), int(own.stretches[line, -1]) + 1):
                 here = table[line] & (own.stretches[line] == stretch)
                 rods += _prolonged(spans.get((family, line, stretch)), family, offset, own.stations[here])
     return FlatGrid.of(rods)

@@ -26,7 +26,24 @@ from gridshell.solve.multifrontal import Multifrontal
 from gridshell.solve.report import SolveReport, Status
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 Progress = Callable[[int, float], None]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Which blocks (m, k) of unknowns the energies couple, each block with `count` (n,) free directions; and what
+    follows from that alone: the assembly's maps, and a solver with its order of elimination."""
+
+    blocks: tuple[Ints, ...]
+    count: Ints
+    assembly: Assembly
+    solver: LinearSolver
+
+    def serves(self, blocks: tuple[Ints, ...], count: Ints) -> bool:
+        """Whether another problem has this pattern."""
+        here, there = (*self.blocks, self.count), (*blocks, count)
+        return len(here) == len(there) and all(map(np.array_equal, here, there))
 
 
 @dataclass(frozen=True)
@@ -42,6 +59,7 @@ class Problem:
     length : characteristic length of the shape [m]: steps are measured by it.
     load : (n, 3) dead forces [N], or None.
     places : (n, 2) where the blocks lie in the flat grid, from which the order of elimination follows, or None.
+    pattern : of a problem that was solved before; where this one has the same, it need not be analysed again.
     """
 
     elements: tuple[Elements, ...]
@@ -51,6 +69,7 @@ class Problem:
     inextensible: bool = False
     load: Floats | None = None
     places: Floats | None = None
+    pattern: Pattern | None = None
 
 
 @dataclass(frozen=True)
@@ -66,6 +85,7 @@ class Equilibrium:
     gradient: Floats
     report: SolveReport
     elements: tuple[Elements, ...]
+    pattern: Pattern
     mode: Floats | None = None
 
 
@@ -133,7 +153,7 @@ def find_equilibrium(
     )
     mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     step.refresh(state)
-    return Equilibrium(state, forces, gradient, report, step.elements, mode)
+    return Equilibrium(state, forces, gradient, report, step.elements, step.pattern, mode)
 
 
 def find_stable(
@@ -174,6 +194,15 @@ def linear_solver(
     return Multifrontal(indptr, indices, np.repeat(places, free.count, axis=0))
 
 
+def _pattern(problem: Problem, blocks: tuple[Ints, ...], free: Freedom) -> Pattern:
+    """The pattern of a problem: the one that comes with it, or a new one."""
+    if problem.pattern is not None and problem.pattern.serves(blocks, free.count):
+        return problem.pattern
+    assembly = Assembly.of(blocks, free)
+    solver = linear_solver(assembly.indptr, assembly.indices, free, problem.places)
+    return Pattern(blocks, free.count, assembly, solver)
+
+
 class _Step:
     """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
 
@@ -182,10 +211,10 @@ class _Step:
         self.elements = problem.elements
         free = problem.constraint.freedom(state)
         everywhere = np.arange(len(state))[:, None]
-        self._blocks = [*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere]
-        self._assembly = Assembly.of(self._blocks, free)
+        self._blocks = (*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere)
+        self.pattern = _pattern(problem, self._blocks, free)
+        self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
-        self._solver = linear_solver(self._assembly.indptr, self._assembly.indices, free, problem.places)
         self.dofs = free.size
         self.factorizations = 0
         self.negative_modes = 0
