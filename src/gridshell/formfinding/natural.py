@@ -1,8 +1,8 @@
 """Natural ends: how the rods of a net, bound to the surface, straighten there.
 
-A line of the net goes on curving to its end, while a rod bends no more at its own. The joints hardly move for it, so that
-between them each rod differs from its line by a cubic spline that vanishes at the joints, and whose end moments undo the
-line's geodesic curvature. It dies out by 0.27 from joint to joint. (Beam theory to first order; the solve does the rest.)
+A line of the net goes on curving to its end, while a rod bends no more at its own. The joints hardly move for it: between
+them each rod differs from its line by a cubic spline that vanishes at the joints, and whose end moments undo the line's
+geodesic curvature. It dies out by 0.27 from joint to joint. (Beam theory, to first order; the solve does the rest.)
 """
 
 import numba as nb
@@ -41,13 +41,19 @@ def _straighten(points, normal, rod_nodes, rod_start, rod_stop, stations, joint,
             for k in range(a + 1, b):
                 x, y = (s[b] - s[k]) / h, (s[k] - s[a]) / h
                 shift = h * h / 6.0 * (moments[span] * (x**3 - x) + moments[span + 1] * (y**3 - y))
-                result[nodes[k]] += shift * side[k]
+                _shift(result, nodes[k], shift, side, k)
         for first, second, stop, one in ((0, 1, -1, -1), (len(at) - 1, len(at) - 2, len(nodes), 1)):
             begin, h = at[first], abs(s[at[first]] - s[at[second]])
             slope = h / 6.0 * (2.0 * moments[first] + moments[second])
             for k in range(begin + one, stop, one):  # past the last joint a rod goes straight on
                 far = abs(s[k] - s[begin])
-                result[nodes[k]] += far * (slope + 0.5 * far * moments[first]) * side[k]
+                _shift(result, nodes[k], far * (slope + 0.5 * far * moments[first]), side, k)
+
+
+@nb.njit(cache=True)
+def _shift(result, node, shift, side, k):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        result[node, i] += shift * side[k, i]
 
 
 @nb.njit(cache=True, error_model="numpy")
@@ -55,12 +61,13 @@ def _sideways(points, normal, nodes):  # type: ignore[no-untyped-def]
     """(n, 3) unit vectors in the surface across a rod."""
     side, last = np.empty((len(nodes), 3)), len(nodes) - 1
     for k in range(len(nodes)):
-        along = points[nodes[min(k + 1, last)]] - points[nodes[max(k - 1, 0)]]
-        n = normal[nodes[k]]
+        a, b, n, square = points[nodes[max(k - 1, 0)]], points[nodes[min(k + 1, last)]], normal[nodes[k]], 0.0
         for i in range(3):
             m, p = (i + 1) % 3, (i + 2) % 3
-            side[k, i] = n[m] * along[p] - n[p] * along[m]
-        side[k] /= np.sqrt(side[k, 0] ** 2 + side[k, 1] ** 2 + side[k, 2] ** 2)
+            side[k, i] = n[m] * (b[p] - a[p]) - n[p] * (b[m] - a[m])
+            square += side[k, i] ** 2
+        for i in range(3):
+            side[k, i] /= np.sqrt(square)
     return side
 
 

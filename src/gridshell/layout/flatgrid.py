@@ -1,7 +1,7 @@
 """Straight rods lying in a plane, and where they cross."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -64,7 +64,9 @@ class FlatRod:
         return self.line == piece.line and self.start - tiny <= piece.start and piece.end <= self.end + tiny
 
     def cut(self, start: float, end: float) -> "FlatRod":
-        return replace(self, start=start, end=end)
+        return FlatRod(
+            self.name, self.family, self.offset, start, end, self.origin, self.direction, self.virtual
+        )  # fmt: skip
 
 
 def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:

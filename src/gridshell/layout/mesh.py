@@ -167,11 +167,9 @@ def _fixed_points(
     out = np.zeros(len(s), dtype=bool)
     out[1:] |= near & (turn[1:] > turn[:-1])
     out[:-1] |= near & (turn[1:] < turn[:-1])
-    rod, s, nodes, turn = (array[~out] for array in (rod, s, nodes, turn))
-    joints = int(merged.max(initial=-1)) + 1
-    fresh = np.flatnonzero(nodes < 0)
+    joints, fresh = int(merged.max(initial=-1)) + 1, np.flatnonzero(~out & (nodes < 0))
     nodes[fresh[np.argsort(turn[fresh])]] = joints + np.arange(len(fresh))
-    return rod, s, nodes, joints + len(fresh)
+    return rod[~out], s[~out], nodes[~out], joints + len(fresh)
 
 
 def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:

@@ -48,9 +48,10 @@ def with_apron(net: ChebyshevNet, clearance: float) -> FlatGrid:
     for family, table in (("u", points), ("v", points.T)):
         own = lines[family]
         for line, offset in enumerate(own.offsets.tolist()):
-            for stretch in range(int(own.stretches[line, 0]), int(own.stretches[line, -1]) + 1):
-                here = table[line] & (own.stretches[line] == stretch)
-                rods += _prolonged(spans.get((family, line, stretch)), family, offset, own.stations[here])
+            stations, stretches = own.stations[table[line]], own.stretches[line][table[line]]
+            spanned = {stretch for one, at, stretch in spans if (one, at) == (family, line)}
+            for stretch in sorted(spanned.union(stretches.tolist())):
+                rods += _prolonged(spans.get((family, line, stretch)), family, offset, stations[stretches == stretch])
     return FlatGrid.of(rods)
 
 

@@ -138,8 +138,8 @@ def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # ty
 
 
 def fill_quadrants(target: Target, net: Net) -> None:
-    """What is not known of all four quadrants: first all nodes whose neighbours are known, and then, since a node depends
-    only on those of earlier anti-diagonals, what follows from them, one anti-diagonal at a time."""
+    """What is not known of all four quadrants: first all nodes whose neighbours are known, then what follows from them,
+    one anti-diagonal at a time, since a node depends only on those of earlier ones."""
     tried = np.zeros(net.points.shape[:2], dtype=bool)
     found = _next_nodes(net.points, tried, net.u, net.v, *net.origin, 2, len(net.u) + len(net.v))
     diagonal = 2
@@ -153,8 +153,8 @@ def fill_quadrants(target: Target, net: Net) -> None:
 @nb.njit(cache=True)
 def _next_nodes(points, tried, u, v, i0, j0, diagonal, some):  # type: ignore[no-untyped-def]
     """Of the first anti-diagonals from `diagonal` on that have any, `some` at a time: the nodes that are unknown, not
-    `tried`, and whose neighbours are known. Where to go on; their indices; the neighbours A towards the u axis, B towards
-    the v axis, and D across; the two chords; and the side of the net's quadrant."""
+    `tried`, and whose neighbours are known. Where to go on; their indices; the neighbours A towards the u axis, B
+    towards the v axis, and D across; the two chords; and the side of the net's quadrant."""
     nu, nv = len(u), len(v)
     last, most = nu + nv - 2, nu * nv
     while True:

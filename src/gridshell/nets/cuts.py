@@ -1,6 +1,8 @@
 """Where the lines of a net leave a target: runs of inside nodes, and cuts between nodes."""
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -79,8 +81,8 @@ def _fill_runs(region: Mask, seeds: Mask) -> Mask:
 
 
 class Lines(NamedTuple):
-    """Lines of a net: material coordinates `s` (n,) along them [m], `points` (m, n, 3) of each, NaN where there are none,
-    and which are `inside` (m, n)."""
+    """Lines of a net: material coordinates `s` (n,) along them [m], `points` (m, n, 3) of each, NaN where there are
+    none, and which are `inside` (m, n)."""
 
     s: Floats
     points: Floats
@@ -129,19 +131,19 @@ def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[
     the end, the marches may find different pieces. An end that only one of them finds stays where it is; its
     error is at most about half the gap or piece that the other march does not see, or the way to its nearest end.
     """
-    ends, error = np.array(fine).ravel(), 0.0
-    better = ends.copy()
+    ends, error = [end for cut in fine for end in cut], 0.0
+    better = list[float]()
     for k, end in enumerate(ends):
-        rough = np.array([cut[k % 2] for cut in coarse])
-        change = float(end - rough[np.argmin(np.abs(rough - end))]) if len(rough) else np.inf
+        change = min((end - cut[k % 2] for cut in coarse), key=abs, default=inf)
         if abs(change) <= step:
-            better[k] = end + change / 3
+            better.append(end + change / 3)
             error = max(error, abs(change) / 3)
         else:
-            error = max(error, min(abs(change), 0.5 * float(np.abs(np.delete(ends, k) - end).min())))
-    if not np.all(np.diff(better) > 0):
+            better.append(end)
+            error = max(error, min(abs(change), 0.5 * min(abs(other - end) for other in ends[:k] + ends[k + 1 :])))
+    if any(after <= before for before, after in pairwise(better)):
         return fine, max(error, step)
-    return [Cut(float(start), float(end)) for start, end in better.reshape(-1, 2)], error
+    return [Cut(start, end) for start, end in zip(better[::2], better[1::2], strict=True)], error
 
 
 def _roots(target: Target, sets: Sequence[Lines], runs: Sequence[tuple[Ints, Ints, Ints]]) -> Floats:
