@@ -343,7 +343,7 @@ def test_the_work_of_all_tries_is_counted():
     _, straight = squeezed_column(20, 1.5, stiffness=1e4 * EI)
     _, found = squeezed_column(20, 1.5, find_stable, stiffness=1e4 * EI)
     assert found.report.iterations > straight.report.iterations
-    assert found.report.factorizations >= found.report.iterations
+    assert found.report.factorizations > straight.report.factorizations
 
 
 # Reactions of a popped-up grid

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 import gridshell as gs
 from gridshell.errors import InputError
 from gridshell.model import Shell
+from gridshell.solve import mixed_newton
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Problem, find_equilibrium, find_stable
 
@@ -81,6 +82,23 @@ def test_pop_up_is_a_stable_equilibrium_with_its_ends_on_the_boundary(name, ends
     assert popped.report.stable
     assert popped.report.factorizations <= 8  # 2 to 5 measured
     np.testing.assert_array_equal(popped.positions[popped.footprint.mesh.ends.ravel()], boundary.points)
+
+
+@every_target
+@both_ends
+def test_chord_steps_lead_where_newtons_lead_with_fewer_factorisations(name, ends, monkeypatch):
+    trimmed = trimmed_on(name)
+    found = popped_on(name, ends)
+    monkeypatch.setattr(mixed_newton, "CHORD", 0.0)
+    newton = gs.pop_up(gs.map_back(trimmed), trimmed.boundary, ROD, ends=ends)
+    assert newton.report.factorizations == newton.report.iterations
+    assert found.report.factorizations <= newton.report.factorizations
+    if ends == "pinned":
+        assert found.report.factorizations < newton.report.factorizations
+    assert found.report.negative_modes == newton.report.negative_modes
+    size = trimmed.draped.target.size
+    assert np.abs(found.positions - newton.positions).max() < 1e-10 * size
+    assert np.abs(found.forces - newton.forces).max() < 1e-5 * np.abs(newton.forces).max()
 
 
 @every_target

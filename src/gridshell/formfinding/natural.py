@@ -1,8 +1,8 @@
 """Natural ends: how the rods of a net, bound to the surface, straighten there.
 
-A line of the net goes on curving to its end, while a rod bends no more at its own. The joints hardly move for it: between
-them each rod differs from its line by a cubic spline that vanishes at the joints, and whose end moments undo the line's
-geodesic curvature. It dies out by 0.27 from joint to joint. (Beam theory, to first order; the solve does the rest.)
+A line of the net goes on curving to its end, while a rod bends no more at its own. The joints hardly move for it: so
+between them each rod differs from its line by a cubic spline that vanishes at the joints, and whose end moments undo
+the line's geodesic curvature. It dies out by 0.27 from joint to joint. (Beam theory, to first order.)
 """
 
 import numba as nb

@@ -89,9 +89,9 @@ class Equilibrium:
     mode: Floats | None = None
 
 
-TOLERANCE = 2e-11  # of the length: estimate of the error that is left
+TOLERANCE = 1e-13  # of the length: estimate of the error that is left
 CURVED = 20.0  # what is left after Newton's step is its square, times this: the most on smooth targets
-FORCE_TOLERANCE = 1e-6  # of the largest axial force, or of the
+FORCE_TOLERANCE = 1e-10  # of the largest axial force, or of the
 LEAST_FORCE = 1e-6  # of EA, estimated likewise
 STRAIN_TOLERANCE = 2e-6
 LONGEST_STEP = 0.15  # of the length
@@ -99,8 +99,9 @@ NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
 SAME_FORCES = 0.01  # of the largest axial force: no more they may change after the negative modes are counted
 CHORD = 1e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
-SLOW = 0.1  # of the last step: chord steps that are longer do not pay
+SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
+LEAST = 1e-300
 
 
 def find_equilibrium(
@@ -262,6 +263,9 @@ class _Step:
         if prescribed is not None:
             motion += prescribed
         reach = float(np.sqrt(np.einsum("ij,ij->i", motion, motion).max()))
+        if self._chord and not reach <= SLOW * self._last[0] * problem.length:  # of no use: Newton's step instead
+            self._chord = False
+            return self.take(state, forces, descend)
         share = min(1.0, LONGEST_STEP * problem.length / reach) if reach > 0 else 1.0
         strains += stretch.elongation(at, motion)
         forces_next = forces + share * (base + stretch.stiffness * strains - forces)
@@ -279,10 +283,10 @@ class _Step:
         """
         size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE * float(self._problem.stretch.stiffness.max()))
         changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
-        rates = (moved / self._last[0], changed / self._last[1]) if self._chord else (CURVED * moved, changed)
+        shrunk = moved / max(self._last[0], LEAST), changed / max(self._last[1], LEAST)
+        rates = shrunk if self._chord else (CURVED * moved, changed)
         self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < SAME_FORCES
-        slow = self._chord and max(rates) > SLOW
-        self._chord = moved < CHORD and since < SAME_FORCES and not slow and not self.negative_modes
+        self._chord = moved < CHORD and since < SAME_FORCES and not self.negative_modes
         self._last = moved, changed
 
     def _times(self, motion: Floats) -> Floats:
