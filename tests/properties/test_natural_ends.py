@@ -35,6 +35,17 @@ def test_a_rod_on_a_plane_becomes_the_natural_spline_through_its_joints(tail):
     assert found[others] == pytest.approx(points[others], abs=1e-12)
 
 
+def test_a_line_that_turns_far_in_its_last_span_is_left_alone():
+    mesh = mesh_grid(
+        FlatGrid.of([FlatRod.u("U", 0.0, 0.0, 3.0), *(FlatRod.v(f"V{k}", k, -1.0, 1.0) for k in range(4))]), 0.1
+    )
+    for turn, moves in ((0.45, True), (0.55, False)):
+        points = mesh.flat.copy()
+        points[:, 1] += 0.5 * turn * points[:, 0] ** 2 * (points[:, 0] < 0.6)  # of one span, from the level start on
+        moved = with_natural_ends(PLANE, mesh, points) - points
+        assert (np.abs(moved).max() > 1e-3) == moves
+
+
 @pytest.mark.parametrize("target", [gs.Hemisphere(0.2), gs.Paraboloid(0.2, 0.15), gs.Ellipsoid(0.2, 0.15, 0.18)])
 def test_the_drape_starts_much_nearer_to_where_it_ends(target, monkeypatch):
     bound, seen = importlib.import_module("gridshell.formfinding.bound"), list[np.ndarray]()

@@ -7,18 +7,31 @@ carried is only a guess, from which a solve starts.
 import numpy as np
 from numpy.typing import NDArray
 
+from gridshell.geometry.curves import on_curve
 from gridshell.layout import GridMesh
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 SAME_LINE = 0.25  # spacings
 
 
 def carried_nodes(values: Floats, mesh: GridMesh, to: GridMesh) -> Floats:
-    """(n, d) values at the nodes of the mesh `to`, from those (m, d) at the nodes of `mesh`; zero on new rods."""
-    result = np.zeros((to.node_count, values.shape[1]))
+    """(n, d) values at the nodes of the mesh `to`, from those (m, d) at the nodes of `mesh`; zero on new rods.
+
+    Where two rods meet, what comes along them differs a little: they take the mean, without a kink of either.
+    """
+    total, count = np.zeros((to.node_count, values.shape[1])), np.zeros((to.node_count, 1))
+    own = list[tuple[Ints, Floats, Floats]]()
     for rod, old in corresponding(mesh, to):
-        result[to.nodes_of(rod)] = _along(_shares(to, rod), _shares(mesh, old), values[mesh.nodes_of(old)])
+        nodes, shares = to.nodes_of(rod), _shares(to, rod)
+        own.append((nodes, shares, _along(shares, _shares(mesh, old), values[mesh.nodes_of(old)])))
+        total[nodes] += own[-1][2]
+        count[nodes] += 1
+    result = total / np.maximum(count, 1)
+    for nodes, shares, alone in own:
+        at = np.flatnonzero((count[nodes, 0] > 1) | (np.arange(len(nodes)) % (len(nodes) - 1) == 0))
+        result[nodes] = alone + _along(shares, shares[at], (result[nodes] - alone)[at])
     return result
 
 
@@ -66,4 +79,5 @@ def _middles(shares: Floats) -> Floats:
 
 
 def _along(now: Floats, before: Floats, values: Floats) -> Floats:
-    return np.column_stack([np.interp(now, before, column) for column in values.T])
+    """By local cubics: between the nodes of straight pieces a rod would have kinks."""
+    return on_curve(before, values, np.clip(now, before[0], before[-1]))

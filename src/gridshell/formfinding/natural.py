@@ -14,6 +14,8 @@ from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
 
+STEEP = 0.5  # rad that a line turns in its last span: such a rod stays on its line, beam theory is not for it
+
 
 def with_natural_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
     """The nodes (n, 3) of lines of a net on the target, moved sideways to about where rods would be [m]."""
@@ -34,7 +36,10 @@ def _straighten(points, normal, rod_nodes, rod_start, rod_stop, stations, joint,
             continue
         side = _sideways(points, normal, nodes)
         curvature = _curvature(points, nodes, s, side)
-        moments = _moments(s[at], -curvature[at[0]], -curvature[at[-1]])
+        first, last = curvature[at[0]], curvature[at[-1]]
+        if max(abs(first) * (s[at[1]] - s[at[0]]), abs(last) * (s[at[-1]] - s[at[-2]])) > STEEP:
+            continue
+        moments = _moments(s[at], -first, -last)
         for span in range(len(at) - 1):
             a, b = at[span], at[span + 1]
             h = s[b] - s[a]
@@ -42,12 +47,12 @@ def _straighten(points, normal, rod_nodes, rod_start, rod_stop, stations, joint,
                 x, y = (s[b] - s[k]) / h, (s[k] - s[a]) / h
                 shift = h * h / 6.0 * (moments[span] * (x**3 - x) + moments[span + 1] * (y**3 - y))
                 _shift(result, nodes[k], shift, side, k)
-        for first, second, stop, one in ((0, 1, -1, -1), (len(at) - 1, len(at) - 2, len(nodes), 1)):
-            begin, h = at[first], abs(s[at[first]] - s[at[second]])
-            slope = h / 6.0 * (2.0 * moments[first] + moments[second])
+        for end, inner, stop, one in ((0, 1, -1, -1), (len(at) - 1, len(at) - 2, len(nodes), 1)):
+            begin, h = at[end], abs(s[at[end]] - s[at[inner]])
+            slope = h / 6.0 * (2.0 * moments[end] + moments[inner])
             for k in range(begin + one, stop, one):  # past the last joint a rod goes straight on
                 far = abs(s[k] - s[begin])
-                _shift(result, nodes[k], far * (slope + 0.5 * far * moments[first]), side, k)
+                _shift(result, nodes[k], far * (slope + 0.5 * far * moments[end]), side, k)
 
 
 @nb.njit(cache=True)
