@@ -348,8 +348,7 @@ def test_a_best_footprint_that_pops_up_otherwise_is_said(whole: History) -> None
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.target.name)
 def test_the_kept_searches_converged_and_their_best_pop_up_again_nearer_than_the_direct_answer(case: Case) -> None:
     history = stored(case.target.name)
-    if history is None:
-        pytest.skip(f"no search for the {case.target.name} is kept: python docs/genetic.py {case.target.name}")
+    assert history is not None
     best = [one.best for one in history.generations]
     assert best[-1] > (1 - GAIN) * best[-1 - WINDOW]
     assert min(np.array(best[: -1 - WINDOW][WINDOW:]) * (1 - GAIN) - best[2 * WINDOW : -1]) > 0  # not before

@@ -123,8 +123,8 @@ def find_equilibrium(
     """
     begin = time.perf_counter()
     step = _Step(problem, state)
-    status, iteration = Status.STALLED, 0
-    for iteration in range(1, most_iterations + 1):
+    status = Status.STALLED
+    while step.iterations < most_iterations:
         try:
             moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
         except SingularError:
@@ -135,7 +135,7 @@ def find_equilibrium(
             break
         state, forces = state_next, forces_next
         if progress is not None:
-            progress(iteration, moved / problem.length)
+            progress(step.iterations, moved / problem.length)
         if step.settled and mismatch < STRAIN_TOLERANCE:
             status = Status.CONVERGED
             break
@@ -145,7 +145,7 @@ def find_equilibrium(
     report = SolveReport(
         status=status,
         dofs=step.dofs,
-        iterations=iteration,
+        iterations=step.iterations,
         factorizations=step.factorizations,
         seconds=time.perf_counter() - begin,
         force_residual=float(np.abs(residual).max(initial=0.0)),
@@ -217,12 +217,13 @@ class _Step:
         self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
         self.dofs = free.size
+        self.iterations = 0  # chord steps in a row, which stand for one of Newton's, count as one
         self.factorizations = 0
         self.negative_modes = 0
         self._shift = 0.0
         self._factored = state, np.empty(0)  # where the matrix is from
         self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
-        self._chord = self.settled = False
+        self._chord = self._was_chord = self.settled = False
 
     def refresh(self, state: Floats) -> None:
         self.elements = tuple(element.refreshed(state) for element in self.elements)
@@ -281,13 +282,14 @@ class _Step:
 
         After Newton's step the error is about its square; after a chord step it shrinks as from the last step to this.
         """
+        self.iterations += not (self._chord and self._was_chord)
         size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE * float(self._problem.stretch.stiffness.max()))
         changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
         shrunk = moved / max(self._last[0], LEAST), changed / max(self._last[1], LEAST)
         rates = shrunk if self._chord else (CURVED * moved, changed)
         self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < SAME_FORCES
+        self._was_chord, self._last = self._chord, (moved, changed)
         self._chord = moved < CHORD and since < SAME_FORCES and not self.negative_modes
-        self._last = moved, changed
 
     def _times(self, motion: Floats) -> Floats:
         """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""
