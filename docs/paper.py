@@ -29,8 +29,8 @@ BESIDE = {  # what the paper has where we have this
     "(ellipsoid), which may be simulated times or its own; h = 0.1 s against unknowns, which explicit ties do not bear "
     "(E7).",
     "genetic": 'The paper: a hemispherical gridshell "may take approximately" 100 generations of 500 individuals, or '
-    "50,000 forward simulations, for which its own method needs one. It has the algorithm's G0 for the paraboloid and the "
-    "ellipsoid, from reference 30, as a line in its figure, without numbers.",
+    "50,000 forward simulations, for which its own method needs one. It has the algorithm's G0 for the paraboloid and "
+    "the ellipsoid, from reference 30, as a line in its figure, without numbers.",
     "studies": 'The paper: H, E, r and g "do not significantly influence the actuated shape" of soft, inextensible '
     'rods; C1 = C2 = 1e6 EI "after a convergent study".',
 }
