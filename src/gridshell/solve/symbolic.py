@@ -58,7 +58,7 @@ def plan_of(indptr: Ints, indices: Ints, blocks: Blocks, order: Ints) -> Plan:
     order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
-    row_start, rows = _fronts(first, order, blocks.start, blocks.neighbours, child_start, children)
+    row_start, rows = _fronts(first, order, blocks.start, blocks.neighbours, up)
     maps = _maps(indptr, indices, blocks.begin, order, weight, first, up, row_start, rows, child_start, children)
     return Plan(*maps)
 
@@ -226,45 +226,39 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)
-def _fronts(first, order, start, neighbours, child_start, children):  # type: ignore[no-untyped-def]
-    """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]]."""
+def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def]
+    """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]].
+
+    Block i is in its own front, and in all those between that of an earlier block it is coupled to and its own.
+    """
     supers, n = len(first) - 1, len(order)
-    place, mark = np.empty(n, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    place, owner, mark = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(supers, dtype=np.int64)
     for k in range(n):
         place[order[k]] = k
-    row_start, rows, used = np.zeros(supers + 1, dtype=np.int64), np.empty(max(16, 4 * n), dtype=np.int64), 0
     for s in range(supers):
-        for j in range(first[s], first[s + 1]):
-            rows, used = _push(rows, used, j)
-            mark[j] = s
-        own = used
-        for j in range(first[s], first[s + 1]):
-            for e in range(start[order[j]], start[order[j] + 1]):
-                i = place[neighbours[e]]
-                if i > j and mark[i] != s:
-                    mark[i] = s
-                    rows, used = _push(rows, used, i)
-        for e in range(child_start[s], child_start[s + 1]):
-            c = children[e]
-            for k in range(row_start[c] + first[c + 1] - first[c], row_start[c + 1]):
-                i = rows[k]
-                if mark[i] != s:
-                    mark[i] = s
-                    rows, used = _push(rows, used, i)
-        rows[own:used].sort()
-        row_start[s + 1] = used
-    return row_start, rows[:used].copy()
-
-
-@nb.njit(cache=True)
-def _push(array, used, value):  # type: ignore[no-untyped-def]
-    """Append to an array that doubles when it is full."""
-    if used == len(array):
-        larger = np.empty(2 * used, dtype=array.dtype)
-        larger[:used] = array
-        array = larger
-    array[used] = value
-    return array, used + 1
+        owner[first[s] : first[s + 1]] = s
+    row_start, rows, used = np.zeros(supers + 1, dtype=np.int64), np.empty(0, dtype=np.int64), mark.copy()
+    for sweep in range(2):  # count, then fill
+        used[:], mark[:] = row_start[:-1], -1
+        for i in range(n):
+            s = owner[i]
+            mark[s] = i
+            if sweep == 1:
+                rows[used[s]] = i
+            used[s] += 1
+            for e in range(start[order[i]], start[order[i] + 1]):
+                j = place[neighbours[e]]
+                s = owner[j]
+                while j < i and mark[s] != i:
+                    mark[s] = i
+                    if sweep == 1:
+                        rows[used[s]] = i
+                    used[s] += 1
+                    s = up[s]
+        if sweep == 0:
+            row_start[1:] = np.cumsum(used)
+            rows = np.empty(row_start[supers], dtype=np.int64)
+    return row_start, rows
 
 
 @nb.njit(cache=True)
