@@ -124,7 +124,8 @@ def find_equilibrium(
     begin = time.perf_counter()
     step = _Step(problem, state)
     status = Status.STALLED
-    while step.iterations < most_iterations:
+    while step.iterations + step.counts <= most_iterations:
+        new = step.counts
         try:
             moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
         except SingularError:
@@ -134,7 +135,7 @@ def find_equilibrium(
             status = Status.DIVERGED
             break
         state, forces = state_next, forces_next
-        if progress is not None:
+        if progress is not None and new:
             progress(step.iterations, moved / problem.length)
         if step.settled and mismatch < STRAIN_TOLERANCE:
             status = Status.CONVERGED
@@ -217,13 +218,18 @@ class _Step:
         self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
         self.dofs = free.size
-        self.iterations = 0  # chord steps in a row, which stand for one of Newton's, count as one
+        self.iterations = 0
         self.factorizations = 0
         self.negative_modes = 0
         self._shift = 0.0
         self._factored = state, np.empty(0)  # where the matrix is from
         self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
         self._chord = self._was_chord = self.settled = False
+
+    @property
+    def counts(self) -> bool:
+        """Whether the next step is an iteration: chord steps in a row stand for one of Newton's."""
+        return not (self._chord and self._was_chord)
 
     def refresh(self, state: Floats) -> None:
         self.elements = tuple(element.refreshed(state) for element in self.elements)
@@ -282,7 +288,7 @@ class _Step:
 
         After Newton's step the error is about its square; after a chord step it shrinks as from the last step to this.
         """
-        self.iterations += not (self._chord and self._was_chord)
+        self.iterations += self.counts
         size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE * float(self._problem.stretch.stiffness.max()))
         changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
         shrunk = moved / max(self._last[0], LEAST), changed / max(self._last[1], LEAST)
