@@ -3,17 +3,22 @@
 import io
 import re
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
+from sample_archive import sample_archive
 
+from gridshell.output.colours import mixed
 from gridshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
-from gridshell.output.labels import Room
+from gridshell.output.labels import Room, lines_meet
 from gridshell.output.pdf import POINTS, WIDTHS, drawings_pdf
+from gridshell.output.pictures import LAYERS, PAPER, picture
 from gridshell.output.png import drawing_png
+from gridshell.output.rods import rods_of
 from gridshell.output.svg import drawing_svg, number
 
 numbers = st.floats(-1e6, 1e6).map(lambda x: float(np.round(x, 4))) | st.sampled_from([0.0, -0.001, 100.0, -0.5, 1.005])
@@ -95,3 +100,61 @@ def test_a_box_is_free_unless_it_meets_one_that_was_taken(boxes: list[tuple[floa
         assert room.free(corners) == all(apart)
         room.take(corners)
         taken.append((x, y, width, height))
+
+
+@given(st.floats(-3, 3), st.lists(st.floats(-3, 3), min_size=4, max_size=4))
+def test_a_line_meets_a_box_where_one_of_its_points_lies_inside(angle: float, ends: list[float]) -> None:
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    line = np.array(ends).reshape(2, 2)
+    box = np.array([[-1.5, -0.5], [1.5, -0.5], [1.5, 0.5], [-1.5, 0.5]])
+    along = line[0] + np.linspace(0, 1, 2001)[:, None] * (line[1] - line[0])
+    beyond = np.max(np.abs(along) - (1.5, 0.5), axis=1).min()  # how far the best of the points is outside
+    if abs(beyond) > 0.005:  # no longer than a step between two points
+        assert lines_meet(box @ turn + 7.0, line[None] @ turn + 7.0) == (beyond < 0)
+
+
+def test_a_mark_of_a_pdf_is_a_circle() -> None:
+    pencil = Pencil()
+    pencil.mark((50.0, 40.0), 7.0, "MARK")
+    pdf = drawings_pdf([pencil.done("", "", 2.0)], (100.0, 80.0), "")
+    (stream,) = re.findall(rb"stream\n(.*?)\nendstream", pdf, re.DOTALL)
+    (words,) = re.findall(r"(\S+ \S+ m .*) c S", zlib.decompress(stream).decode())
+    points = np.array(re.findall(r"-?\d+\.\d+", words), dtype=float).reshape(-1, 2)
+    for k in range(0, 12, 3):
+        middle = np.array([1, 3, 3, 1]) @ points[k : k + 4] / 8
+        np.testing.assert_allclose(
+            np.hypot(*(np.array([points[k], middle, points[k + 3]]) - (50, 40)).T), 7.0, rtol=3e-4
+        )
+    np.testing.assert_allclose(np.sum(points[:12:3] - (50, 40), axis=0), 0, atol=2e-3)
+    np.testing.assert_array_equal(points[0], points[-1])
+
+
+@pytest.mark.parametrize("state", ["flat", "popped_pinned"])
+def test_a_picture_draws_every_rod_whole_and_once_over_a_halo(state: str) -> None:
+    archive = sample_archive(5)
+    shape = picture(archive, state)
+    rods = [path for path in shape.paths if path.layer == "CUT" and path.pen]
+    halo, ink = ([path for path in rods if path.pen and (path.pen.colour == PAPER) == paper] for paper in (True, False))
+    lengths = [sum(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum() for path in some) for some in (halo, ink)]
+    nodes = {tuple(point) for path in ink for point in np.round(path.points, 9)}
+    assert len(nodes) == len(np.unique(archive.states["rod_nodes"]))
+    assert lengths[0] == pytest.approx(lengths[1], rel=1e-12)
+    pieces = sum(len(path.points) - 1 for path in ink)
+    assert pieces == sum(len(rod.nodes) - 1 for rod in rods_of(archive))
+    assert len({path.pen.width for path in ink if path.pen}) <= LAYERS
+    assert len(ink) >= len(rods_of(archive))
+
+
+def test_what_is_made_of_an_archive_is_made_again_for_another() -> None:
+    first = sample_archive(5)
+    second = replace(first, result={**first.result, "rods": first.result["rods"][:3]})
+    assert rods_of(first) is rods_of(first)
+    assert len(rods_of(first)) == 10
+    assert len(rods_of(second)) == 3
+    assert first == replace(second, result=first.result)
+
+
+def test_mixed_colours_lie_between() -> None:
+    assert mixed("#1f5f8b", "#fdfdfb", 0.0) == "#1f5f8b"
+    assert mixed("#1f5f8b", "#fdfdfb", 1.0) == "#fdfdfb"
+    assert mixed("#004080", "#80c000", 0.25) == "#206060"

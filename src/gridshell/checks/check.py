@@ -53,11 +53,11 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
         return Checks(bent, held, carried, None, ())
     last = done["pinned"]
     deployment = deploy(
-        last.shell, last.state, last.forces, stages=stages,
+        last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
         told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
     )  # fmt: skip
     flat = bending(last.footprint.mesh, deployment.positions[0], rod)
-    on_the_way = (flat, *(bending_of(last.shell, state, rod) for state in deployment.states))
+    on_the_way = (flat, *(bending_of(shell, state, rod) for shell, state in deployment.shells))
     return Checks(bent, held, carried, deployment, on_the_way)
 
 

@@ -8,6 +8,7 @@ snaps, and on the building site it would have to be pushed: such stages are foun
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from math import comb
 
 import numpy as np
@@ -16,8 +17,9 @@ from numpy.typing import NDArray
 from gridshell.checks.reactions import Reactions, reactions
 from gridshell.geometry.vectors import cross
 from gridshell.model import Shell
+from gridshell.rods.elements import Elements
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Equilibrium, Problem, find_equilibrium
+from gridshell.solve.mixed_newton import Equilibrium, Pattern, Problem, find_equilibrium
 from gridshell.solve.path import EASY, follow
 
 Floats = NDArray[np.float64]
@@ -36,7 +38,8 @@ class Deployment:
     ----------
     share : (s,) of the way that the ends have gone, ascending; 0 is the flat grid.
     positions : (s, n, 3) of the mesh's nodes [m].
-    states : (s - 1, N, 3) of the shell, without the flat grid.
+    shells : at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's source
+        frames; none where ways of several shells were joined.
     snaps : pairs of neighbouring shares between which the path folds: going forward, the shell does not come
         from the first shape to the second by itself.
     lost_at : share below which no equilibrium was found, or None; only the flat grid then stands before it.
@@ -44,7 +47,7 @@ class Deployment:
 
     share: Floats
     positions: Floats
-    states: Floats
+    shells: tuple[tuple[Shell, Floats], ...]
     snaps: tuple[tuple[float, float], ...] = ()
     lost_at: float | None = None
 
@@ -62,7 +65,10 @@ class Deployment:
         return tuple(words)
 
 
-def deploy(shell: Shell, state: Floats, forces: Floats, *, stages: int, told: Told = lambda share: None) -> Deployment:
+def deploy(
+    shell: Shell, state: Floats, forces: Floats, *, stages: int, pattern: Pattern | None = None,
+    told: Told = lambda share: None,
+) -> Deployment:  # fmt: skip
     """Follow a popped-up shell back to the flat grid.
 
     Parameters
@@ -70,12 +76,13 @@ def deploy(shell: Shell, state: Floats, forces: Floats, *, stages: int, told: To
     state, forces : (N, 3) an equilibrium with pinned ends [m], and the axial forces (e,) of its edges [N].
     stages : number of equilibria above the flat grid. They crowd near it, where the rise goes with the root of the
         way.
+    pattern : of an earlier solve of this shell.
 
     Returns
     -------
     The stages reached. One that was not reached is missing; it is never replaced by something else.
     """
-    path = _Path(shell, state)
+    path = _Path(shell, state, pattern)
     shares = (np.arange(stages, -1, -1) / stages) ** 2
     told(1.0)
     here = path.settle(state, forces)
@@ -90,16 +97,16 @@ def deploy(shell: Shell, state: Floats, forces: Floats, *, stages: int, told: To
             snaps.append((share, before))
         found.append(there)
         here = there
-    states = np.array([one.state for one in reversed(found)])
-    positions = np.array([path.flat, *(shell.positions(state) for state in states)])
-    return Deployment(np.append(shares[: len(found)], 0.0)[::-1], positions, states, tuple(reversed(snaps)), lost)
+    shells = tuple((shell.with_elements(one.elements), one.state) for one in reversed(found))
+    positions = np.array([path.flat, *(shell.positions(one.state) for one in reversed(found))])
+    return Deployment(np.append(shares[: len(found)], 0.0)[::-1], positions, shells, tuple(reversed(snaps)), lost)
 
 
 class _Path:
     """A pinned shell whose ends lie somewhere between the flat grid (share 0) and the final places (share 1)."""
 
-    def __init__(self, shell: Shell, last: Floats) -> None:
-        self.shell = shell
+    def __init__(self, shell: Shell, last: Floats, pattern: Pattern | None) -> None:
+        self.shell, self.pattern, self._smooth = shell, pattern, True
         positions, ends = shell.positions(last), shell.mesh.ends.ravel()
         self.flat = laid_out(shell.mesh.flat, ends, positions)
         self._first = self.flat[ends] + shell.lift[shell.ends] * np.array([0.0, 0.0, 1.0])
@@ -108,11 +115,17 @@ class _Path:
 
     def settle(self, state: Floats, forces: Floats) -> Equilibrium:
         """The equilibrium at share 1, next to `state`."""
-        return follow(lambda _: self._problem(1.0), state, forces, first_step=1.0)
+        found = follow(lambda _: self._problem(1.0, self.shell.elements), state, forces, first_step=1.0)
+        self.pattern = found.pattern
+        return found
 
     def go(self, here: Equilibrium, start: float, stop: float) -> Equilibrium:
         """From one share to another."""
-        return follow(lambda t: self._problem((1 - t) * start + t * stop), here.state, here.forces, first_step=1.0)
+
+        def problem_at(t: float) -> Problem:
+            return self._problem((1 - t) * start + t * stop, here.elements)
+
+        return follow(problem_at, here.state, here.forces, first_step=1.0)
 
     def ahead(self, found: Sequence[Equilibrium], share: float) -> Equilibrium | None:
         """The stage after those `found`, from where they lead; None where that does not lead straight there.
@@ -120,14 +133,15 @@ class _Path:
         Stages are equally spaced in the root of the way, in which shapes on a smooth path are nearly polynomials:
         Newton's method then needs about half of the steps that it takes from the last shape.
         """
-        last = found[: -DEGREE - 2 : -1]
-        if len(last) < 2 or last[0].report.iterations > EASY:
+        last = list(takewhile(lambda one: one.report.iterations <= EASY, reversed(found[-DEGREE - 1 :])))
+        if len(last) < 2 or not self._smooth:
             return None
         weights = [(-1) ** k * comb(len(last), k + 1) for k in range(len(last))]
         state = np.sum([weight * one.state for weight, one in zip(weights, last, strict=True)], axis=0)
         forces = np.sum([weight * one.forces for weight, one in zip(weights, last, strict=True)], axis=0)
-        there = find_equilibrium(self._problem(share), state, forces, most_iterations=EASY)
-        return there if there.report.stable else None
+        there = find_equilibrium(self._problem(share, last[0].elements), state, forces, most_iterations=EASY)
+        self._smooth = there.report.stable  # where one guess leads astray, the next ones do, too
+        return there if self._smooth else None
 
     def folds(self, low: Equilibrium, share: float, high: Equilibrium, before: float) -> bool:
         """Whether the way from `low` up to `high` leads elsewhere.
@@ -143,13 +157,14 @@ class _Path:
         apart = np.linalg.norm(self.shell.positions(again.state - high.state), axis=1).max()
         return not again.report.converged or bool(apart > SAME * self._length)
 
-    def _problem(self, share: float) -> Problem:
+    def _problem(self, share: float, elements: tuple[Elements, ...]) -> Problem:
         supports = Supports(self.shell.held_ends(), self.shell.ends, (1 - share) * self._first + share * self._last)
-        return Problem(self.shell.elements, self.shell.stretch, supports, self._length, places=self.shell.places)
+        stretch, places = self.shell.stretch, self.shell.places
+        return Problem(elements, stretch, supports, self._length, places=places, pattern=self.pattern)
 
     def _energy(self, at: Equilibrium) -> tuple[float, Reactions]:
         unused = np.zeros_like(at.state)
-        energy = sum(one.evaluate(at.state, unused) for one in (*self.shell.elements, self.shell.stretch))
+        energy = sum(one.evaluate(at.state, unused) for one in (*at.elements, self.shell.stretch))
         return energy, reactions(self.shell, at)
 
 

@@ -51,7 +51,7 @@ def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deplo
     return Deployment(
         ways[0].share[rows[0]],
         np.concatenate([one.positions[row] for one, row in zip(ways, rows, strict=True)], axis=1),
-        np.concatenate([one.states[np.array(row[1:]) - 1] for one, row in zip(ways, rows, strict=True)], axis=1),
+        (),
         tuple(sorted({pair for one in ways for pair in one.snaps})),
         max(lost, default=None),
     )

@@ -42,14 +42,10 @@ def directors_along(tangents: Floats, first: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         weights = 1.0 / (1.0 + dot(tangents[:-1], tangents[1:]))
     x, y, z = adapted(first, tangents[0]).tolist()
-    directors = [(x, y, z)]
-    edges = tangents.tolist()
+    directors, edges = [(x, y, z)], tangents.tolist()
     for (p, q, r), (a, b, c), weight in zip(edges, edges[1:], weights.tolist(), strict=False):
-        before = p * x + q * y + r * z  # `parallel_transport` by scalars: arrays of three cost ten times as much
-        share = weight * (before + a * x + b * y + c * z)
-        x -= share * (p + a) - 2.0 * before * a
-        y -= share * (q + b) - 2.0 * before * b
-        z -= share * (r + c) - 2.0 * before * c
+        share = weight * (a * x + b * y + c * z)  # as `parallel_transport`, but by scalars: ten times as fast
+        x, y, z = x - share * (p + a), y - share * (q + b), z - share * (r + c)
         directors.append((x, y, z))
     return np.array(directors)
 

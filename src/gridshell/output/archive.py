@@ -3,7 +3,6 @@
 import json
 import os
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import wraps
 from math import isfinite
@@ -68,7 +67,7 @@ class Archive:
 
 
 def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
-    """`make`, whose result is kept with the archive: many files are made from the same rods. It is not to be changed."""
+    """`make`, its result kept with the archive, and not to be changed: many files are made from the same rods."""
 
     @wraps(make)
     def kept(archive: Archive) -> T:
@@ -94,19 +93,21 @@ def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str]
     text = json_text(archive.result)
     archive = replace(archive, result=json.loads(text))
     wanted = list(DEFAULT if kinds is None else kinds)
-    aside = [kind for kind in wanted if kind in ASIDE]
 
-    def make(some: Iterable[str]) -> None:
-        for name, content in files_of(archive, some):
+    def make(aside: bool) -> None:
+        for name, content in files_of(archive, [kind for kind in wanted if (kind in ASIDE) == aside]):
             put(temporary / name, content)
 
-    with replacing(folder) as temporary, beside(lambda: make(aside)) if aside else nullcontext():
+    def make_aside() -> None:
+        make(aside=True)
+        with open(temporary / "states.npz", "wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **archive.states)
+
+    with replacing(folder) as temporary, beside(make_aside):
         put(temporary / "result.json", text)
         if archive.case_toml:
             put(temporary / "case.toml", archive.case_toml)
-        make(kind for kind in wanted if kind not in ASIDE)
-        with open(temporary / "states.npz", "wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, **archive.states)
+        make(aside=False)
     return Path(folder).expanduser().resolve()
 
 
@@ -168,12 +169,14 @@ def _dumps(value: Any) -> str:
 
 def _plain(value: Any) -> Any:
     """`value` in JSON's own types; NumPy's arrays and numbers are converted."""
+    if isinstance(value, float):  # most are; NumPy's float64 is one
+        return float(value) if isfinite(value) else None
+    if isinstance(value, str):
+        return value
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
+        return _plain(value.tolist())
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if isfinite(value) else None
     return value

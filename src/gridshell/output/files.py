@@ -168,4 +168,4 @@ KINDS: dict[str, Callable[[Content], Files]] = {
     "3dm": _rhino, "png": _png, "report": _report,
 }  # fmt: skip
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # which needs another package
-ASIDE = ("png", "obj", "gltf", "vtp")  # about half of the work, which shares nothing with the rest
+ASIDE = ("png", "csv", "obj", "gltf", "vtp", "compas")  # about half of the work, which shares nothing with the rest

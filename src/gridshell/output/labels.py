@@ -56,18 +56,25 @@ class Room:
         extent = left, low, right, high = _extent(box)
         near = [
             other
-            for key in self._keys(extent)
-            for (x0, y0, x1, y1), other in self._taken.get(key, ())
+            for square in self._squares(extent)
+            for (x0, y0, x1, y1), other in self._taken.get(square, ())
             if x0 < right and left < x1 and y0 < high and low < y1
         ]
         return not near or not boxes_meet(box, np.array(near))
 
     def take(self, box: Floats) -> None:
         extent = _extent(box)
-        for key in self._keys(extent):
-            self._taken.setdefault(key, []).append((extent, box))
+        for square in self._squares(extent):
+            self._taken.setdefault(square, []).append((extent, box))
 
-    def _keys(self, extent: Extent) -> list[tuple[int, int]]:
+    def claim(self, box: Floats) -> bool:
+        """Take the box if it is free; whether it was."""
+        free = self.free(box)
+        if free:
+            self.take(box)
+        return free
+
+    def _squares(self, extent: Extent) -> list[tuple[int, int]]:
         left, low, right, high = (int(value // self._square) for value in extent)
         return [(x, y) for x in range(left, right + 1) for y in range(low, high + 1)]
 
@@ -177,5 +184,5 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     ends = (lines - box.mean(axis=0)) @ axes  # in which the rectangle is +-1
     low, high = ends.min(axis=1), ends.max(axis=1)
     off = ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 0, 1] * ends[:, 1, 0]
-    apart = (low >= 1.0).any(axis=1) | (high <= -1.0).any(axis=1) | (np.abs(off) >= (high - low).sum(axis=1))
+    apart = (low >= 1.0).any(axis=1) | (high <= -1.0).any(axis=1) | (np.abs(off) > (high - low).sum(axis=1))
     return not apart.all()

@@ -10,6 +10,7 @@ from math import cos, sin
 
 from gridshell.output.drawing import LAYERS, Drawing, Mark, Path, Pen, Text
 
+LEVEL = 4  # of compression: half the time of 6, for files that are 8 % longer
 POINTS = 72 / 25.4  # of a millimetre
 _H = 0.5522847  # handles of four cubics that make a circle, over its radius
 ROUND = (
@@ -43,7 +44,7 @@ def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: s
         b"<< /Title " + _string(title) + b" /Creator (gridshell) >>",
     ]
     for k, (sheet, page) in enumerate(zip(sheets, pages, strict=True)):
-        content = zlib.compress("\n".join(_content(sheet)).encode("cp1252", "replace"), 6)
+        content = zlib.compress("\n".join(_content(sheet)).encode("cp1252", "replace"), LEVEL)
         beside = f"/Prev {page - 1} 0 R " * (k > 0) + f"/Next {page + 5} 0 R" * (k < len(pages) - 1)
         objects += [
             _dictionary(
@@ -111,8 +112,8 @@ def _text(text: Text) -> str:
     if text.anchor != "start":
         back = (0.5 if text.anchor == "middle" else 1.0) * _width(text.text) * size
         x, y = x - back * c, y - back * s
-    words = _string(text.text).decode("cp1252", "replace")
-    return f"BT /F{int(text.bold)} {size:.3f} Tf {c:.5f} {s:.5f} {-s:.5f} {c:.5f} {x:.3f} {y:.3f} Tm {words} Tj ET"
+    turn = f"{c:.5f} {s:.5f} {-s:.5f} {c:.5f}"
+    return f"BT /F{int(text.bold)} {size:.3f} Tf {turn} {x:.3f} {y:.3f} Tm ({_escaped(text.text)}) Tj ET"
 
 
 def _width(text: str) -> float:
@@ -122,8 +123,11 @@ def _width(text: str) -> float:
 
 def _string(text: str) -> bytes:
     """A PDF string."""
-    escaped = text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
-    return b"(" + escaped.encode("cp1252", "replace") + b")"
+    return b"(" + _escaped(text).encode("cp1252", "replace") + b")"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
 
 
 def _dictionary(content: str) -> bytes:

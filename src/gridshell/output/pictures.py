@@ -18,6 +18,7 @@ from gridshell.output.wording import MINUS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Polylines = list[list[tuple[int, slice]]]
 
 WIDTH = 540.0  # drawing units of the shell itself
 SIDE, TOP, BELOW, BAR = 50.0, 22.0, 40.0, 28.0  # margins; the colour bar needs more below
@@ -121,15 +122,14 @@ class _Rods:
     Parameters
     ----------
     plane : (d, 2) the drawn nodes.
-    layer, shade : (s,) of each piece, 0 the farthest layer; index in the palette.
+    halos, lines : by layer, the farthest first: indices in the palette, and drawn nodes of polylines.
     fade : share of paper in the farthest colours.
     pen : width of the rods in the middle [drawing units].
     """
 
-    pieces: Pieces
     plane: Floats
-    layer: Ints
-    shade: Ints
+    halos: Polylines
+    lines: Polylines
     palette: list[str]
     fade: float
     pen: float
@@ -149,34 +149,34 @@ class _Rods:
             shade = np.rint(0.5 * (bins[pieces.first] + bins[pieces.first + 1])).astype(np.intp)
             palette, fade = scale.palette, FADE
         pen = float(np.clip(0.12 * WIDTH / max(len(rods), 1), 0.45, 1.7))
-        return _Rods(pieces, view.project(shape.positions)[nodes], layer, shade, palette, fade, pen)
+        halos, lines = (_polylines(pieces, layer, one) for one in (np.zeros_like(shade), shade))
+        return _Rods(view.project(shape.positions)[nodes], halos, lines, palette, fade, pen)
 
     def draw(self, pencil: Pencil, layers: range) -> None:
         """Some layers from far to near, each over a halo of paper that sets it off."""
-        halos, lines = (self._lines(key) for key in (0 * self.shade, self.shade))
         for depth in layers:
             near = (depth + 0.5) / LAYERS
             width = self.pen * (0.75 + 0.4 * near)
             halo = Pen(PAPER, 2.2 * width)
-            pencil.paths += [Path(self.plane[chain], "CUT", pen=halo) for _, chain in halos[depth]]
+            pencil.paths += [Path(self.plane[chain], "CUT", pen=halo) for _, chain in self.halos[depth]]
             pens = {
                 shade: Pen(mixed(self.palette[shade], PAPER, self.fade * (1 - near) ** 1.3), width)
-                for shade in {shade for shade, _ in lines[depth]}
+                for shade in {shade for shade, _ in self.lines[depth]}
             }
-            pencil.paths += [Path(self.plane[chain], "CUT", pen=pens[shade]) for shade, chain in lines[depth]]
+            pencil.paths += [Path(self.plane[chain], "CUT", pen=pens[shade]) for shade, chain in self.lines[depth]]
 
-    def _lines(self, shade: Ints) -> list[list[tuple[int, slice]]]:
-        """For each layer the shades, ascending, and drawn nodes of its polylines: pieces that follow each other on a
-        rod in one layer and shade."""
-        order = np.lexsort((shade, self.layer))
-        first, key = self.pieces.first[order], np.column_stack([self.layer, shade])[order]
-        ends = np.flatnonzero(np.any(np.diff(key, axis=0), axis=1) | (np.diff(first) > 1))
-        stop = first[np.append(ends, len(first) - 1)[: len(first)]] + 2
-        begin = np.append(0, ends + 1)[: len(first)]
-        lines: list[list[tuple[int, slice]]] = [[] for _ in range(LAYERS)]
-        for (layer, own), low, high in zip(key[begin].tolist(), first[begin].tolist(), stop.tolist(), strict=True):
-            lines[layer].append((own, slice(low, high)))
-        return lines
+
+def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
+    """Pieces that follow each other on a rod in one layer and shade as one; the shades of a layer ascend."""
+    order = np.lexsort((shade, layer))
+    first, layer, shade = pieces.first[order], layer[order], shade[order]
+    ends = np.flatnonzero((np.diff(layer) != 0) | (np.diff(shade) != 0) | (np.diff(first) > 1))
+    begin, end = (np.concatenate(parts)[: len(first)] for parts in (([0], ends + 1), (ends, [len(first) - 1])))
+    columns = (layer[begin], shade[begin], first[begin], first[end] + 2)
+    lines: Polylines = [[] for _ in range(LAYERS)]
+    for depth, own, low, high in zip(*(column.tolist() for column in columns), strict=True):
+        lines[depth].append((own, slice(low, high)))
+    return lines
 
 
 def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[RodRecord]) -> None:

@@ -6,7 +6,9 @@ from math import degrees
 from platform import python_version
 from typing import Any
 
+import numba
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from gridshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
@@ -98,7 +100,7 @@ def head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
         "version": 1,
         "units": "SI",
         "version_gridshell": version("gridshell"),
-        "versions": {"python": python_version(), **{name: version(name) for name in ("numpy", "scipy", "numba")}},
+        "versions": {"python": python_version()} | {one.__name__: one.__version__ for one in (np, scipy, numba)},
         "name": name,
         "status": status,
         "warnings": list(warnings),

@@ -50,8 +50,7 @@ def _meetings(pencil: Pencil, archive: Archive, text: float) -> None:
         for corner in ((0.5, 0.4), (0.5, -1.1), (-0.5, 0.4), (-0.5, -1.1)):
             anchor = "start" if corner[0] > 0 else "end"
             pencil.write(number, at + text * np.array(corner), size, "LABEL", anchor=anchor)
-            if room.free(pencil.texts[-1].box()):
-                room.take(pencil.texts[-1].box())
+            if room.claim(pencil.texts[-1].box()):
                 break
             pencil.texts.pop()
 
@@ -76,8 +75,7 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
             pencil.write(
                 words, a + share * along + above, size, "LABEL", anchor="middle", angle=angle, colour="#6b5212"
             )
-            if room.free(pencil.texts[-1].box()):
-                room.take(pencil.texts[-1].box())
+            if room.claim(pencil.texts[-1].box()):
                 break
             pencil.texts.pop()
     _axes(pencil, text)

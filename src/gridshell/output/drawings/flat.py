@@ -58,8 +58,7 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float) -> None:
             (-width, -radius - size),
         ):
             pencil.write(joint.id, mark + corner, size, "LABEL")
-            if room.free(pencil.texts[-1].box()):
-                room.take(pencil.texts[-1].box())
+            if room.claim(pencil.texts[-1].box()):
                 break
             pencil.texts.pop()
 

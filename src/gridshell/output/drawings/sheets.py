@@ -165,8 +165,7 @@ def _match_lines(
         words = f"match line to part {_part(*neighbour)}"
         for step in range(4, int(np.linalg.norm(line[1] - line[0])) - 50, 2):
             pencil.write(words, start + step * along, TEXT, "TITLE", angle=angle, colour=pen.colour)
-            if free.free(pencil.texts[-1].box()):
-                free.take(pencil.texts[-1].box())
+            if free.claim(pencil.texts[-1].box()):
                 break
             pencil.texts.pop()
     return pencil.done("", "", TEXT)
