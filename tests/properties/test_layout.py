@@ -358,7 +358,7 @@ def test_a_cut_mesh_keeps_stations_nodes_and_the_joints_far_from_ends(seed, coun
         within = (s >= rod.start) & (s <= rod.end)
         to_end = np.minimum(np.abs(s - rod.start), np.abs(s - rod.end))  # nodes that crowd an end are left out
         joints = np.isin(mesh.nodes_of(whole), nodes[part.joint_nodes[(part.grid.crossings.rods == k).any(axis=1)]])
-        within &= joints | (to_end == 0) | (to_end >= 1e-3 * np.median(np.diff(s)))
+        within &= joints | (to_end == 0) | (to_end >= 0.01 * np.median(np.diff(s)))
         np.testing.assert_array_equal(part.stations[part.rod_slice(k)], s[within])
         np.testing.assert_array_equal(nodes[part.nodes_of(k)], mesh.nodes_of(whole)[within])
     np.testing.assert_array_equal(part.flat, mesh.flat[nodes])

@@ -13,6 +13,8 @@ from gridshell.layout.flatgrid import Family, FlatGrid, FlatRod
 
 Auto = Literal["auto"]
 
+EDGES = 6  # of the mesh to a spacing, where the edge is "auto"
+
 
 @dataclass(frozen=True)
 class GridLayout:
@@ -47,11 +49,11 @@ class GridLayout:
         rods: tuple[int, int] | Auto = "auto",
         spacing: float | tuple[float, float],
         length: float | Auto = "auto",
-        edge: float,
+        edge: float | Auto = "auto",
         rotate: float = 0.0,
         offset: tuple[float, float] = (0.0, 0.0),
     ) -> "GridLayout":
-        """Rods along x and along y.
+        """Rods along x and along y; an edge "auto" is a sixth of the smaller spacing.
 
         Raises
         ------
@@ -69,6 +71,7 @@ class GridLayout:
             if len(counts) != 2 or any(int(n) != n or n < 2 for n in counts):
                 raise InputError(f'layout rods must be "auto" or two counts of at least 2, not {rods}')
             rods = (int(counts[0]), int(counts[1]))
+        edge = auto_edge(pair) if edge == "auto" else edge
         if edge > min(pair):
             raise InputError(f"layout edge {edge} m is longer than the spacing {min(pair)} m: use a shorter edge")
         if not isfinite(rotate) or not all(isfinite(shift) for shift in offset):
@@ -128,6 +131,11 @@ class GridLayout:
                 for k, c in enumerate(offsets)
             ]
         return FlatGrid.of(rods)
+
+
+def auto_edge(spacing: tuple[float, float]) -> float:
+    """The edge of the mesh [m] that goes with spacings [m]."""
+    return min(spacing) / EDGES
 
 
 def rod_name(family: Family, index: int, count: int) -> str:

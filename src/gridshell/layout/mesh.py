@@ -117,7 +117,7 @@ class GridMesh:
         return result
 
 
-CROWDED = 1e-3  # of the usual edge: a node that near to a rod's end is left out; at 2e-3 all goes well
+CROWDED = 0.01  # of the usual edge: a node that near to a rod's end is left out; round-off in forces goes with its cube
 
 
 def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
