@@ -184,10 +184,10 @@ def test_rod_without_angles_has_the_strains_of_the_one_with_them():
     for twist in (False, True):
         rod = gs.ElasticRod.of(straight(20), THIN, clamped={"end": X, "start": X}, twist=twist)
         bow = straight(20) * [0.9, 1, 1]
-        bow[:, 2] = 0.3 * np.sin(pi * rod.rest[:, 0]) ** 2  # about as high as it ends: it does not snap
+        bow[:, 2] = 0.15 * np.sin(pi * rod.rest[:, 0]) ** 2
         goal = {"positions": {-1: (0.8, 0.1, 0.1)}, "tangents": {"end": (1, 0.3, 0)}}
         spinning = ("start", "end") if twist else ()  # in space, frames that were held would twist the rod
-        shapes.append(gs.solve_rod(rod, start=rod.state(bow), spinning=spinning, steps=4, **goal))
+        shapes.append(gs.solve_rod(rod, start=rod.state(bow), spinning=spinning, **goal))
     without, with_them = (np.linalg.norm(shape.strains.curvature, axis=1) for shape in shapes)
     assert without.shape == (21,)
     np.testing.assert_allclose(without, with_them, rtol=1e-6)

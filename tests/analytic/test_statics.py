@@ -346,6 +346,19 @@ def test_the_work_of_all_tries_is_counted():
     assert found.report.factorizations > straight.report.factorizations
 
 
+@pytest.mark.parametrize(("begin", "goal"), [(0.99, 1.005), (0.985, 1.004), (0.999, 1.002), (0.95, 1.01), (1.01, 0.99)])
+def test_modes_are_counted_at_the_equilibrium_and_not_where_the_solve_began(begin, goal):
+    """A straight column taken past Euler's load, its Hessian factorised first where it was still stable."""
+    edges = 40
+    chain = (2 * edges / pi * np.sin(pi / 2 / edges)) ** 2  # its own load over Euler's
+    shell, start = squeezed_column(edges, begin * chain)
+    _, held = squeezed_column(edges, goal * chain)
+    supports = Supports(in_plane(shell).with_directions(shell.ends), shell.ends, held.state[shell.ends])
+    found = find_equilibrium(Problem(shell.elements, shell.stretch, supports, 1.0), start.state, start.forces)
+    assert found.report.converged
+    assert found.report.negative_modes == int(goal > 1)
+
+
 # Reactions of a popped-up grid
 
 

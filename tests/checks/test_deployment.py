@@ -116,10 +116,10 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(module, "follow", fails_later)
     monkeypatch.setattr(module._Path, "ahead", lambda *_: None)
     way = deployed(dome())
-    assert way.share.tolist() == [0.0, 0.5625, 1.0]
-    assert len(way.positions) == 3
-    assert way.lost_at == 0.5625
-    assert way.warnings == ("the way from flat could not be followed below 56 %: stages are missing",)
+    assert way.share == pytest.approx([0.0, 0.25, 0.5625, 1.0])  # the path ends at 25 %, where its state is
+    assert len(way.positions) == 4
+    assert way.lost_at == pytest.approx(0.25)
+    assert way.warnings == ("the way from flat could not be followed below 25 %: stages are missing",)
 
 
 def test_the_worst_bend_may_be_on_the_way() -> None:

@@ -334,7 +334,25 @@ def test_a_curve_of_two_or_three_points_is_a_line_or_a_parabola():
         np.testing.assert_allclose(on_curve(knots, knots[:, None] ** power, s)[:, 0], s**power, rtol=0, atol=ROUND_OFF)
 
 
+def test_places_that_differ_by_round_off_are_one_node():
+    """A rod's start, a mark and a joint, in this order and in another."""
+    a = 0.15
+    b = np.nextafter(a, 1)
+    c = np.nextafter(b, 1)
+    across = FlatRod.v("V", c, -1.0, 1.0)
+    begins = mesh_grid(FlatGrid.of([FlatRod.u("U", 0.0, a, 1.0), across]), 0.5, marks=[[b], []])
+    passes = mesh_grid(FlatGrid.of([FlatRod.u("U", 0.0, 0.0, 1.0), across]), 0.5, marks=[[b, a], []])
+    assert min(begins.edge_lengths.min(), passes.edge_lengths.min()) > 0.1
+
+
 # Cutting a mesh
+
+
+def test_a_mesh_without_joints_may_be_cut():
+    grid = FlatGrid.of([FlatRod.u("U", 0.0, 0.0, 1.0), FlatRod.v("V", 0.1, -1.0, 1.0)], margin=0.2)
+    part, nodes = cut_mesh(mesh_grid(grid, 0.1), grid.rods, margin=0.0)
+    assert len(part.grid.crossings) == 0
+    assert len(nodes) == 32
 
 
 @settings(max_examples=80, deadline=None)
@@ -427,6 +445,9 @@ LAYOUT = {"rods": (3, 4), "spacing": 0.03, "length": 1.2, "edge": 0.005}
     ({"edge": -0.005}, "layout edge must be positive"),
     ({"edge": 0.031}, "layout edge 0.031 m is longer than the spacing 0.03 m: use a shorter edge"),
     ({"length": 0}, "layout length must be positive, not 0 m"),
+    ({"edge": "5 mm"}, "layout edge must be a length in m, not '5 mm'"),
+    ({"length": None}, "layout length must be a length in m, not None"),
+    ({"spacing": "auto"}, "layout spacing must be two lengths in m"),
     ({"rods": (1, 4)}, 'layout rods must be "auto" or two counts of at least 2'),
     ({"rods": (3, 4.5)}, "two counts"),
     ({"rods": (3, 4, 5)}, "two counts"),

@@ -19,7 +19,7 @@ PLANE = gs.HeightField(function=lambda x, y: 0 * x, domain=gs.Rectangle((20.0, 2
 def test_a_rod_on_a_plane_becomes_the_natural_spline_through_its_joints(tail):
     """A line y = BEND x^2 of a net, crossed by straight ones. Past its last joints a rod is straight."""
     across = [FlatRod.v(f"V{k}", x, -1.0, 1.0) for k, x in enumerate(AT.tolist())]
-    grid = FlatGrid.of([FlatRod.u("U", 0.0, AT[0] - tail, AT[-1] + tail), *across])
+    grid = FlatGrid.of([FlatRod.u("U", 0.25, AT[0] - tail, AT[-1] + tail), *across])
     mesh = mesh_grid(grid, 0.1)
     points = mesh.flat.copy()
     points[:, 1] += BEND * points[:, 0] ** 2
@@ -27,7 +27,7 @@ def test_a_rod_on_a_plane_becomes_the_natural_spline_through_its_joints(tail):
     spline = CubicSpline(AT, BEND * AT**2, bc_type="natural")
     x = mesh.flat[on_rod, 0]
     ends = np.clip(x, AT[0], AT[-1])
-    natural = spline(ends) + spline(ends, 1) * (x - ends)
+    natural = 0.25 + spline(ends) + spline(ends, 1) * (x - ends)
     shift = np.abs(natural - points[on_rod, 1]).max()
     # to first order in the slope: its square is (2 BEND 2.85)^2 = 0.003
     assert np.abs(found[on_rod, 1] - natural).max() < 0.006 * shift
@@ -37,7 +37,7 @@ def test_a_rod_on_a_plane_becomes_the_natural_spline_through_its_joints(tail):
 
 def test_a_line_that_turns_far_in_its_last_span_is_left_alone():
     mesh = mesh_grid(
-        FlatGrid.of([FlatRod.u("U", 0.0, 0.0, 3.0), *(FlatRod.v(f"V{k}", k, -1.0, 1.0) for k in range(4))]), 0.1
+        FlatGrid.of([FlatRod.u("U", 0.25, 0.0, 3.0), *(FlatRod.v(f"V{k}", k, -1.0, 1.0) for k in range(4))]), 0.1
     )
     for turn, moves in ((0.45, True), (0.55, False)):
         points = mesh.flat.copy()
@@ -59,4 +59,15 @@ def test_the_drape_starts_much_nearer_to_where_it_ends(target, monkeypatch):
     draped = gs.drape(gs.GridLayout.orthogonal(spacing=0.03, edge=0.005), rod, target)
     plain, natural = (np.linalg.norm(draped.positions - start, axis=1).max() for start in seen)
     assert natural < 0.25 * plain  # 0.06 to 0.11 measured
-    assert draped.report.factorizations == 2
+    assert draped.report.factorizations <= 3
+
+
+def test_it_is_but_a_guess(monkeypatch):
+    """The drape is the same from the net itself, the axes too, which it holds."""
+    bound, rod = importlib.import_module("gridshell.formfinding.bound"), gs.Rod(gs.Circle(1e-3), gs.Material(1e6, 1e3))
+    target = gs.HeightField(formula="0.03*sin(20*x)*cos(17*y)", domain=gs.Disc(0.2))
+    layout = gs.GridLayout.orthogonal(spacing=0.05, edge=0.0125, rotate=0.4)
+    found = gs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
+    monkeypatch.setattr(bound, "with_natural_ends", lambda target, mesh, points: target.retract(points))
+    plain = gs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
+    assert np.abs(found.positions - plain.positions).max() < 1e-11

@@ -189,3 +189,11 @@ def test_rods_without_a_counterpart_get_nothing(last):
     )
     assert len(alone)
     assert (carried[alone] == 0.0).all()
+
+
+def test_a_net_searched_for_in_its_own_steps_needs_no_other_guess():
+    """Narrow, so that the search takes four steps to a spacing, as the coarse march does: no difference to go by."""
+    peak = gs.HeightField(function=lambda x, y: 0.15 * np.exp(-(x * x + y * y) / (2 * 0.04**2)), domain=gs.Disc(0.2))
+    with np.errstate(all="raise"):
+        net = chebyshev_net(peak, gs.GridLayout.orthogonal(spacing=0.08, edge=0.01))
+    assert net.error_estimate < 0.01 * 0.08

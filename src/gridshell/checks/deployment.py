@@ -20,7 +20,7 @@ from gridshell.model import Shell
 from gridshell.rods.elements import Elements
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Equilibrium, Pattern, Problem, find_equilibrium
-from gridshell.solve.path import EASY, follow
+from gridshell.solve.path import EASY, SMALLEST_STEP, follow
 
 Floats = NDArray[np.float64]
 Told = Callable[[float], None]
@@ -80,26 +80,30 @@ def deploy(
 
     Returns
     -------
-    The stages reached. One that was not reached is missing; it is never replaced by something else.
+    The stages reached. One that was not reached is missing; the last before it is where the path ended.
     """
     path = _Path(shell, state, pattern)
     shares = (np.arange(stages, -1, -1) / stages) ** 2
     told(1.0)
     here = path.settle(state, forces)
-    found, snaps, lost = [here], list[tuple[float, float]](), None
+    found, reached, snaps, lost = [here], [1.0], list[tuple[float, float]](), None
     for before, share in zip(shares[:-2].tolist(), shares[1:-1].tolist(), strict=True):
         told(share)
         there = path.ahead(found, share) or path.go(here, before, share)
         if not there.report.converged:
-            lost = before
+            lost = path.share_of(there)
+            if before - lost > SMALLEST_STEP:
+                found.append(there)
+                reached.append(lost)
             break
         if path.folds(there, share, here, before):
             snaps.append((share, before))
         found.append(there)
+        reached.append(share)
         here = there
     shells = tuple((shell.with_elements(one.elements), one.state) for one in reversed(found))
     positions = np.array([path.flat, *(shell.positions(one.state) for one in reversed(found))])
-    return Deployment(np.append(shares[: len(found)], 0.0)[::-1], positions, shells, tuple(reversed(snaps)), lost)
+    return Deployment(np.array([0.0, *reversed(reached)]), positions, shells, tuple(reversed(snaps)), lost)
 
 
 class _Path:
@@ -142,6 +146,11 @@ class _Path:
         there = find_equilibrium(self._problem(share, last[0].elements), state, forces, most_iterations=EASY)
         self._smooth = there.report.stable  # where one guess leads astray, the next ones do, too
         return there if self._smooth else None
+
+    def share_of(self, at: Equilibrium) -> float:
+        """How far on their way the ends are."""
+        way = self._last - self._first
+        return float(np.sum((at.state[self.shell.ends] - self._first) * way) / np.sum(way * way))
 
     def folds(self, low: Equilibrium, share: float, high: Equilibrium, before: float) -> bool:
         """Whether the way from `low` up to `high` leads elsewhere.

@@ -18,12 +18,16 @@ STEEP = 0.5  # rad that a line turns in its last span: such a rod stays on its l
 
 
 def with_natural_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
-    """The nodes (n, 3) of lines of a net on the target, moved sideways to about where rods would be [m]."""
+    """The nodes (n, 3) of lines of a net on the target, moved sideways to about where rods would be [m].
+
+    The axes stay: they are geodesics, and the drape holds them on their lines.
+    """
     joint = np.zeros(mesh.node_count, dtype=bool)
     joint[mesh.joint_nodes] = True
     normal = target.on_surface(points).normal
     result = points.copy()
-    _straighten(points, normal, mesh.rod_nodes, mesh.rod_start, mesh.rod_stop, mesh.stations, joint, result)
+    rods = np.flatnonzero([rod.offset != 0.0 for rod in mesh.grid.rods])
+    _straighten(points, normal, mesh.rod_nodes, mesh.rod_start[rods], mesh.rod_stop[rods], mesh.stations, joint, result)
     return target.retract(result)
 
 

@@ -164,9 +164,10 @@ def _fixed_points(
     rod, s, nodes, turn = rod[order], s[order], nodes[order], turn[order]
     tiny = 1e-9 * np.array([rod.length for rod in grid.rods])
     near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
-    out = np.zeros(len(s), dtype=bool)
-    out[1:] |= near & (turn[1:] > turn[:-1])
-    out[:-1] |= near & (turn[1:] < turn[:-1])
+    place = np.cumsum(np.append(0, ~near))  # points of a rod in one place: the first to come stays, and every joint
+    first = np.full(place[-1] + 1, len(turn))
+    np.minimum.at(first, place, turn)
+    out = turn > first[place]
     joints, fresh = int(merged.max(initial=-1)) + 1, np.flatnonzero(~out & (nodes < 0))
     nodes[fresh[np.argsort(turn[fresh])]] = joints + np.arange(len(fresh))
     return rod[~out], s[~out], nodes[~out], joints + len(fresh)
@@ -181,7 +182,7 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     index, count = np.array(whole_rods(mesh.grid.rods, rods)), len(mesh.grid.rods)
     grid = FlatGrid.of(rods, margin=margin)
     pairs = np.sort(index[grid.crossings.rods], axis=1) @ [count, 1]
-    known = mesh.grid.crossings.rods @ [count, 1]
+    known = np.append(mesh.grid.crossings.rods @ [count, 1], -1)  # the last is no pair: there may be none
     order = np.argsort(known, kind="stable")
     found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
     kept = known[found] == pairs

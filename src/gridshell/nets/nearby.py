@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 ROUNDS = 6
 SETTLED = 5e-5  # of the target's size: what a round moves; the error left is its third power
 EXACT = 1e-13  # of the step, on a local model
+CLEARLY = 1.5  # times the square of the step: what two nets in steps nearer to each other differ by tells little
 BEYOND = 0.1  # of the known net's extent that a guess may lie outside it
 
 
@@ -32,8 +33,11 @@ def march_near(
     net = Net(u, v, interpolated(near, u, v))
     if coarser is not None:
         change = net.points - interpolated(coarser, u, v)
-        own, once, twice = (np.ptp(one.u) * np.ptp(one.v) / (len(one.u) * len(one.v)) for one in (net, near, coarser))
-        net.points[:] += np.where(np.isfinite(change), (once - own) / (twice - once) * change, 0.0)
+        own, once, twice = (
+            float(np.median(np.diff(one.u)) * np.median(np.diff(one.v))) for one in (net, near, coarser)
+        )
+        if twice > CLEARLY * once:  # errors go with the square of the step
+            net.points[:] += np.where(np.isfinite(change), (once - own) / (twice - once) * change, 0.0)
     if not _settle_axes(target, net, anchor, heading):
         lay_axes(target, net, anchor, heading)
     _settle(target, net)

@@ -76,8 +76,9 @@ class Problem:
 class Equilibrium:
     """A state (n, 3), its axial forces (e,) [N], its gradient (n, 3) [N] without constraint forces, and figures.
 
-    The twist angles of the state belong to the source frames of `elements`, which are at the state. Where it is not
-    stable, `mode` (n, 3) is the direction of the most negative curvature, its largest displacement being 1.
+    The twist angles of the state belong to the source frames of `elements`, which are at the state. `pattern` serves
+    the next solve of this shell, and keeps the factors alive. Where the state is not stable, `mode` (n, 3) is the
+    direction of the most negative curvature, its largest displacement being 1.
     """
 
     state: Floats
@@ -90,18 +91,18 @@ class Equilibrium:
 
 
 TOLERANCE = 1e-13  # of the length: estimate of the error that is left
-CURVED = 20.0  # what is left after Newton's step is its square, times this: the most on smooth targets
-FORCE_TOLERANCE = 1e-10  # of the largest axial force, or of the
-LEAST_FORCE = 1e-6  # of EA, estimated likewise
+FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces
+LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
 STRAIN_TOLERANCE = 2e-6
+CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
 LONGEST_STEP = 0.15  # of the length
 NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
-SAME_FORCES = 0.02  # of the largest axial force: no more they may change after the negative modes are counted
-CHORD = 1e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
+STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
+CHORD = 5e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
-LEAST = 1e-300
+TINY = 1e-300  # no step is shorter, but for none at all
 
 
 def find_equilibrium(
@@ -173,7 +174,7 @@ def find_stable(
             start = first.state + side * NUDGE * problem.length * first.mode
             tries.append(
                 find_equilibrium(
-                    replace(problem, elements=first.elements),
+                    replace(problem, elements=first.elements, pattern=first.pattern),
                     start,
                     first.forces,
                     descend=True,
@@ -287,15 +288,17 @@ class _Step:
         """Whether the error that is left is small enough, and whether the factorisation serves for another step.
 
         After Newton's step the error is about its square; after a chord step it shrinks as from the last step to this.
+        The last factorisation is made where the forces are nearly those of the equilibrium: it counts its modes.
         """
         self.iterations += self.counts
         size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE * float(self._problem.stretch.stiffness.max()))
         changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
-        shrunk = moved / max(self._last[0], LEAST), changed / max(self._last[1], LEAST)
+        shrunk = moved / max(self._last[0], TINY), changed / max(self._last[1], TINY)
         rates = shrunk if self._chord else (CURVED * moved, changed)
-        self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < SAME_FORCES
+        self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
         self._was_chord, self._last = self._chord, (moved, changed)
-        self._chord = moved < CHORD and since < SAME_FORCES and not self.negative_modes
+        count_again = since >= STALE > changed / 3
+        self._chord = moved < CHORD and not count_again and not self.negative_modes
 
     def _times(self, motion: Floats) -> Floats:
         """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""

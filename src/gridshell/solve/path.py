@@ -51,7 +51,7 @@ def follow(
 
         problem = problem_at(there)
         if last is not None:
-            problem = replace(problem, elements=last.elements)
+            problem = replace(problem, elements=last.elements, pattern=last.pattern)
         found = find_stable(problem, state, forces, most_iterations=MOST, progress=told)
         reports.append(found.report)
         if found.report.converged:
