@@ -51,6 +51,30 @@ def test_contact_with_a_mesh_is_that_with_its_formula(name):
     assert np.quantile(np.abs(found.normal - expected.normal).max(axis=1), 0.99) < 5e-3
 
 
+@pytest.mark.parametrize("name", BODIES)
+def test_far_from_a_mesh_too_contact_is_that_with_its_formula(name):
+    """Five sizes up, beside and down, where the field of the surface says nothing."""
+    exact, mesh = BODIES[name]
+    rng = np.random.default_rng(1)
+    x = 5 * RADIUS * rng.uniform(-1, 1, (400, 3))
+    if name == "edge in space":  # far beside such an edge, the formula's own is a guess
+        x[:, :2] *= 0.15
+    assert np.array_equal(mesh.outside(x), exact.outside(x))
+    away = exact.outside(x)
+    assert away.sum() > 50
+    assert mesh.contact(x[away]).distance == pytest.approx(exact.contact(x[away]).distance, abs=1e-5)
+
+
+def test_a_grid_may_fall_on_a_mesh_from_high_above():
+    layout = gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, edge=0.03, length=0.9)
+    ends = []
+    for target in BODIES["base plane"]:
+        draped = gs.drape(layout, ROD, target, method="paper", fall=gs.Fall(height=0.16))
+        assert draped.converged
+        ends.append(draped.positions)
+    assert ends[1] == pytest.approx(ends[0], abs=1e-3 * RADIUS)  # as still as "at rest" is
+
+
 def test_an_outline_is_the_region_that_it_encloses():
     round_one = Outline(Rim.of([ring(RADIUS, 200)], flat, up))
     xy = np.random.default_rng(1).uniform(-0.4, 0.4, (500, 2))

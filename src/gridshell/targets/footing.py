@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.errors import InputError
-from gridshell.geometry.vectors import unit
+from gridshell.geometry.vectors import dot, unit
 from gridshell.targets.rim import Rim
 from gridshell.targets.standing import Standing
-from gridshell.targets.target import Floats, Gap, Implicit
+from gridshell.targets.target import Floats, Implicit
 
 if TYPE_CHECKING:
     from gridshell.targets.freeform import Freeform
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Ints = NDArray[np.intp]
 
 LEVEL = 1e-4  # of the size: an edge this even is a base
+FAR = 0.5  # of the field's reach
 UPRIGHT = 0.2  # upward part of a normal, on a surface whose edge is not level: what is steeper may lean over past it
 CORNER = 0.9  # cosine between edges of the outline: its points are close, and smooth curves turn by far less
 
@@ -114,27 +115,18 @@ class Footing(Standing):
         return self.surface.implicit(x)
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
-        return self.surface.level(x)
+        """Far from the surface, where its field says nothing, of the plane of the nearest patch."""
+        field = self.surface.field
+        apart, patch = field.nearest(x)
+        far = apart > FAR * field.reach
+        value, gradient = np.empty(len(x)), field.frames[patch, 2]
+        value[far] = dot(x[far] - field.centres[patch[far]], gradient[far])
+        value[~far], gradient[~far] = self.surface.level(x[~far])
+        return value, gradient
 
     def height(self, xy: Floats) -> Floats:
         """z (n,) of the rim: only its own points are asked for."""
         return self.outline.height(xy)
-
-    @cached_property
-    def _lowest(self) -> float:
-        """z below which there is nothing but the wall [m]: there, the field of the surface is none."""
-        x = self.surface.surface.vertices
-        return float(min(x[self.surface.margin(x) > 0, 2].min(), self.outline.rim.points[:, 2].min()))
-
-    def contact(self, x: Floats) -> Gap:
-        below = x[:, 2] < self._lowest
-        if self.base is not None or not below.any():
-            return super().contact(x)
-        found = Gap(np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x), 3, 3)))
-        wall = self._wall(x[below], Gap(*self.plan.distance(x[below, :2])), np.zeros(int(below.sum()), dtype=bool))
-        for part, low, high in zip(found, wall, super().contact(x[~below]), strict=True):
-            part[below], part[~below] = low, high
-        return found
 
     def _nearest_of_rim(self, x: Floats, foot: Floats) -> Floats:
         return self.outline.rim.at(*self.outline.rim.feet(x))
