@@ -152,9 +152,12 @@ class _PopUp:
         return shell, replace(slid, report=slid.report.after(at_once.report))
 
     def again(self, last: Popped) -> tuple[Shell, Equilibrium] | None:
-        """From where a shell popped up before went from its draped state; None where that leads nowhere near."""
+        """From where a shell popped up before went from its draped state; None where that leads nowhere near.
+
+        Not for rods with twist angles: these are not carried, and without them the draped state is a better guess.
+        """
         here, there = self.boundary.draped, last.boundary.draped
-        if here is None or there is None:
+        if here is None or there is None or last.shell.angles:
             return None
         shell, mesh, before = self.shell(last.ends), self.footprint.mesh, last.footprint.mesh
         moved = carried_nodes(last.positions - there, before, mesh)

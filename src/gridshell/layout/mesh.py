@@ -154,9 +154,10 @@ def _fixed_points(
     given = [[rod.start, *(marks[k] if marks is not None else ()), rod.end] for k, rod in enumerate(grid.rods)]
     own_rod = np.repeat(np.arange(len(given)), [len(places) for places in given])
     own = np.array([s for places in given for s in places])
+    # a joint comes once on each of its rods: three rods make three crossings
     rod, s, nodes = grid.crossings.rods.ravel(), grid.crossings.at.ravel(), np.repeat(merged, 2)
     order = np.lexsort((s, nodes, rod))
-    once = order[np.diff(rod[order] * len(rod) + nodes[order], prepend=-1) > 0]  # three rods make three crossings
+    once = order[np.diff(rod[order] * len(rod) + nodes[order], prepend=-1) > 0]
     rod, s = np.concatenate([rod[once], own_rod]), np.concatenate([s[once], own])
     nodes = np.concatenate([nodes[once], np.full(len(own), -1)])
     turn = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(own))])  # who comes first

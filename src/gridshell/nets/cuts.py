@@ -94,6 +94,7 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
 
     Parameters
     ----------
+    sets : lines of one family of one net each.
     depth : pieces that lie nowhere further inside than this [m] only graze the end and do not count.
 
     Returns
