@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from gridshell.model.elastic_rod import ElasticRod, RodStrains
     from gridshell.model.shell import Shell
     from gridshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
+    from gridshell.output.archive import Archive, read
     from gridshell.output.takeaway import DrawingStyle, Takeaway
     from gridshell.rods.section import Circle, Ellipse, GivenSection, Material, RectangularSection, Rod, Tube
     from gridshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
@@ -100,6 +101,7 @@ _HOMES = {
     "gridshell.rods.section": (
         "Circle", "Ellipse", "GivenSection", "Material", "RectangularSection", "Rod", "Tube",
     ),
+    "gridshell.output.archive": ("Archive", "read"),
     "gridshell.output.takeaway": ("DrawingStyle", "Takeaway"),
     "gridshell.solve.rod_statics": ("RodShape", "solve_rod"),
     "gridshell.solve.forces": ("Damping", "ExplicitForce", "Gravity", "ImplicitForce", "PointLoads"),
@@ -114,16 +116,17 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping", "Disc", "Draped",
-    "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall",
-    "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity", "GridLayout", "GridMesh",
-    "GridshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError",
-    "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutputError", "Paraboloid", "PatchLayout", "Pin",
-    "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rise", "Risen", "Rod",
-    "RodShape", "RodStrains", "Sewn", "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target",
-    "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back",
-    "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table", "sew", "simulate", "solve_rod", "sphere_net_end",
-    "sphere_net_rod", "straight_rods", "surface_from", "trim",
+    "Agreement", "Archive", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
+    "Disc", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
+    "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity",
+    "GridLayout", "GridMesh", "GridshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
+    "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutputError",
+    "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle",
+    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn", "SharedDofs", "Shell",
+    "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net",
+    "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table",
+    "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from",
+    "trim",
 ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from gridshell.checks.joined import joined_checks
 from gridshell.errors import InputError
 from gridshell.fabrication import fabricate
 from gridshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
-from gridshell.formfinding.drape import Method
+from gridshell.formfinding.drape import Method, require
 from gridshell.formfinding.popup import Ends
 from gridshell.formfinding.progress import Progress, silent
 from gridshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
@@ -185,6 +185,10 @@ def find_form(
     ------
     InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
     """
+    for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
+        require(name, value, kind)
+    if start is not None:
+        require("start", start, FoundForm, "a form that an earlier gridshell.find_form returned")
     found = find_stages(
         target, layout, rod,
         method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,
@@ -220,6 +224,8 @@ def sew(
     ------
     InputError : a value does not fit. NetLimitError : no net covers a patch from its anchor and heading.
     """
+    for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
+        require(name, value, kind)
     found = find_sewn_stages(
         target, [Seam.of(row) for row in seams], layout, rod,
         own=own, joint=joint, ends=ends, search=search, progress=progress,

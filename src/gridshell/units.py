@@ -177,6 +177,12 @@ def shown(value: object) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
+def length_text(metres: float) -> str:
+    """A length in the unit that reads well: 83.3 mm, 20 m."""
+    in_mm = metres < 0.9995
+    return f"{float(f'{1e3 * metres if in_mm else metres:.3g}'):g} {'mm' if in_mm else 'm'}"
+
+
 def _plain(value: Real) -> float:
     try:
         return float(value)

@@ -479,9 +479,9 @@ def test_every_piece_of_a_rod_is_cut_at_its_own_ends_and_said(spacing, offset):
     sides = {"u": DOME * np.arcsin(0.1 / DOME), "v": DOME * np.arcsin(0.2 / DOME)}
     split = [rod for rod in net.rods if abs(rod.offset) > sides[rod.family]]
     names = sorted({rod.name[:-1] for rod in split})
-    assert sorted(net.warnings) == [
-        f"rod {name} meets the target in 2 pieces, each with ends of its own" for name in names
-    ]
+    assert [words.split(";")[0] for words in net.warnings] == [
+        f"{len(names)} rods meet the target in several pieces, each with ends of its own: {', '.join(names)}"
+    ] * bool(names)
     assert bool(split) == (spacing not in (0.03, 0.051))  # at 51 mm the outermost lines come but 0.3 mm inside
     assert sorted(rod.name for rod in split) == sorted(name + which for name in names for which in "ab")
     for rod in split:
@@ -760,3 +760,26 @@ def test_a_geodesic_whose_chord_finds_no_surface_ends_and_the_others_go_on():
     assert np.isfinite(lost[0]).all()
     assert np.isnan(lost[1:]).all()
     np.testing.assert_allclose(np.linalg.norm(kept, axis=1), R, rtol=0, atol=1e-15)
+
+
+ROOF = HeightField(formula="3*cos(pi*x/16)*cos(pi*y/12)", domain=Rectangle((12.0, 8.0)))
+
+
+def test_too_many_nodes_are_refused_before_any_is_marched_and_the_remedy_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    from gridshell.nets import chebyshev
+
+    with monkeypatch.context() as patched:
+        patched.setattr(chebyshev, "_march_lines", None)
+        with pytest.raises(InputError) as caught:
+            chebyshev_net(ROOF, GridLayout.orthogonal(spacing=0.5, edge=0.005))
+    said = str(caught.value)
+    assert re.search(r"have 3\d\d\d x 2\d\d\d nodes, with edges of 5 mm on a target 12 m wide: check its unit", said)
+    assert said.endswith('set layout.edge = "auto" (83.3 mm here)')
+    net = chebyshev_net(ROOF, GridLayout.orthogonal(spacing=0.5, edge="auto"))
+    assert net.layout.edge == pytest.approx(0.0833, rel=1e-3)
+
+
+def test_too_many_lines_ask_for_the_unit_and_name_a_spacing_that_does() -> None:
+    with pytest.raises(InputError, match=r"30 mm apart on a target 400 m wide: check its unit, or .* such as 25 m$"):
+        chebyshev_net(Hemisphere(200.0), GridLayout.orthogonal(spacing=0.03))
+    assert len(chebyshev_net(Hemisphere(200.0), GridLayout.orthogonal(spacing=25.0)).rods) > 30

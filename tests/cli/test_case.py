@@ -76,10 +76,37 @@ def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, obje
 
 
 def test_what_a_file_leaves_out_is_the_default_but_counts_and_lengths_are_auto(load: Any) -> None:
-    case = load("")
-    assert (case.layout.rods, case.layout.length) == ("auto", "auto")
-    built_in = load_case("hemisphere", {"layout.rods": "auto", "layout.length": "auto"})
-    assert case == built_in
+    lengths = dict.fromkeys(("layout.spacing", "layout.edge", "rod.section.radius"), "auto")
+    automatic = {"layout.rods": "auto", "layout.length": "auto", **lengths}
+    assert load("") == load_case("hemisphere", automatic)
+
+
+@pytest.mark.parametrize("size", [0.2, 6.0, 150.0])
+def test_lengths_left_out_grow_with_the_target(load: Any, size: float) -> None:
+    """So every scale has the same net: the spacing is a round length, and all else follows it or the size."""
+    text = f'target = {{ kind = "heightfield", formula = "0", radius = {size} }}'
+    _, layout, rod, _ = load(text).build()
+    assert size / 12 < layout.spacing[0] <= size / 8  # rounded down to 1, 1.5, 2, 3, 5 or 7 times a power of ten
+    assert layout.edge == layout.spacing[0] / 6
+    assert rod.section.radius == pytest.approx(size / 200, rel=1e-3)
+    _, layout, _, _ = load(text, {"layout.spacing": [size / 5, size / 10]}).build()
+    assert layout.edge == pytest.approx(size / 60, rel=1e-15)
+
+
+def test_seams_take_the_rods_of_the_whole_from_a_built_in_case_but_not_from_the_user() -> None:
+    seams = {"seams.lines": "-1,-1; 1,1"}
+    for name in ("hemisphere", "paraboloid", "ellipsoid", "cap"):
+        case = load_case(name, seams)
+        whole = load_case(name, {"layout.rods": "auto", "layout.length": "auto"})
+        assert case.layout == whole.layout
+        assert case.build_sewn().layout.spacing == (0.03, 0.03)
+    for key, value in (("layout.rods", "17x17"), ("layout.length", "1.2 m"), ("drape.method", "gravity")):
+        with pytest.raises(InputError, match=f"{key} = .*: (use|each patch .* use|seams need .* use)"):
+            load_case("hemisphere", {**seams, key: value}).build_sewn()
+
+
+def test_an_empty_table_is_written_without_a_gap_in_it() -> None:
+    assert "\nlayers = {}\n" in load_case("hemisphere").to_toml()
 
 
 @pytest.mark.parametrize(
@@ -114,8 +141,9 @@ def test_an_override_is_what_the_file_would_say(load: Any) -> None:
     overrides |= {"drape.anchor": "0.1,0", "rod.material.youngs_modulus": "25 GPa"}
     text = """
     target.radius = "250 mm"
-    layout = { rods = [13, 11], spacing = [0.04, "50 mm"], length = "1.2 m" }
+    layout = { rods = [13, 11], spacing = [0.04, "50 mm"], length = "1.2 m", edge = 0.005 }
     drape.anchor = ["100 mm", 0]
+    rod.section.radius = "1 mm"
     rod.material.youngs_modulus = 25e9
     """
     assert load_case("hemisphere", overrides) == load(text)
@@ -128,7 +156,7 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         "radius": 0.3,
     }
     tube = load("", {"rod.section.kind": "tube", "rod.section.thickness": "0.2 mm"}).rod.section
-    assert tube.model_dump() == {"kind": "tube", "radius": 0.001, "thickness": 0.0002}
+    assert tube.model_dump() == {"kind": "tube", "radius": "auto", "thickness": 0.0002}
     disc = '[target]\nkind = "heightfield"\nformula = "x"\nradius = 1\n'
     plan = load(disc, {"target.domain": "rectangle", "target.size": "1,2"}).target
     assert (plan.radius, plan.size) == (None, (1.0, 2.0))
@@ -279,10 +307,10 @@ def test_a_height_field_gets_its_formula_and_its_domain(monkeypatch: pytest.Monk
     from gridshell import targets
 
     monkeypatch.setattr(targets, "HeightField", lambda **given: given, raising=False)
-    disc = load_case("heightfield", {"target.formula": "x*y"}).build().target
+    disc = load_case("heightfield", {"target.formula": "x*y"}).target.build()
     assert disc == {"formula": "x*y", "domain": targets.Disc(0.2)}
     overrides = {"target.formula": "x*y", "target.domain": "rectangle", "target.size": "0.4, 300 mm"}
-    plan = load_case("heightfield", overrides).build().target
+    plan = load_case("heightfield", overrides).target.build()
     assert plan == {"formula": "x*y", "domain": targets.Rectangle((0.4, 0.3))}
 
 

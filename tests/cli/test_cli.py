@@ -17,7 +17,7 @@ import pytest
 
 from gridshell.case import case_keys, load_case
 from gridshell.cli import main
-from gridshell.cli.form import ALIASES
+from gridshell.cli.options import ALIASES
 from gridshell.cli.rodends import COLUMNS
 from gridshell.errors import NetLimitError
 
@@ -117,7 +117,8 @@ def test_form_asks_for_the_case_and_saves_its_full_input(
 def test_a_case_file_is_run_into_out_and_its_name(finder: FakeFinder) -> None:
     Path("shell.toml").write_text("target.radius = '1 m'")
     assert main(["form", "shell.toml"]) == 0
-    assert load_case("out/shell/case.toml") == load_case("shell.toml")
+    asked = load_case("shell.toml")
+    assert load_case("out/shell/case.toml") == asked.sized(asked.target.build())
 
 
 def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
@@ -300,6 +301,65 @@ def test_a_table_may_be_separated_by_semicolons(finder: FakeFinder) -> None:
     Path(table).write_text(Path(table).read_text().replace(",", ";"))
     assert main(["popup", table, "--unit", "m"]) == 0
     assert finder.calls[0][0][1].shape == (2, 2, 3)
+
+
+def test_a_table_by_semicolons_may_have_decimal_commas(finder: FakeFinder) -> None:
+    table = write_table(Path("rods.csv"), [["a,b", *CROSS[0]], ["c", *CROSS[1]]], ("id", *COLUMNS))
+    assert main(["popup", table, "--unit", "m"]) == 0
+    Path(table).write_text(Path(table).read_text().replace(",", ";").replace(".", ",").replace('"a;b"', "a,b"))
+    assert main(["popup", table, "--unit", "m", "--out", "again"]) == 0
+    (first, final, _), (second, same, _) = (call[0] for call in finder.calls)
+    assert [rod.name for rod in second.rods] == ["a,b", "c"]
+    assert first.rods == second.rods
+    np.testing.assert_array_equal(final, same)
+
+
+def test_a_table_takes_the_rod_that_is_asked_for(finder: FakeFinder) -> None:
+    from gridshell.rods.section import Circle, Material, RectangularSection, Tube
+
+    table = write_table(Path("rods.csv"), CROSS)
+
+    def rod(*options: str) -> Any:
+        out = f"out{len(finder.calls)}"
+        assert main(["popup", table, "--unit", "m", "--out", out, *options]) == 0
+        return finder.calls[-1][0][2]
+
+    usual = rod()
+    assert rod("--rod.section.radius", "2 mm").section == Circle(0.002)
+    assert rod("--rod.material.youngs_modulus", "11 GPa").section == usual.section
+    assert rod("--rod.material.youngs_modulus", "11 GPa").material == Material(11e9, 1e3, 0.5)
+    lath = ["--rod.section.kind", "rectangle", "--rod.section.width", "1 mm", "--rod.section.height", "3 mm"]
+    assert rod(*lath).section == RectangularSection(width=0.001, height=0.003)
+    tube = rod("--rod.section.kind", "tube", "--rod.section.thickness", "0.1 mm").section
+    assert tube == Tube(usual.section.radius, 0.0001)
+
+
+def test_a_result_takes_the_rod_that_is_asked_for_in_place_of_its_own(finder: FakeFinder, dome: Path) -> None:
+    assert main(["popup", "dome", "--rod.material.density", "470 kg/m3"]) == 0
+    rod = finder.calls[0][0][2]
+    assert (rod.section.radius, rod.material.density) == (0.007, 470.0)
+
+
+def test_a_bad_rod_of_a_table_is_one_sentence(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
+    table = write_table(Path("rods.csv"), CROSS)
+    said = refused(capsys, "popup", table, "--unit", "m", "--rod.section.thickness", "1 mm")
+    assert 'kind "circle" has no thickness' in said
+    assert "unknown option --layout.edge" in refused(capsys, "popup", table, "--unit", "m", "--layout.edge", "1 mm")
+
+
+def test_lengths_left_to_the_targets_size_are_said_before_the_job(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """So that a wrong unit, or a file without a target, shows."""
+    Path("empty.toml").write_text("")
+    assert main(["form", "empty.toml"]) == 0
+    said = capsys.readouterr().err.splitlines()[0]
+    assert said == "gridshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm, rod radius 1 mm"
+    Path("big.toml").write_text("target = { radius = 200 }\nlayout.spacing = 25")
+    assert main(["form", "big.toml"]) == 0
+    assert capsys.readouterr().err.startswith("gridshell: hemisphere, 400 m wide; edge 4.17 m, rod radius 1 m\n")
+    assert main(["form", "empty.toml", "--quiet", "--out", "quiet"]) == 0
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("column", COLUMNS)

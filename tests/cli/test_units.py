@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gridshell.errors import InputError
-from gridshell.units import Kind, parse_quantity
+from gridshell.units import Kind, length_text, parse_quantity
 
 
 @pytest.mark.parametrize(
@@ -88,3 +88,15 @@ def test_a_bad_quantity_is_one_sentence_with_key_reason_and_remedy(value: object
 def test_the_message_shows_the_value_as_given() -> None:
     with pytest.raises(InputError, match=r'^rotate = "45 dg": unknown unit "dg" \(did you mean deg\?\); give an angle'):
         parse_quantity("45 dg", "angle", "rotate")
+
+
+@given(st.floats(1e-5, 9e5))
+def test_a_length_as_it_is_shown_can_be_read_again(length: float) -> None:
+    assert parse_quantity(length_text(length), "length", "length") == pytest.approx(length, rel=5.01e-3)  # three digits
+
+
+@pytest.mark.parametrize(
+    ("length", "text"), [(1 / 12, "83.3 mm"), (20.0, "20 m"), (0.99999, "1 m"), (0.9994, "999 mm"), (1234.0, "1230 m")]
+)
+def test_a_length_is_shown_in_the_unit_that_reads_well(length: float, text: str) -> None:
+    assert length_text(length) == text

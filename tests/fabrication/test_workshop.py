@@ -161,6 +161,13 @@ def test_stock_that_is_too_short_is_said() -> None:
     assert made.warnings[0].startswith("9 rods (the first: U01) cannot be spliced between joints from stock of 0.08 m")
 
 
+def test_one_rod_that_cannot_be_spliced_is_named_alone() -> None:
+    long = [[-0.3, 0.0], [0.3, 0.0]]
+    grid = gs.straight_rods([long, *([[x, -0.03], [x, 0.03]] for x in np.linspace(-0.3, 0.3, 5))])
+    made = fabricate(mesh_grid(grid, 0.02), ROD, Fabrication(stock_length=0.08))
+    assert made.warnings == ("rod R01 cannot be spliced between joints from stock of 0.08 m: give longer stock",)
+
+
 @pytest.mark.parametrize(
     ("options", "reason"),
     [({"end_allowance": -0.01}, "end allowance"), ({"kerf": float("nan")}, "kerf"),

@@ -12,9 +12,15 @@ from browser import needs_browser, open_report
 from forms import TARGETS, archive, wished
 from sample_archive import sample_archive, table_archive, with_way_up
 
+import gridshell as gs
+from gridshell.output import Archive, wording
 from gridshell.output.archive import export
+from gridshell.output.figures import key_figures
+from gridshell.output.plan import flat_plan
+from gridshell.output.result import rod_table
 from gridshell.output.verdict import verdict
 from gridshell.output.viewer import viewer_json
+from tests.acceptance.cases import ROD
 
 
 def page_of(made: object, folder: Path) -> Path:
@@ -132,6 +138,124 @@ def test_the_verdict_calls_a_way_up_smooth_only_where_nothing_snaps() -> None:
     way = {**made.result["deployment"], "snaps": [[0.1, 0.2]]}
     assert smooth not in verdict(replace(made, result={**made.result, "deployment": way})).sentences
     assert smooth not in verdict(sample_archive()).sentences
+
+
+def with_way(strength_used: float | None, lost: float | None, snaps: list[list[float]]) -> Archive:
+    """The dome with a way up whose stages below `lost` are missing."""
+    made = archive("dome")
+    bent = {key: dict(entry) for key, entry in made.result["bending"].items() if isinstance(entry, dict)}
+    for entry in bent.values():
+        entry["utilisation"] = strength_used
+    whole = made.result["deployment"]
+    kept = [k for k, stage in enumerate(whole["stages"]) if stage["share"] == 0 or stage["share"] >= (lost or 0.0)]
+    way = {**whole, "stages": [whole["stages"][k] for k in kept], "lost_at": lost, "snaps": snaps}
+    states = {name: rows[kept] if name.startswith("history") else rows for name, rows in made.states.items()}
+    return replace(made, result={**made.result, "bending": bent, "deployment": way}, states=states)
+
+
+@pytest.mark.parametrize(
+    ("lost", "snaps", "level", "words", "note", "head"),
+    [(None, [], "good", "the way up included.", "Every stage is an equilibrium", "on the way up"),
+     (None, [[0.14, 0.25]], "caution", "what a snap asks of them is not known.", "Every stage", "on the way up"),
+     (0.5625, [], "caution", "above 56 % of the way up; below, nothing is known of it.", "Below 56 %",
+      "on the way up above 56 %"),
+     (1.0, [], "caution", "nothing is known of the way up, which could not be followed.",
+      "The way up from flat was not followed", None)],
+)  # fmt: skip
+def test_no_more_is_said_of_the_way_up_than_was_followed(
+    lost: float | None, snaps: list[list[float]], level: str, words: str, note: str, head: str | None, tmp_path: Path
+) -> None:
+    made = with_way(0.32, lost, snaps)
+    found = verdict(made)
+    (said,) = [sentence for sentence in found.sentences if "of their strength" in sentence]
+    assert said.startswith("The rods use 32 % of their strength at most, ")
+    assert said.endswith(words)
+    assert ("way up included" in said) == (found.level == "good")
+    assert found.level == level
+    assert "the way up is not known" in found.headline or level == "good"
+    page = page_of(made, tmp_path).read_text()
+    assert f"<figcaption>{note}" in page
+    assert re.findall(r">(on the way up[^<]*)</th>", page) == ([head] if head else [])
+    lines = [line for line in made.summary().splitlines() if line.startswith("  bending   way up")]
+    assert len(lines) == (head is not None)
+    assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)
+
+
+def test_a_way_up_that_nobody_followed_is_not_included() -> None:
+    made = with_way(0.32, None, [])
+    result = {key: value for key, value in made.result.items() if key != "deployment"}
+    del result["bending"]["pop_up"]
+    found = verdict(replace(made, result=result))
+    assert found.level == "caution"
+    assert found.sentences[-1].endswith("in the final shape; the way up from flat was not followed.")
+    assert "way up" not in replace(made, result=result).summary()
+
+
+def test_without_a_strength_a_lost_way_up_does_not_change_the_level() -> None:
+    assert verdict(with_way(None, 1.0, [])).level == "good"
+
+
+def test_rods_that_break_come_before_all_but_what_did_not_converge() -> None:
+    made = with_way(3.16, None, [])
+    shells = {ends: {**shell, "stable": False} for ends, shell in made.result["pop_up"].items()}
+    broken = replace(made, result={**made.result, "pop_up": shells})
+    assert (verdict(broken).level, verdict(broken).headline) == ("bad", "Converged, but the rods would break")
+    first = broken.summary().splitlines()[0]
+    assert first.endswith(": converged, but the rods would break")
+    assert "316 % of the strength" in broken.summary()
+    assert "break" not in with_way(1.0, None, []).summary()
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(8260.4, "8260"), (1_234_567.0, "1230000"), (999.6, "1000"), (12.345, "12.3"),
+     (-1420.0, "-1420"), (0.00126, "0.00126")],
+)  # fmt: skip
+def test_numbers_are_plain(value: float, shown: str) -> None:
+    assert wording.rounded(value) == shown
+    assert wording.newtons(value) == f"{shown} N"
+
+
+def test_every_number_of_a_material_has_its_unit() -> None:
+    timber = gs.Material(youngs_modulus=11e9, density=470.0, shear=0.69e9).parameters()
+    rows = dict(wording.case_rows(timber))
+    assert rows == {
+        "Young's modulus": "11 GPa",
+        "density": "470 kg/m\N{SUPERSCRIPT THREE}",
+        "shear modulus": "0.69 GPa",
+    }
+
+
+@pytest.mark.parametrize(
+    ("rod", "line"),
+    [(ROD, "circle, radius 1 mm; E = 1 MPa, 1000 kg/m3 (the paper's rubber; for another: rod.material)"),
+     (gs.Rod(gs.Tube(0.02, 0.003), gs.Material(25e9, 1900.0)),
+      "tube, radius 20 mm, thickness 3 mm; E = 25 GPa, 1900 kg/m3"),
+     (gs.Rod(gs.RectangularSection(0.012, 0.05), gs.Material(11e9, 470.0, shear=0.69e9)),
+      "rectangle, width 12 mm, height 50 mm; E = 11 GPa, 470 kg/m3"),
+     (gs.Rod(gs.GivenSection(1e6, 20.0, 30.0, 5.0)), "given, EA 1000000 N, EI1 20 N m\N{SUPERSCRIPT TWO}")],
+)  # fmt: skip
+def test_the_summary_names_the_rod(rod: gs.Rod, line: str) -> None:
+    made = archive("dome")
+    text = replace(made, result={**made.result, "rod": rod_table(rod)}).summary()
+    (said,) = [one for one in text.splitlines() if one.startswith("  rod ")]
+    assert said.startswith(f"  rod       {line}")
+    assert said.endswith("rod.material)") == (rod is ROD)
+
+
+def test_a_grid_that_rests_on_its_target_tells_depth_and_not_gap() -> None:
+    made = archive("dome")
+    assert "s, gap 0 mm, " in made.summary()
+    assert ("largest gap", "0.000 mm") not in _drape_rows(made, "gravity")
+    for method, word in (("bound", "largest gap"), ("gravity", "deepest inside the target")):
+        assert word in [title for title, _ in _drape_rows(made, method)]
+    drape = {**made.result["drape"], "method": "gravity", "max_gap": 5.54e-5}
+    assert "deepest node inside by 0.0554 mm" in replace(made, result={**made.result, "drape": drape}).summary()
+
+
+def _drape_rows(made: Archive, method: str) -> list[tuple[str, str]]:
+    result = {**made.result, "drape": {**made.result["drape"], "method": method, "max_gap": 5.54e-5}}
+    return dict(key_figures(result, flat_plan(made)))["Drape"]
 
 
 def test_the_verdict_warns_of_a_shell_that_springs_off_with_every_support() -> None:

@@ -1,5 +1,6 @@
 """The paper's drape in time against gravity statics, which shares only the energies with it."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 import gridshell as gs
 from gridshell.errors import InputError, StabilityError
+from gridshell.formfinding.calming import calming, decay
 from gridshell.formfinding.draped import Draped
 from gridshell.formfinding.fall import Fall
 from gridshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
@@ -85,6 +87,43 @@ def test_a_fall_that_is_cut_short_says_that_it_is_not_at_rest() -> None:
     assert not draped.converged
     assert draped.report.status is Status.MOVING
     assert "NOT AT REST after 0.3 s" in draped.warnings[0]
+
+
+@pytest.mark.parametrize("key", ["drag", "duration"])
+def test_what_a_fall_that_is_not_at_rest_asks_for_brings_it_to_rest(key: str) -> None:
+    short = gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=Fall(drag=1.0, duration=2.5))
+    assert not short.converged
+    found = re.search(rf"([\d.]+) \S+ \(drape\.{key}\)", short.warnings[0])
+    assert found
+    fall = Fall(drag=float(found[1])) if key == "drag" else Fall(drag=1.0, duration=float(found[1]))
+    assert gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall).converged
+
+
+@pytest.mark.parametrize("rate", [0.3, 2.0])
+def test_decay_is_that_of_a_damped_swing(rate: float) -> None:
+    """Energy of x = exp(-c t / 2) cos(w t), whose peaks fall as exp(-c t)."""
+    times = np.linspace(0.0, 8.0, 801)
+    seen = list(zip(times, np.exp(-rate * times) * np.sin(12 * times) ** 2, strict=True))
+    found, peak = decay(seen)
+    assert abs(found / rate - 1) < 0.05  # windows begin anywhere in a swing of 0.26 s, of 2 s
+    assert abs(peak / np.exp(-6 * rate) - 1) < 0.25 * rate
+    assert decay([]) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("drag", "rate", "says"),
+    [(0.0, 1.0, "a drag of 5 1/s (drape.drag), or some 14 s (drape.duration)"),
+     (0.0, 0.02, "a drag of 5 1/s (drape.drag)"),
+     (6.0, 1.0, "some 14 s (drape.duration)"),
+     (6.0, 0.02, "friction (drape.friction)")],
+)  # fmt: skip
+def test_a_remedy_that_would_not_help_is_not_named(drag: float, rate: float, says: str) -> None:
+    """A swing that must lose a factor exp(5) more: 5 s longer at a rate of 1/s, times the spare half."""
+    times = np.linspace(0.01, 6.0, 600)
+    energies = np.exp(-rate * times)
+    still = float(energies[times > 4.5].max()) * np.exp(-5.0)
+    seen = [(0.0, still * np.exp(15.0)), *zip(times, energies, strict=True)]
+    assert calming(seen, still, 1.0, 6.0, drag) == says
 
 
 def test_beyond_the_step_limit_of_explicit_springs_a_fall_is_refused() -> None:

@@ -93,6 +93,43 @@ def test_a_popped_up_saddle_is_warned_of(monkeypatch):
     assert form.result()["pop_up"]["pinned"]["stable"] is False
 
 
+@pytest.mark.parametrize(("share", "says"), [(0.49, None), (0.51, "hardly any room for joints"), (1.01, "touch")])
+@pytest.mark.parametrize("kind", ["circle", "lath"])
+def test_rods_too_wide_for_their_distance_are_warned_of(share, says, kind):
+    """Where families meet at an angle, parallel rods are nearer than their spacing by its sine."""
+    found = gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=())
+    apart = 0.05 * np.sin(np.radians(found.result()["drape"]["min_angle_deg"]))
+    wide = share * apart
+    section = gs.Circle(wide / 2) if kind == "circle" else gs.RectangularSection(1e-3, wide)
+    rod = gs.Rod(section, ROD.material)
+    warnings = replace(found, draped=replace(found.draped, rod=rod)).warnings
+    assert [says in text for text in warnings] == [True] * (says is not None)
+    assert all(f"{1e3 * wide:.3g} mm wide" in text and f"{1e3 * apart:.3g} mm apart" in text for text in warnings)
+
+
+@pytest.mark.parametrize(("stiffness", "stretched"), [(0.3e6, True), (1e8, False)])
+def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remedy(stiffness, stretched):
+    """Strain is density g length / E whatever the section: no other advice is given where that is the cause."""
+    rod = gs.Rod(gs.Circle(1e-3), gs.Material(youngs_modulus=stiffness, density=1e3))
+    layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, length=0.9, edge=0.03)
+    form = gs.find_form(HEMISPHERE, layout, rod, method="gravity")
+    assert form.status == "converged"
+    found = [text for text in form.warnings if "under their own weight" in text]
+    assert len(found) == stretched
+    if stretched:
+        assert f"stretch by {100 * form.draped.report.max_strain:.2g} %" in found[0]
+        assert "rod.material" in found[0]
+        sprung = [text for text in form.warnings if "springs off" in text]
+        assert len(sprung) == 1
+        assert sprung[0].endswith("even with clamped ends")
+
+
+def test_a_wave_that_springs_off_is_advised_seams():
+    gap = replace(hemisphere_form().agreement["clamped"], max=0.03 * SIZE)
+    (words,) = replace(hemisphere_form(), agreement={"clamped": gap}).warnings
+    assert words.endswith("dips and ridges need seams, graded stiffness or supports")
+
+
 def test_families_that_meet_at_a_small_angle_are_warned_of():
     """A hemisphere and some more: on the diagonal of the net the angle closes as f(uv/R^2)."""
     form = gs.find_form(gs.Cap(SIZE, -0.06), layout_of(edge=0.025), ROD, ends=("clamped",))

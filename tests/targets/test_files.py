@@ -154,6 +154,19 @@ def test_a_case_names_files_from_its_own_folder(bowl, tmp_path, monkeypatch):
     assert target.height(np.zeros((1, 2)))[0] == pytest.approx(1.1, abs=1e-4)
 
 
+def test_a_surface_with_nothing_inside_its_edge_is_told_why(bowl, tmp_path):
+    """A box of two triangles a face is all edge, whatever its base; what a base leaves nothing of is another matter."""
+    import trimesh
+
+    trimesh.creation.box((12, 8, 3)).export(tmp_path / "box.stl")
+    for base in (None, 1.0):
+        with pytest.raises(gs.InputError, match=r'no vertex of "box.stl" lies inside its edge.* mesh it more finely'):
+            gs.surface_from(tmp_path / "box.stl", unit=1.0, base=base)
+    (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
+    with pytest.raises(gs.InputError, match=r'nothing of "bowl\.obj" lies inside its end: choose a lower base'):
+        gs.surface_from(tmp_path / "bowl.obj", unit=MM, base=100.0)
+
+
 def test_broken_files_are_refused_in_one_sentence(tmp_path):
     """A tenth of those that `make accept-targets` tries, every kind of fault among them in some format."""
     for what, arguments in list(broken_files(tmp_path))[3::10]:

@@ -18,11 +18,18 @@ from gridshell.units import shown
 
 Raw = dict[str, Any]
 
+
+def _paper(rods: tuple[int, int]) -> Raw:
+    """A grid of the paper [HQK section 3.1] with so many rods along x and y."""
+    grid = {"rods": rods, "spacing": 0.03, "length": 1.2, "edge": 0.005}
+    return {"layout": grid, "rod": {"section": {"radius": 0.001}}}
+
+
 BUILT_IN: dict[str, Raw] = {
-    "hemisphere": {"layout": {"rods": (17, 17), "length": 1.2}},
-    "paraboloid": {"layout": {"rods": (15, 15), "length": 1.2}},
-    "ellipsoid": {"layout": {"rods": (11, 15), "length": 1.2}},
-    "cap": {"layout": {"rods": (17, 17), "length": 1.2}},
+    "hemisphere": _paper((17, 17)),
+    "paraboloid": _paper((15, 15)),
+    "ellipsoid": _paper((11, 15)),
+    "cap": _paper((17, 17)),
     "heightfield": {},
 }
 """The cases that need no file, each named like its target's kind; the schema's defaults give the rest."""
@@ -31,9 +38,6 @@ BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf"), "me
 BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
 BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
 """Kinds of targets by the file that holds them: the file alone is a case."""
-
-BY_SIZE: Raw = {"layout": {"spacing": "auto", "edge": "auto"}, "rod": {"section": {"radius": "auto"}}}
-"""What such a case takes from its target's size."""
 
 FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
@@ -59,6 +63,9 @@ def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object]
     for path, kind in BY_KIND.items():
         _table(raw, path).setdefault("kind", kind)
     _drop_for_another_kind(raw, overrides)
+    if str(name_or_path) in BUILT_IN and {"seams.lines", "seams.file"} & overrides.keys():
+        for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
+            raw["layout"].pop(key, None)
     for path, value in overrides.items():
         if path not in case_keys():
             raise InputError(unknown_key(path, value, raw))
@@ -97,7 +104,7 @@ def _read(name_or_path: str | PathLike[str]) -> Raw:
     if name in BUILT_IN:
         return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
     if kind := BY_SUFFIX.get(path.suffix.lower()):
-        return {"target": {"kind": kind, "file": name}, **deepcopy(BY_SIZE)}
+        return {"target": {"kind": kind, "file": name}}
     if path.is_dir():
         raise InputError(f"{name} is a folder: give a case file, such as {path / 'case.toml'}")
     if not path.exists():

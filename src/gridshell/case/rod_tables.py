@@ -40,7 +40,7 @@ def _decided(radius: float | Literal["auto"]) -> float:
 class CircleTable(Table):
     kind: Literal["circle"] = "circle"
     radius: LengthOrAuto = Field(
-        default=0.001, description='radius; "auto": 1/200 of the target\'s size; of a tube: outer radius'
+        default="auto", description='radius; "auto": 1/200 of the target\'s size; of a tube: outer radius'
     )
 
     def build(self) -> "Section":
@@ -51,7 +51,7 @@ class CircleTable(Table):
 
 class TubeTable(Table):
     kind: Literal["tube"] = "tube"
-    radius: LengthOrAuto = Field(default=0.001, description="outer radius")
+    radius: LengthOrAuto = Field(default="auto", description="outer radius")
     thickness: Length = Field(description="thickness of the tube's wall")
 
     def build(self) -> "Section":

@@ -51,23 +51,22 @@ if TYPE_CHECKING:
 class LayoutTable(Table):
     rods: Counts = Field(default="auto", description='rods along x and y: 17x17, or "auto" for all that touch')
     spacing: LengthsOrAuto = Field(
-        default=(0.03, 0.03), description='between neighbouring rods: one length, or u,v, or "auto"'
+        default="auto", description='between neighbouring rods: one length, or u,v, or "auto"'
     )
     length: LengthOrAuto = Field(default="auto", description='length of every rod before trimming, or "auto"')
-    edge: LengthOrAuto = Field(default=0.005, description='longest edge of the mesh, or "auto"')
+    edge: LengthOrAuto = Field(default="auto", description='longest edge of the mesh, or "auto"')
     rotate: AngleOrAuto = Field(default=0.0, description='turn of the grid seen from above, or "auto": the best found')
     offset: Point = Field(default=(0.0, 0.0), description="shift x,y of the lattice against the axes")
 
     def build(self, target: "Target | None" = None) -> "GridLayout":
-        """The layout; "auto" stands for some 17 rods each way over the target, and six edges a span."""
+        """The layout; a spacing "auto" stands for some 17 rods each way over the target."""
         from gridshell.layout import GridLayout
 
         spacing = self.spacing
         if spacing == "auto":
             spacing = (_round((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
-        edge = min(spacing) / 6 if self.edge == "auto" else self.edge
-        return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "edge": edge, "rotate": rotate})
+        return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "rotate": rotate})
 
 
 class DrapeTable(Table):
@@ -127,7 +126,7 @@ class PatchTable(Table):
 
 
 class SeamsTable(Table):
-    lines: Polylines = Field(default=(), description='lines x,y; x,y that cut the target in plan, "|" between two')
+    lines: Polylines = Field(default=(), description='lines x,y; x,y that cut the target, prolonged; "|" between two')
     file: str | None = Field(default=None, description="OBJ or DXF with such lines")
     unit: Unit = Field(default=1.0, description="the unit of that file, such as mm")
     patches: tuple[PatchTable, ...] = Field(default=(), description="what patches, by their names, have of their own")
@@ -272,16 +271,16 @@ class Case(Table):
         ------
         InputError : moreover, keys that a form in patches does not have.
         """
-        for key, value, default in (
-            ("layout.rods", self.layout.rods, "auto"),
-            ("layout.length", self.layout.length, "auto"),
-            ("layout.offset", self.layout.offset, (0.0, 0.0)),
-            ("drape.method", self.drape.method, "bound"),
-            ("drape.anchor", self.drape.anchor, None),
+        patches = "each patch of a target cut by seams has its own"
+        for key, value, default, instead in (
+            ("layout.rods", self.layout.rods, "auto", f'{patches}: use "auto"'),
+            ("layout.length", self.layout.length, "auto", f'{patches}: use "auto"'),
+            ("layout.offset", self.layout.offset, (0.0, 0.0), f"{patches}: leave it out"),
+            ("drape.method", self.drape.method, "bound", 'seams need the bound drape: use "bound", or no seams'),
+            ("drape.anchor", self.drape.anchor, None, f"{patches}: leave it out, or give it in seams.patches"),
         ):
             if value != default:
-                instead = "leave it out" if default in (None, (0.0, 0.0)) else f'use "{default}"'
-                raise InputError(f"{key} = {shown(value)}: a target cut by seams has it from its patches: {instead}")
+                raise InputError(f"{key} = {shown(value)}: {instead}")
         target, layout, rod, options = self.build()
         kept = {key: options[key] for key in ("joint", "ends")}
         return Built(target, layout, rod, {"seams": self.seams.lines, "own": self.seams.own(), **kept})

@@ -17,6 +17,8 @@ from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Equilibrium, Problem, find_equilibrium
 
+THIN = 0.05  # strain of the outermost fibre up to which rods are thin: radii of ten depths
+
 
 @dataclass(frozen=True)
 class Checks:
@@ -36,7 +38,40 @@ class Checks:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return () if self.deployment is None else self.deployment.warnings
+        """Sentences that a user should read."""
+        way = () if self.deployment is None else self.deployment.warnings
+        bends = [
+            float((bent.strain - np.abs(bent.axial_strain)).max())
+            for bent in (*self.bending.values(), *self.on_the_way)
+            if bent.strain is not None
+        ]
+        if max(bends, default=0.0) <= THIN:
+            return way
+        return (
+            *way,
+            f"bending strains the rods by {100 * max(bends):.0f} %: they are too thick for their bends, the theory of "
+            f"thin rods holds up to {100 * THIN:.0f} % or so; use thinner rods or a larger target",
+        )
+
+    def overstress(self, strength: float | None) -> tuple[str, ...]:
+        """A sentence where the rods would break, in a final shape or on the way up.
+
+        strength : of the rods' material [Pa], or None.
+        """
+        if strength is None:
+            return ()
+        shares = () if self.deployment is None else self.deployment.share
+        final = [(_worst(bent) / strength, f"with {ends} ends") for ends, bent in self.bending.items()]
+        way = [
+            (_worst(bent) / strength, f"on the way up (stage at {100 * share:.0f} %)")
+            for share, bent in zip(shares, self.on_the_way, strict=True)
+            if share < 1
+        ]
+        broken = sorted((max(each) for each in (final, way) if each and max(each)[0] > 1), reverse=True)
+        if not broken:
+            return ()
+        found = ", ".join(f"{max(101, round(100 * used))} % of the strength {where}" for used, where in broken)
+        return (f"the rods would break: {found}; use thinner, softer or stronger rods, or a flatter target",)
 
 
 def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress: Progress = silent) -> Checks:
@@ -59,6 +94,10 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
     flat = bending(last.footprint.mesh, deployment.positions[0], rod)
     on_the_way = (flat, *(bending_of(shell, state, rod) for shell, state in deployment.shells))
     return Checks(bent, held, carried, deployment, on_the_way)
+
+
+def _worst(bent: Bending) -> float:
+    return 0.0 if bent.stress is None else float(bent.stress.max())
 
 
 def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:

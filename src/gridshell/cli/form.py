@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gridshell.case import BUILT_IN, Case, CaseKey, case_keys, load_case
+from gridshell.case import BUILT_IN, Case, load_case
+from gridshell.cli.options import CaseCommand, case_options, overrides_of
 from gridshell.cli.outcome import Kept, deliver, output_folder, wanted_kinds
 from gridshell.cli.progress import Progress, announce_compilation
+from gridshell.units import length_text
 
 if TYPE_CHECKING:
     from gridshell.formfinding.search import Search
@@ -16,55 +18,10 @@ if TYPE_CHECKING:
     from gridshell.rods.section import Rod
     from gridshell.targets import Target
 
-ALIASES = {
-    "target.radius": "--radius",
-    "target.formula": "--formula",
-    "target.unit": "--unit",
-    "target.base": "--base",
-    "target.boundary": "--boundary",
-    "layout.rods": "--rods",
-    "layout.spacing": "--spacing",
-    "layout.length": "--length",
-    "layout.edge": "--edge",
-    "layout.rotate": "--rotate",
-    "drape.anchor": "--anchor",
-    "drape.method": "--method",
-    "drape.objective": "--objective",
-}
-
-
-def _parameter(path: str) -> str:
-    """A key's name as a Python identifier."""
-    return path.replace(".", "__")
-
-
-class CaseOption(click.Option):
-    """The option of one key of the case file; its value is read by the case."""
-
-    def __init__(self, key: CaseKey) -> None:
-        self.key = key
-        names = [f"--{key.path}", *filter(None, [ALIASES.get(key.path)]), _parameter(key.path)]
-        text = key.help + (f" ({', '.join(key.kinds)})" if key.kinds and not key.choices else "")
-        super().__init__(names, metavar="|".join(map(str, key.choices)) or "VALUE", help=text)
-
-
-class CaseCommand(click.Command):
-    """A command with an option for every key, shown table by table."""
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        sections = dict[str, list[tuple[str, str]]]()
-        for option in self.get_params(ctx):
-            if isinstance(option, click.Option) and (record := option.get_help_record(ctx)):
-                table = f"[{option.key.path.partition('.')[0]}]" if isinstance(option, CaseOption) else "Output"
-                sections.setdefault(table, []).append(record)
-        for title, records in sections.items():
-            with formatter.section(title):
-                formatter.write_dl(records, col_max=40)
-
 
 @click.command(
     cls=CaseCommand,
-    params=[CaseOption(key) for key in case_keys().values()],
+    params=case_options(),
     epilog='Lengths and so on take a unit, "200 mm", "45 deg", "25 GPa"; a plain number is in SI.',
 )
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE")
@@ -78,8 +35,7 @@ def command(name: str, out: str | None, only: str | None, as_json: bool, quiet: 
     NAME is a built-in case, {names}; CASE.toml a case file; SURFACE a mesh (OBJ, STL, PLY, OFF,
     glTF), a Rhino file (3dm), or heights (CSV, PNG). Each key of a case is an option too.
     """
-    overrides = {path: value for path in case_keys() if (value := values[_parameter(path)]) is not None}
-    case = load_case(name, overrides)
+    case = load_case(name, overrides_of(values))
     return run(case, name, out=out, only=only, as_json=as_json, quiet=quiet)
 
 
@@ -93,9 +49,10 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
     if case.seams.lines:
         return _sew(case, folder, only=only, as_json=as_json, quiet=quiet)
     target, layout, rod, options = case.build()
-    case = case.sized(target)
+    asked, case = case, case.sized(target)
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
+    _announce_sizes(asked, target, layout, rod, quiet=quiet)
     from gridshell.form import find_form
 
     with Progress(quiet=quiet) as progress:
@@ -117,9 +74,10 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
 def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bool) -> int:
     """Find the form of a case with seams and write it; the exit code."""
     target, layout, rod, options = case.build_sewn()
-    case = case.sized(target)
+    asked, case = case, case.sized(target)
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
+    _announce_sizes(asked, target, layout, rod, quiet=quiet)
     from gridshell.form import sew
 
     with Progress(quiet=quiet) as progress:
@@ -128,6 +86,19 @@ def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bo
         case = case.headed(form.layout.rotate)
         kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
     return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
+
+
+def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", *, quiet: bool) -> None:
+    """Before a job runs, say what it is and which lengths were left to its target's size: a wrong unit shows here."""
+    section = case.rod.section
+    lengths = {
+        "spacing": min(layout.spacing) if case.layout.spacing == "auto" else None,
+        "edge": layout.edge if case.layout.edge == "auto" else None,
+        "rod radius": getattr(rod.section, "radius", None) if getattr(section, "radius", None) == "auto" else None,
+    }
+    said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
+    if said and not quiet:
+        click.echo(f"gridshell: {target.name}, {length_text(2 * target.size)} wide; {said}", err=True)
 
 
 def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: Progress) -> "Search":

@@ -42,6 +42,8 @@ class RodEnds:
 def read_table(path: Path, unit: str) -> RodEnds:
     """The rods of a CSV table with the columns `COLUMNS` and, if it likes, `id`; coordinates in `unit`.
 
+    Cells are parted by commas, semicolons or tabs; unless by commas, a comma is a decimal point.
+
     Raises
     ------
     InputError : no such file, no rods, a missing column, a cell without a finite number, an id used twice.
@@ -82,6 +84,8 @@ def _rows(path: Path, lines: list[str]) -> Iterator[tuple[str, dict[str, str]]]:
             continue
         if len(cells) != len(header):
             raise InputError(f"{where} has {len(cells)} cells, the header {len(header)}: give one for each")
+        if delimiter != ",":
+            cells = [cell if name == "id" else cell.replace(",", ".") for name, cell in zip(header, cells, strict=True)]
         yield where, dict(zip(header, cells, strict=True))
 
 

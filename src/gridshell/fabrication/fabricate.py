@@ -92,10 +92,8 @@ def _splices(
         made.append(tuple(at - options.end_allowance for at in found or ()))
     if not hopeless:
         return tuple(made), ()
-    words = (
-        f"{len(hopeless)} rods (the first: {hopeless[0]}) cannot be spliced between joints from stock of {stock:g} m"
-    )
-    return tuple(made), (f"{words}: give longer stock",)
+    who = f"rod {hopeless[0]}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {hopeless[0]})"
+    return tuple(made), (f"{who} cannot be spliced between joints from stock of {stock:g} m: give longer stock",)
 
 
 def _pieces(length: float, at: tuple[float, ...], options: Fabrication) -> list[float]:

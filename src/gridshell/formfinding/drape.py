@@ -1,6 +1,11 @@
 """Drape: lay the flat grid on the target."""
 
+from collections.abc import Sequence
+from math import isfinite
+from numbers import Real
 from typing import Literal
+
+import numpy as np
 
 from gridshell.errors import InputError
 from gridshell.formfinding.bound import bound_drape
@@ -12,8 +17,27 @@ from gridshell.joints import Joint
 from gridshell.layout import GridLayout
 from gridshell.rods.section import Rod
 from gridshell.targets import Target
+from gridshell.units import shown
 
 Method = Literal["bound", "gravity", "paper"]
+
+
+def require(name: str, value: object, kind: type, wanted: str = "") -> None:
+    """Refuse an argument of another kind, with one sentence in place of what it would break later.
+
+    Raises
+    ------
+    InputError : it says what the argument is, and what it must be: `wanted`, by default a `kind`.
+    """
+    if not isinstance(value, kind):
+        what = shown(value) if isinstance(value, str | int | float) else f"a {type(value).__name__}"
+        raise InputError(f"{name} must be {wanted or f'a gridshell {kind.__name__}'}, not {what}")
+
+
+def _require_point(name: str, value: object) -> None:
+    pair = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else ()
+    if len(pair) != 2 or not all(isinstance(one, Real) and isfinite(one) for one in pair):
+        raise InputError(f"{name} must be two finite numbers x, y in m, not {value!r}")
 
 
 def drape(
@@ -49,6 +73,12 @@ def drape(
     ------
     InputError, NetLimitError : the layout does not fit the target; no net exists.
     """
+    for name, value, kind in (("layout", layout, GridLayout), ("rod", rod, Rod), ("target", target, Target)):
+        require(name, value, kind)
+    if start is not None:
+        require("start", start, Draped, "what an earlier gridshell.drape returned")
+    if anchor is not None:
+        _require_point("anchor", anchor)
     if method == "bound":
         return bound_drape(target, layout, rod, anchor=anchor, near=start, progress=progress)
     if method == "gravity":

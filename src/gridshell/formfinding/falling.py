@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gridshell.contact.modified_mass import ModifiedMass, Touching
 from gridshell.errors import ConvergenceError, StabilityError
+from gridshell.formfinding.calming import calming
 from gridshell.formfinding.draped import Draped, smallest_joint_angle
 from gridshell.formfinding.fall import Fall
 from gridshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
@@ -95,7 +96,7 @@ def falling_drape(
         anchor=anchor,
         gravity=gravity,
         net=None,
-        warnings=_warnings(rest, series),
+        warnings=_warnings(rest, series, falling),
         rest=rest,
         fall=fall,
     )
@@ -116,13 +117,15 @@ class _Falling:
         self._law = ModifiedMass(target, massive, fall.stopped, fall.friction)
         self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.places))
         self._ties: ExplicitTies | None = None
+        self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
+        self._seen = list[tuple[float, float]]()  # times [s] and kinetic energies [J]
 
     def run(self, positions: Floats) -> TimeSeries:
-        fall, slowness = self.fall, float(np.sqrt(self.target.size / USUAL_SIZE))
+        fall = self.fall
         normals = np.tile([0.0, 0.0, 1.0], (len(positions), 1)) if self.shell.angles else None
         state = self.shell.state(positions, normals=normals)
-        step = fall.time_step or min(USUAL_STEP * slowness, self._safe_step(state))
-        duration = fall.duration or USUAL_DURATION * slowness
+        step = fall.time_step or min(USUAL_STEP * self._slowness, self._safe_step(state))
+        duration = fall.duration or USUAL_DURATION * self._slowness
         self._step = step
         never = int(np.ceil(duration / step)) + 1
         try:
@@ -178,6 +181,7 @@ class _Falling:
             if self.fall.time_step and moment.motion.explicit and count % (LIMITS * CHECKS) == 0:
                 self._refuse_unstable(moment)
             energy, force = self.activity(moment)
+            self._seen.append((moment.time, energy))
             self._progress("drape", f"falling, t = {moment.time:.3f} s, kinetic energy {energy:.1e} J", force)
             return self.fall.settle and self.rests(energy, force)
 
@@ -195,6 +199,11 @@ class _Falling:
 
     def rests(self, energy: float, force: float) -> bool:
         return energy < STILL * self._weight * self.target.size and force < BALANCED * self._heaviest
+
+    def remedy(self, rest: Rest) -> str:
+        """A drag and a duration that would do, from the energy that there was and from its decay."""
+        usual, still = USUAL_DURATION * self._slowness, STILL * self._weight * self.target.size
+        return calming(self._seen, still, rest.force_residual / (BALANCED * self._heaviest), usual, self.fall.drag)
 
     def pulls(self, last: Moment) -> int:
         """Nodes in contact that the target would have to pull."""
@@ -224,7 +233,7 @@ class _Falling:
         return rest, report
 
 
-def _warnings(rest: Rest, series: TimeSeries) -> tuple[str, ...]:
+def _warnings(rest: Rest, series: TimeSeries, falling: _Falling) -> tuple[str, ...]:
     if series.report is not None and series.report.end is End.STALLED:
         return (
             f"the fall could not go on at t = {rest.time:.4g} s however small its steps ({series.report.reason}); "
@@ -233,7 +242,7 @@ def _warnings(rest: Rest, series: TimeSeries) -> tuple[str, ...]:
     if not rest.at_rest:
         return (
             f"the grid is NOT AT REST after {rest.time:.3g} s: kinetic energy {rest.kinetic_energy:.1e} J, "
-            f"out-of-balance force {rest.force_residual:.1e} N; give it a longer duration, or drag",
+            f"out-of-balance force {rest.force_residual:.1e} N; give it {falling.remedy(rest)}",
         )
     if rest.fastest_growth:
         count = sum(s < UNSTABLE for s in rest.growth)

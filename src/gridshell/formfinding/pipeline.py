@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import degrees, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,15 @@ from gridshell.formfinding.trim import (
 )
 from gridshell.joints import Ball, Joint
 from gridshell.layout import FlatGrid, GridLayout, mesh_grid
-from gridshell.rods.section import Rod
+from gridshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
 
 EDGES_A_SPAN = 6
 SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
+STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
+ROOM = 0.5  # of the clear distance of parallel rods: wider ones leave no room for joints
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,9 @@ class FoundForm:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
-        return (*self.draped.warnings, *_popped_warnings(self.popped), *_springs_off(self.agreement))
+        stretched = _stretched(self.draped)
+        off = _springs_off(self.agreement, advise=not stretched)
+        return (*self.draped.warnings, *stretched, *_crowded(self.draped), *_popped_warnings(self.popped), *off)
 
 
 @dataclass(frozen=True)
@@ -174,16 +179,52 @@ def _popped_status(popped: dict[Ends, Popped]) -> str:
     return "converged"
 
 
-def _springs_off(compared: dict[Ends, Agreement]) -> tuple[str, ...]:
-    """With its ends clamped a convex shell keeps to the target; one that does not is held by nothing there."""
+def _stretched(draped: Draped) -> tuple[str, ...]:
+    """Rods that hang stretch by weight over stiffness, in which their section's area cancels out."""
+    strain = draped.report.max_strain
+    if draped.method == "bound" or not draped.converged or strain <= STRETCHED:
+        return ()
+    return (
+        f"on the target the rods stretch by {100 * strain:.2g} % under their own weight, so that they are cut too "
+        'short: use a stiffer or lighter material (rod.material; a thicker section does not help), or method "bound"',
+    )
+
+
+def _crowded(draped: Draped) -> tuple[str, ...]:
+    """Rods too wide for their distance, where shear brings parallel ones nearest to each other."""
+    apart, wide = min(draped.layout.spacing) * sin(draped.min_angle), _breadth(draped.rod)
+    if not wide > ROOM * apart:
+        return ()
+    what = "they would touch" if wide >= apart else "that leaves hardly any room for joints"
+    return (
+        f"the rods are {1e3 * wide:.3g} mm wide, and parallel ones {1e3 * apart:.3g} mm apart where the families meet "
+        f"at {degrees(draped.min_angle):.0f} degrees: {what}; use thinner rods (rod.section) or a larger spacing",
+    )
+
+
+def _breadth(rod: Rod) -> float:
+    """What a rod covers of the grid's plane across its line [m]; 0 where the shape of its section is not known."""
+    section = rod.section
+    if isinstance(section, GivenSection):
+        return 0.0
+    if isinstance(section, Circle | Tube):
+        return 2 * section.outer_radius
+    return 2 * section.b if isinstance(section, Ellipse) else section.height
+
+
+def _springs_off(compared: dict[Ends, Agreement], *, advise: bool) -> tuple[str, ...]:
+    """With its ends clamped a convex shell keeps to the target; one that does not is held by nothing there.
+
+    advise : what to do, where nothing else is known to be the cause.
+    """
     gap = compared.get("clamped")
     if gap is None or gap.max_relative < SPRUNG:
         return ()
     x, y, z = gap.where
+    advice = ": dips and ridges need seams, graded stiffness or supports" if advise else ""
     return (
         f"the free grid springs off the target by {gap.max:.3g} m ({100 * gap.max_relative:.1f} % of its size) near "
-        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends: dips and ridges need seams, graded stiffness or "
-        "supports",
+        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends{advice}",
     )
 
 

@@ -64,7 +64,11 @@ class GridLayout:
             if not isinstance(two, tuple | list) or len(two) != 2 or not all(isinstance(one, Real) for one in two):
                 raise InputError(f"layout {name} must be two lengths in m, not {two!r}")
         for name, value in (("spacing", pair[0]), ("spacing", pair[1]), ("edge", edge), ("length", length)):
-            if value != "auto" and not (isfinite(value) and value > 0):
+            if value == "auto" and name in ("edge", "length"):
+                continue
+            if not isinstance(value, Real):
+                raise InputError(f"layout {name} must be a length in m, not {value!r}")
+            if not (isfinite(value) and value > 0):
                 raise InputError(f"layout {name} must be positive, not {value} m")
         if rods != "auto":
             counts = tuple(rods)

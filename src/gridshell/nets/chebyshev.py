@@ -18,12 +18,13 @@ from gridshell.errors import InputError, NetLimitError
 from gridshell.geometry.curves import on_curve
 from gridshell.layout import FlatRod, GridLayout
 from gridshell.layout.flatgrid import Family
-from gridshell.layout.gridlayout import rod_name
+from gridshell.layout.gridlayout import auto_edge, rod_name
 from gridshell.layout.mesh import edge_counts
 from gridshell.nets.compass import Net, axes, geodesics, march
 from gridshell.nets.cuts import Cut, Lines, cut_lines, extrapolated, inside_nodes
 from gridshell.nets.nearby import march_near
 from gridshell.targets import Target
+from gridshell.units import length_text
 
 Floats = NDArray[np.float64]
 
@@ -99,6 +100,7 @@ def chebyshev_net(
         )
     for parts in SEARCHES:
         lines, rough = _find_lines(target, layout, start, heading, near.net if near else None, parts)
+        _refuse_too_many(target, layout, lines)
         coarse = _march_lines(target, layout, lines, start, heading, 1, rough)
         fine = _march_lines(target, layout, lines, start, heading, 2, coarse, rough)
         inside = inside_nodes(target, fine)
@@ -130,9 +132,13 @@ def chebyshev_net(
 def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
     """The anchor lifted vertically onto the target, and the tangent that points along the heading in plan."""
     x, y = anchor if anchor is not None else target.summit
-    point = target.lift(np.array([[x, y]]))
+    other = "leave it out for the highest point, or let a search choose (--anchor auto)"
+    try:
+        point = target.lift(np.array([[x, y]]))
+    except InputError as reason:
+        raise InputError(f"the anchor: {reason}, {other}") from None
     if not target.carries(point)[0]:
-        raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim")
+        raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim, {other}")
     n = target.on_surface(point).normal[0]
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])
     return point[0], np.array([*plan * n[2], -plan @ n[:2]])
@@ -164,8 +170,9 @@ def _find_lines(
         )
         if len(u) * len(v) > MOST_NODES / 10:
             raise InputError(
-                f"the net needs more than {len(u) // parts} x {len(v) // parts} lines: use a larger spacing or a "
-                "smaller target"
+                f"the net needs more than {len(u) // parts} x {len(v) // parts} lines, "
+                f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
+                f"unit, or use {_coarser(target)}"
             )
         net = march_near(target, u, v, start, heading, near) if near else march(target, u, v, start, heading)
         inside = inside_nodes(target, net)
@@ -202,9 +209,24 @@ def _march_lines(
     target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int, *near: Net
 ) -> Net:
     u, v = (_subdivide(offsets, layout.edge, refine) for offsets in (lines.u, lines.v))
-    if len(u) * len(v) > MOST_NODES:
-        raise InputError(f"the net would have {len(u)} x {len(v)} nodes: use longer edges or a larger spacing")
     return march_near(target, u, v, start, heading, *near)
+
+
+def _refuse_too_many(target: Target, layout: GridLayout, lines: _Lines) -> None:
+    """Before the finer march takes memory for nodes that are too many."""
+    counts = [len(_subdivide(offsets, layout.edge, 2)) for offsets in (lines.u, lines.v)]
+    if counts[0] * counts[1] > MOST_NODES:
+        auto = auto_edge(layout.spacing)
+        fine = layout.edge < 0.99 * auto
+        remedy = f'set layout.edge = "auto" ({length_text(auto)} here)' if fine else f"use {_coarser(target)}"
+        raise InputError(
+            f"the net would have {counts[0]} x {counts[1]} nodes, with edges of {length_text(layout.edge)} on a target "
+            f"{length_text(2 * target.size)} wide: check its unit, or {remedy}"
+        )
+
+
+def _coarser(target: Target) -> str:
+    return f"a larger spacing, such as {length_text(target.size / 8)}"
 
 
 def _subdivide(offsets: Floats, edge: float, refine: int) -> Floats:
@@ -299,7 +321,7 @@ def _name_rods(
     layout: GridLayout, lines: _Lines, ends: _Ends
 ) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
     """Rods from the lines: those of the layout get their labels, all other lines are virtual."""
-    rods, dropped, warnings = list[FlatRod](), list[tuple[str, str]](), list[str]()
+    rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), list[str]()
     families: tuple[tuple[Family, Floats, list[list[Cut]]], ...] = (("u", lines.v, ends.u), ("v", lines.u, ends.v))
     for family, offsets, cuts in families:
         make = FlatRod.u if family == "u" else FlatRod.v
@@ -319,11 +341,19 @@ def _name_rods(
             for label, cut in zip(piece_names(name, len(pieces)), pieces, strict=True):
                 rods.append(make(label, here, *cut, virtual=label in layout.left_out))
             if len(pieces) > 1:
-                warnings.append(f"rod {name} meets the target in {len(pieces)} pieces, each with ends of its own")
+                broken.append(name)
         for c, pieces in touching.items():
             labels = piece_names(f"virtual {family.upper()} {c:+.4f}", len(pieces))
             rods += [make(label, c, *cut, virtual=True) for label, cut in zip(labels, pieces, strict=True)]
-    return tuple(rods), dropped, warnings
+    return tuple(rods), dropped, [_in_pieces(broken)] if broken else []
+
+
+def _in_pieces(names: list[str]) -> str:
+    """That some rods do not go from rim to rim."""
+    return (
+        f"{len(names)} rods meet the target in several pieces, each with ends of its own: {', '.join(names)}; an "
+        "opening needs a ring that carries the reactions of the rods that end there"
+    )
 
 
 def piece_names(rod: str, count: int) -> list[str]:

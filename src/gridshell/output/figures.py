@@ -5,7 +5,7 @@ from typing import Any
 
 from gridshell.output import wording
 from gridshell.output.plan import FlatPlan
-from gridshell.output.verdict import ENDS, entries
+from gridshell.output.verdict import ENDS, entries, unknown_below
 
 Row = tuple[str, str]
 Entry = tuple[str, str, Callable[[Any], str]]  # what it is called, its key, how it is shown
@@ -40,6 +40,7 @@ _DRAPE: tuple[Entry, ...] = (
     ("status", "status", str),
     ("degrees of freedom", "dofs", str),
     ("largest gap", "max_gap", wording.millimetres),
+    ("deepest inside the target", "max_depth", wording.millimetres),
     ("largest strain", "max_strain", wording.small),
     ("force residual", "force_residual", wording.newtons),
     ("negative modes", "negative_modes", str),
@@ -81,7 +82,8 @@ def supports_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
 def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     """What was checked, for each kind of ends and on the way up: `columns` and `rows` of (title, values)."""
     bent, held = result.get("bending") or {}, result.get("reactions") or {}
-    columns = [key for key in (*ENDS, "pop_up") if key in bent]
+    unknown = unknown_below(result)
+    columns = [key for key in (*ENDS, "pop_up") if key in bent and (key in ENDS or unknown < 1)]
     rows = []
     for title, key, show in _BENDING:
         values = [bent[column].get(key) for column in columns]
@@ -91,7 +93,8 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
         values = [(held.get(column) or {}).get(key) for column in columns]
         if any(value is not None for value in values):
             rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
-    heads = ["on the way up" if column == "pop_up" else column for column in columns]
+    way = f"on the way up above {wording.percent(unknown)}" if unknown else "on the way up"
+    heads = [way if column == "pop_up" else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None
 
 
@@ -105,7 +108,7 @@ def key_figures(result: Mapping[str, Any], plan: FlatPlan) -> list[tuple[str, li
         ("Cut list", _cut_list(plan)),
         ("Rod", [row for part in parts for row in wording.case_rows(part)]),
         ("Net", _listed(result.get("net") or {}, _NET)),
-        ("Drape", _listed(drape, _DRAPE) + _listed(drape.get("own_ends") or {}, _OWN_ENDS)),
+        ("Drape", _listed(_with_depth(drape), _DRAPE) + _listed(drape.get("own_ends") or {}, _OWN_ENDS)),
     ]
     return [(title, rows) for title, rows in groups if rows]
 
@@ -120,6 +123,13 @@ def levels_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
 
 def _listed(table: Mapping[str, Any], listed: tuple[Entry, ...]) -> list[Row]:
     return [(title, show(table[key])) for title, key, show in listed if table.get(key) is not None]
+
+
+def _with_depth(drape: Mapping[str, Any]) -> dict[str, Any]:
+    """What is called `max_gap` of a grid that rests on the target is how deep a node lies inside it."""
+    if drape.get("method", "bound") == "bound":
+        return dict(drape)
+    return {**drape, "max_gap": None, "max_depth": drape.get("max_gap")}
 
 
 def _cut_list(plan: FlatPlan) -> list[Row]:

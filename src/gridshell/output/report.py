@@ -14,11 +14,16 @@ from gridshell.output.schedules import joints_table as joints
 from gridshell.output.schedules import supports_table as supports
 from gridshell.output.shapes import CAPTIONS
 from gridshell.output.svg import drawing_svg, inline
-from gridshell.output.verdict import verdict
+from gridshell.output.verdict import unknown_below, verdict
 from gridshell.output.viewer import viewer_json
+from gridshell.output.wording import percent
 
 IN_PAGE = ("supports", "elevations", "erection")
 FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
+PARTLY = (
+    "Below {share} of the way up from flat no stage could be found: nothing is known there. Above, every one is an "
+)
+PARTLY += "equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
 NOT_FOLLOWED = "The way up from flat was not followed: nothing is known between these shapes."
 
 
@@ -77,8 +82,16 @@ def _view(archive: Archive) -> dict[str, Any] | None:
         "script": Markup(script),
         "frames": data.count('"places":'),
         "colours": [kind for kind in ("stress", "gap") if f'"{kind}":{{' in data],
-        "note": FOLLOWED if "history" in archive.states else NOT_FOLLOWED,
+        "note": _note(archive),
     }
+
+
+def _note(archive: Archive) -> str:
+    """What the stages of the view are."""
+    unknown = unknown_below(archive.result)
+    if "history" not in archive.states or unknown >= 1:
+        return NOT_FOLLOWED
+    return PARTLY.format(share=percent(unknown)) if unknown else FOLLOWED
 
 
 def _tables(archive: Archive) -> list[tuple[str, Table, str]]:

@@ -4,7 +4,10 @@ from collections.abc import Iterator
 from math import degrees
 from typing import Any
 
-from gridshell.output.wording import stress
+from gridshell.output.verdict import unknown_below, utilisation
+from gridshell.output.wording import case_rows, percent, rounded, stress
+
+RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1], what a case has by default
 
 
 def summary_text(result: dict[str, Any]) -> str:
@@ -12,7 +15,10 @@ def summary_text(result: dict[str, Any]) -> str:
     rods = result["rods"]
     joints = sum(len(rod["joints"]) for rod in rods) // 2
     verdict = "converged" if result["status"] == "converged" else f"NOT CONVERGED: {result['status']}"
+    if (utilisation(result) or 0.0) > 1:
+        verdict += ", but the rods would break"
     lines = [f"{result['name']}: {verdict}", f"  grid      {len(rods)} rods, {joints} joints"]
+    lines += _rod(result["rod"])
     lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
@@ -23,7 +29,8 @@ def summary_text(result: dict[str, Any]) -> str:
         work = sum(level["factorizations"] for level in drape["levels"])
         line = f"  drape     {drape['method']}: {drape['dofs']} unknowns, {work} factorisations, "
         line += f"{drape['seconds']:.2f} s, "
-        line += f"gap {_mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
+        gap = "gap" if drape["method"] == "bound" else "deepest node inside by"
+        line += f"{gap} {_mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
         lines.append(line + f"negative modes {drape['negative_modes']}")
         if own := drape.get("own_ends"):
             lines.append(f"            its own rod ends within {_mm(own['max'])}, median {_mm(own['median'])}")
@@ -31,8 +38,8 @@ def summary_text(result: dict[str, Any]) -> str:
         state = "stable" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
         if gap := result.get("agreement", {}).get(ends):
-            line += f"; gap max {_mm(gap['max'])} ({_percent(gap['max_relative'])}), "
-            line += f"rms {_mm(gap['rms'])} ({_percent(gap['rms_relative'])})"
+            line += f"; gap max {_mm(gap['max'])} ({percent(gap['max_relative'])}), "
+            line += f"rms {_mm(gap['rms'])} ({percent(gap['rms_relative'])})"
         lines.append(line)
     lines += _checked(result)
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
@@ -42,45 +49,55 @@ def summary_text(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def _rod(rod: dict[str, Any]) -> Iterator[str]:
+    """Section and material in one line, and whether it is the paper's rubber."""
+    line = "  rod       " + ", ".join(" ".join(row) for row in case_rows(rod["section"])).removeprefix("kind ")
+    if material := rod.get("material"):
+        line += f"; E = {stress(material['youngs_modulus'])}, {rounded(material['density'], 4)} kg/m3"
+    if material == RUBBER:
+        line += " (the paper's rubber; for another: rod.material)"
+    yield line
+
+
 def _sewn(result: dict[str, Any]) -> Iterator[str]:
     """Each patch and each seam in a line of the summary."""
     for patch in result.get("patches") or []:
         line = f"  patch {patch['id']:<4}{patch['rods']} rods, heading {degrees(patch['rotate']):.1f} deg; "
         line += f"smallest angle {patch['net']['min_angle_deg']:.1f} deg"
         for ends, gap in patch["agreement"].items():
-            line += f"; {ends} gap rms {_percent(gap['rms_relative'])}"
+            line += f"; {ends} gap rms {percent(gap['rms_relative'])}"
         yield line
     moved = max((patch["ends_moved"] for patch in result.get("patches") or []), default=0.0)
     for number, seam in enumerate(result.get("seams") or [], start=1):
         line = f"  seam {number:<5}{len(seam['meetings'])} rods of either side meet, ends moved by {_mm(moved)} at most"
         for ends, force in (seam.get("forces") or {}).items():
-            line += f"; {ends} it carries {force['largest']:.3g} N at most"
+            line += f"; {ends} it carries {rounded(force['largest'])} N at most"
         yield line
 
 
 def _checked(result: dict[str, Any]) -> list[str]:
     """Bending and reactions, in a line each."""
-    lines = []
+    lines, unknown = [], unknown_below(result)
     for place, bent in result.get("bending", {}).items():
+        if place == "pop_up" and unknown >= 1:
+            continue
         if isinstance(bent, dict) and bent.get("min_radius") is not None:
             name = "way up" if place == "pop_up" else place
             line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}"
             if bent.get("max_stress") is not None:
                 line += f", largest stress {stress(bent['max_stress'])}"
             if bent.get("utilisation") is not None:
-                line += f", {_percent(bent['utilisation'])} of the strength"
+                line += f", {percent(bent['utilisation'])} of the strength"
+            if place == "pop_up" and unknown:
+                line += f"; unknown below {percent(unknown)} of it"
             lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
-        lines.append(f"  reactions {ends:<8}largest {held['largest_force']:.3g} N; sums of {sums}")
+        lines.append(f"  reactions {ends:<8}largest {rounded(held['largest_force'])} N; sums of {sums}")
     return lines
 
 
 def _mm(metres: float) -> str:
     if abs(metres) >= 1.0:
-        return f"{metres:.3g} m"
+        return f"{rounded(metres)} m"
     return f"{1e3 * metres:.3g} mm" if abs(metres) >= 1e-9 else "0 mm"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share >= 1e-9 else "0 %"

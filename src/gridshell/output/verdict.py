@@ -28,14 +28,14 @@ def verdict(archive: Archive) -> Verdict:
     """The verdict on an archive."""
     result = archive.result
     failed, unstable = _failed(result), _unstable(result)
-    used = _utilisation(result)
-    sentences = [*failed, *unstable, *_gaps(result), *_strength(result, used)]
+    used, unknown = utilisation(result), unknown_below(result)
+    sentences = [*failed, *unstable, *_gaps(result), *_strength(result, used, unknown)]
     if failed:
         return Verdict("bad", "Not converged: do not build from these drawings", sentences)
-    if unstable:
-        return Verdict("caution", "Converged, but not stable with every kind of support", sentences)
     if used is not None and used > 1:
         return Verdict("bad", "Converged, but the rods would break", sentences)
+    if unstable:
+        return Verdict("caution", "Converged, but not stable with every kind of support", sentences)
     known = [entry.get("stable") for entry in entries(result, "pop_up").values()]
     if not known:
         return Verdict("caution", "Not checked: there is no pop-up in this result", sentences)
@@ -44,6 +44,9 @@ def verdict(archive: Archive) -> Verdict:
     left = [gap["max_relative"] for gap in entries(result, "agreement").values() if gap.get("max_relative") is not None]
     if min(left, default=0.0) > SPRUNG:
         return Verdict("caution", "Converged and stable, but it does not keep to the target", sentences)
+    if used is not None and (unknown or _snaps(result)):
+        headline = "Converged and stable; whether the rods hold on the way up is not known"
+        return Verdict("caution", headline, sentences)
     return Verdict("good", "Converged and stable", sentences)
 
 
@@ -51,6 +54,21 @@ def entries(result: Mapping[str, Any], table: str) -> dict[str, dict[str, Any]]:
     """What `result[table]` holds for each kind of ends; empty where nothing is known."""
     known = result.get(table) or {}
     return {ends: entry for ends, entry in known.items() if isinstance(entry, dict)}
+
+
+def unknown_below(result: Mapping[str, Any]) -> float:
+    """Share of the way from flat below which nothing is known: 0 all of it was followed, 1 the final shape alone is."""
+    way = result.get("deployment") or {}
+    if way and way.get("lost_at") is None:
+        return 0.0
+    return min((float(stage["share"]) for stage in way.get("stages") or [] if stage["share"] > 0), default=1.0)
+
+
+def utilisation(result: Mapping[str, Any]) -> float | None:
+    """The largest of all shapes that are known, those of the way up among them; None where no strength was given."""
+    bent = (result.get("bending") or {}).values()
+    known = [entry["utilisation"] for entry in bent if isinstance(entry, dict) and entry.get("utilisation") is not None]
+    return max(known, default=None)
 
 
 def _failed(result: Mapping[str, Any]) -> list[str]:
@@ -87,24 +105,33 @@ def _gaps(result: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _utilisation(result: Mapping[str, Any]) -> float | None:
-    """The largest of all shapes, the way up included; None where no strength was given."""
-    bent = (result.get("bending") or {}).values()
-    known = [entry["utilisation"] for entry in bent if isinstance(entry, dict) and entry.get("utilisation") is not None]
-    return max(known, default=None)
-
-
-def _strength(result: Mapping[str, Any], used: float | None) -> list[str]:
+def _strength(result: Mapping[str, Any], used: float | None, unknown: float) -> list[str]:
     """How much of the strength is used, and whether the way up is smooth."""
     words = []
     if used is not None:
-        words.append(f"The rods use {percent(used)} of their strength at most, the way up included.")
+        words.append(f"The rods use {percent(used)} of their strength at most, {_known(result, unknown)}")
     elif result.get("bending"):
         words.append("No strength was given, so it is not known whether the rods hold (checks.strength).")
-    way = result.get("deployment") or {}
-    if way and not way.get("snaps") and way.get("lost_at") is None:
+    if not unknown and not _snaps(result):
         words.append("On the way up from flat the shell moves smoothly, as far as its stages tell.")
     return words
+
+
+def _known(result: Mapping[str, Any], unknown: float) -> str:
+    """In which shapes that is; no more is said of the way up than was followed."""
+    if not result.get("deployment"):
+        return "in the final shape; the way up from flat was not followed."
+    if unknown >= 1:
+        return "in the final shape; nothing is known of the way up, which could not be followed."
+    if unknown:
+        return f"in the final shape and above {percent(unknown)} of the way up; below, nothing is known of it."
+    if _snaps(result):
+        return "in the final shape and the stages of the way up; what a snap asks of them is not known."
+    return "the way up included."
+
+
+def _snaps(result: Mapping[str, Any]) -> bool:
+    return bool((result.get("deployment") or {}).get("snaps"))
 
 
 def _advice(clamped: Mapping[str, Any], pinned: Mapping[str, Any]) -> str:

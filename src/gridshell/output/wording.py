@@ -16,15 +16,22 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     **dict.fromkeys(("EI", "EI1", "EI2", "GJ"), (1.0, "N m\N{SUPERSCRIPT TWO}")),
     **dict.fromkeys(("mass", "mass_per_length"), (1.0, "kg/m")),
     "EA": (1.0, "N"),
-    "youngs_modulus": (1e-6, "MPa"),
+    **dict.fromkeys(("youngs_modulus", "shear"), (1e-6, "MPa")),
     "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
     "rotate": (180 / pi, "\N{DEGREE SIGN}"),
 }
 NAMES = {
     "youngs_modulus": "Young's modulus",
     "poisson_ratio": "Poisson's ratio",
+    "shear": "shear modulus",
     "reference_size": "size, for relative gaps",
 }
+
+
+def rounded(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits; a large one in full, never as 1.42e+03."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if abs(float(text)) >= 10**digits else text
 
 
 def millimetres(metres: float | None, digits: int = 3) -> str:
@@ -42,21 +49,23 @@ def percent(share: float | None) -> str:
     """A share as a percentage with two significant digits."""
     if share is None or not isfinite(share):
         return UNKNOWN
+    if abs(share) < 1e-9:
+        return "0 %"
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
 def newtons(force: float) -> str:
-    return f"{force:.3g} N"
+    return f"{rounded(force)} N"
 
 
 def newton_metres(moment: float) -> str:
-    return f"{moment:.3g} N m"
+    return f"{rounded(moment)} N m"
 
 
 def stress(pascals: float) -> str:
     """A stress [Pa] in a unit of its size."""
     unit, name = next((one for one in PRESSURES if abs(pascals) >= one[0]), PRESSURES[-1])
-    return f"{pascals / unit:.3g} {name}"
+    return f"{rounded(pascals / unit)} {name}"
 
 
 def seconds(time: float) -> str:
@@ -104,7 +113,7 @@ def _case_value(key: str, value: Any) -> str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
     factor, unit = CASE_UNITS.get(key, (1.0, ""))
-    if key == "youngs_modulus" and value >= 1e8:
+    if unit == "MPa" and value >= 1e8:
         factor, unit = 1e-9, "GPa"
-    shown = f"{factor * value:.5g}".replace("-", MINUS)
+    shown = rounded(factor * value, 5).replace("-", MINUS)
     return f"{shown}{unit}" if unit == "\N{DEGREE SIGN}" else f"{shown} {unit}".strip()

@@ -57,8 +57,11 @@ class Freeform(Target):
         curves: tuple[Floats, ...] = (),
         source: Mapping[str, object] | None = None,
         name: str = "the mesh",
+        notes: tuple[str, ...] = (),
     ) -> "Freeform":
         """From vertices (n, 3) [m] and triangles (m, 3), checked; it ends at its open boundary, curves and base.
+
+        notes : what was done to them before, in sentences.
 
         Raises
         ------
@@ -68,7 +71,7 @@ class Freeform(Target):
         made = {"kind": "mesh", "vertices": len(vertices), "faces": len(faces)}
         target = Freeform(
             surface=surface, base_height=base, curves=curves, source=dict(source or made),
-            repairs=tuple(repairs),
+            repairs=(*notes, *repairs),
         )  # fmt: skip
         target._require_an_end(name)
         target._require_a_good_fit(name)
@@ -267,6 +270,11 @@ class Freeform(Target):
             if not off < ASIDE * self._extent:
                 raise InputError(f"the boundary curve lies up to {off:.3g} m off {name}: draw it on the surface")
         if not (self.margin(self.surface.vertices) > 0).any():
+            if len(np.unique(np.concatenate([[], *self.surface.loops]))) == len(self.surface.vertices):
+                raise InputError(
+                    f"no vertex of {name} lies inside its edge, at which creases of more than 40 degrees end it too: "
+                    "mesh it more finely, or round its creases"
+                )
             raise InputError(f"nothing of {name} lies inside its end: choose a lower base or another boundary")
 
     def _require_a_good_fit(self, name: str) -> None:

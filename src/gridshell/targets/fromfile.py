@@ -77,7 +77,8 @@ def heights_from(
     boundary: File | None = None,
     placement: Placement = UNMOVED,
 ) -> Freeform:
-    """The surface through heights on a lattice: a CSV with a row of heights for each y, or a grey image.
+    """The surface through heights on a lattice: a CSV with a row of heights for each y or with points x, y, z, or a
+    grey image.
 
     Parameters
     ----------
@@ -92,9 +93,9 @@ def heights_from(
     path = Path(file)
     if path.suffix.lower() not in GRID_FILES:
         raise InputError(f"{path} holds no lattice of heights: give one of {', '.join(GRID_FILES)}")
-    vertices, faces = read_heights(path, size, height)
+    vertices, faces, notes = read_heights(path, size, height)
     source: dict[str, object] = {"kind": "heights", "size": list(size), "height": height}
-    return _placed(path, vertices, faces, [], 1.0, base, boundary, placement, source)
+    return _placed(path, vertices, faces, [], 1.0, base, boundary, placement, source, notes)
 
 
 def _placed(
@@ -107,6 +108,7 @@ def _placed(
     boundary: File | None,
     placement: Placement,
     source: dict[str, object],
+    notes: tuple[str, ...] = (),
 ) -> Freeform:
     if boundary is not None:
         curves = curves + read_curves(Path(boundary), unit)
@@ -116,4 +118,4 @@ def _placed(
     placed = tuple(placement(curve) for curve in curves)
     with np.errstate(over="ignore", invalid="ignore"):
         vertices = placement(vertices)
-    return Freeform.of(vertices, faces, base=base, curves=placed, source=given, name=shown(path.name))
+    return Freeform.of(vertices, faces, base=base, curves=placed, source=given, name=shown(path.name), notes=notes)

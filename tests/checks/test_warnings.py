@@ -1,0 +1,71 @@
+"""What the checks warn of: rods that would break, and rods too thick for the theory; circles, whose strain is r / R."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_bending import on_circle, rods_of_length
+
+import gridshell as gs
+from gridshell.checks import Bending, Checks, bending
+from gridshell.checks.deployment import Deployment
+
+E = 1e9
+THICKNESS = 2e-3  # radius of the rod [m]
+ROD = gs.Rod(gs.Circle(radius=THICKNESS), gs.Material(youngs_modulus=E, density=1e3))
+MESH = rods_of_length(0.3, edge=0.002)
+STRENGTH = E * THICKNESS / 0.1  # used up by a circle of 0.1 m
+
+
+def bent(radius: float) -> Bending:
+    positions, clamps = on_circle(MESH, radius)
+    return bending(MESH, positions, ROD, clamps=clamps)
+
+
+def checks(final: dict[str, float], way: list[float]) -> Checks:
+    """Of shells whose rods lie on circles: in their final shapes, and at equal stages of the way up."""
+    share = np.linspace(0, 1, len(way))
+    deployment = Deployment(share, np.zeros((len(way), MESH.node_count, 3)), ()) if way else None
+    return Checks({ends: bent(radius) for ends, radius in final.items()}, {}, {}, deployment, tuple(map(bent, way)))  # type: ignore[misc]
+
+
+def test_rods_break_by_their_thickness_over_the_radius() -> None:
+    """A quarter of the radius that they bear: four times the strength; of two shapes each the worst is named."""
+    (words,) = checks({"pinned": 0.05, "clamped": 0.025}, [1.0, 0.05, 0.04, 1.0, 0.05]).overstress(STRENGTH)
+    assert words.startswith(
+        "the rods would break: 400 % of the strength with clamped ends, 250 % of the strength on the way up "
+        "(stage at 50 %); "
+    )
+
+
+@pytest.mark.parametrize(("final", "way", "says"), [
+    ({"pinned": 0.2}, [1.0, 0.04, 0.2], "would break: 250 % of the strength on the way up (stage at 50 %);"),
+    ({"pinned": 0.05}, [1.0, 0.2, 0.05], "would break: 200 % of the strength with pinned ends;"),
+    ({"pinned": 0.0999}, [], "would break: 101 % of the strength with pinned ends;"),  # never 100 % of what breaks
+])  # fmt: skip
+def test_the_shape_that_breaks_is_named(final: dict[str, float], way: list[float], says: str) -> None:
+    (words,) = checks(final, way).overstress(STRENGTH)
+    assert says in words
+
+
+def test_rods_that_hold_are_not_warned_of() -> None:
+    held = checks({"pinned": 0.101}, [1.0, 0.101, 0.101])
+    assert held.overstress(STRENGTH) == ()
+    assert checks({"pinned": 0.01}, []).overstress(None) == ()
+
+
+@pytest.mark.parametrize(("radius", "percent"), [(1.01 * THICKNESS / 0.05, None), (THICKNESS / 0.08, 8)])
+@pytest.mark.parametrize("on_the_way", [False, True])
+def test_rods_too_thick_for_their_bends_are_warned_of(radius: float, percent: int | None, on_the_way: bool) -> None:
+    found = checks({"pinned": 10.0 if on_the_way else radius}, [10.0, radius, 10.0] if on_the_way else [])
+    assert [words.split(":")[0] for words in found.warnings] == (
+        [] if percent is None else [f"bending strains the rods by {percent} %"]
+    )
+
+
+def test_a_stretched_rod_is_not_a_thick_one() -> None:
+    shell = bent(10.0)
+    assert shell.strain is not None
+    axial = np.full_like(shell.axial_strain, -0.2)
+    drawn = replace(shell, axial_strain=axial, strain=shell.strain + 0.2)
+    assert Checks({"pinned": drawn}, {}, {}, None, ()).warnings == ()
