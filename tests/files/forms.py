@@ -1,6 +1,8 @@
-"""Real results that the tests of files share, found once: a dome, an oval turned by 45 degrees, a ridge."""
+"""Real results that the tests of files share, found once: a dome, an oval turned by 45 degrees, a ridge, and others."""
 
 from functools import cache
+
+import numpy as np
 
 import gridshell as gs
 from gridshell.fabrication import Fabrication
@@ -34,3 +36,33 @@ def wished() -> Archive:
     style = DrawingStyle(project="Pavilion", revision="B", tolerance=5e-4, layers={"CUT": "LASER"})
     making = Fabrication(end_allowance=0.012, stock_length=0.4, kerf=0.003)
     return form("dome").archive(takeaway=Takeaway(strength=2e4, stages=4, fabrication=making, drawings=style))
+
+
+LATH = gs.Rod(
+    gs.RectangularSection(width=0.012, height=0.05), gs.Material(youngs_modulus=11e9, shear=0.69e9, density=470)
+)
+ROOF = gs.HeightField(formula="3*cos(pi*x/16)*cos(pi*y/12) + 0.05*x", domain=gs.Rectangle((12.0, 8.0)))
+
+
+def mesh_with_an_opening() -> gs.Target:
+    """A vault of 12 by 8 m with a round opening of 1.3 m off its middle."""
+    x, y = np.meshgrid(np.linspace(-6, 6, 61), np.linspace(-4, 4, 41), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), (3 * np.cos(np.pi * x / 16) * np.cos(np.pi * y / 12)).ravel()])
+    index = np.arange(len(points)).reshape(x.shape)
+    a, b, c, d = (one.ravel() for one in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    kept = np.linalg.norm(points[faces].mean(axis=1)[:, :2] - (1.0, 0.5), axis=1) > 1.3
+    used, faces = np.unique(faces[kept], return_inverse=True)
+    return gs.Freeform.of(points[used], faces.reshape(-1, 3))
+
+
+@cache
+def formed(name: str) -> Archive:
+    """Also a roof on a rectangle, one with an "opening", and a dome that is "sewn" of two patches."""
+    if name in TARGETS:
+        return archive(name)
+    if name == "sewn":
+        layout = gs.GridLayout.orthogonal(spacing=0.03, edge=0.01)
+        return gs.sew(gs.Hemisphere(0.2), [[(-1.0, 0.0), (1.0, 0.0)]], layout, ROD).archive()
+    target, spacing = (ROOF, 0.8) if name == "roof" else (mesh_with_an_opening(), 0.6)
+    return gs.find_form(target, gs.GridLayout.orthogonal(spacing=spacing, edge=0.1), LATH).archive()

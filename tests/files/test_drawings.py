@@ -3,6 +3,7 @@
 import io
 import re
 import zlib
+from dataclasses import replace
 from itertools import pairwise
 from math import pi
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from dxf_reader import read_dxf
 from ezdxf.enums import TextEntityAlignment
-from forms import TARGETS, archive, wished
+from forms import TARGETS, archive, formed, wished
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -24,21 +25,25 @@ from gridshell.output.archive import export
 from gridshell.output.drawing import LAYERS, Drawing, Pencil, Text
 from gridshell.output.drawing import Path as Line
 from gridshell.output.drawings import drawing_set, sheet_set
+from gridshell.output.drawings.bracing import bracing_drawing
+from gridshell.output.drawings.final import elevations_drawing
 from gridshell.output.drawings.flat import diagonals, flat_drawing
 from gridshell.output.drawings.sheets import OVERLAP, SCALES, TEXT, fitted, room, tiled
 from gridshell.output.dxf import drawing_dxf
-from gridshell.output.labels import boxes_meet, spread
+from gridshell.output.labels import boxes_meet, lines_meet, spread
 from gridshell.output.plan import flat_plan
+from gridshell.output.rods import joint_places, rods_of
 from gridshell.output.schedules import rods_table
 from gridshell.output.takeaway import DrawingStyle, Takeaway
 
 PAPER = (420.0, 297.0)  # A3
-ARCHIVES = [*TARGETS, "wished", "sample", "table"]
+FORMED = [*TARGETS, "roof", "opening", "sewn"]
+ARCHIVES = [*FORMED, "wished", "sample", "table"]
 
 
 def named(name: str) -> Archive:
     others = {"wished": wished, "sample": sample_archive, "table": table_archive}
-    return others[name]() if name in others else archive(name)
+    return others[name]() if name in others else formed(name)
 
 
 def covered(drawing: Drawing) -> list[tuple[str, str]]:
@@ -217,6 +222,67 @@ def test_diagonals_are_those_of_the_largest_rectangle() -> None:
         if x1 > x0 and y1 > y0 and {(x0, y0), (x1, y0), (x0, y1), (x1, y1)} <= marks
     )  # fmt: skip
     assert area == pytest.approx(best)
+
+
+@pytest.mark.parametrize("name", FORMED)
+def test_each_grid_is_set_out_by_two_diagonals_with_their_lengths(name: str) -> None:
+    """Each patch of a sewn shell has its own; along them every cell is there, so that none runs over an opening."""
+    plan = flat_plan(formed(name))
+    found = diagonals(plan)
+    assert len(found) == (4 if name == "sewn" else 2)
+    for a, b in found:
+        for point in a + np.linspace(0.01, 0.99, 99)[:, None] * (b - a):
+            near = np.abs(plan.marks - point).max(axis=1) < 1.001 * plan.spacing
+            sides = np.sign(np.round(plan.marks[near] - point, 6))
+            assert {(1, 1), (1, -1), (-1, 1), (-1, -1)} <= {
+                (i or j, k or m) for i, k in sides for j in (1, -1) for m in (1, -1)
+            }  # a joint in each quarter around it
+    written = [text.text for text in flat_drawing(plan, plan.text).texts]
+    for a, b in found:
+        words = f"{np.linalg.norm(b - a):.1f}"
+        assert written.count(words) == sum(f"{np.linalg.norm(d - c):.1f}" == words for c, d in found)
+
+
+def apart(point: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Distances (n,) from a point to lines (n, 2, 2)."""
+    start, along = lines[:, 0], lines[:, 1] - lines[:, 0]
+    share = np.clip(np.sum((point - start) * along, axis=1) / np.sum(along**2, axis=1), 0, 1)
+    return np.linalg.norm(start + share[:, None] * along - point, axis=1)
+
+
+@pytest.mark.parametrize(("name", "share"), [("dome", 0.7), ("roof", 1.0), ("opening", 1.0), ("sewn", 0.45)])
+def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -> None:
+    """Nearly all of them find room, where cells are not too thin; between joints, rods are taken to be straight."""
+    made = formed(name)
+    drawing = bracing_drawing(made, flat_plan(made).text)
+    braces = np.array([path.points for path in drawing.paths if "to" in path.note])
+    numbers = [text for text in drawing.texts if text.layer == "LABEL"]
+    assert len(numbers) >= share * len(braces)
+    joints = joint_places(made, made.states[made.final or ""])
+    rods = []
+    for rod in rods_of(made):
+        met = sorted(rod.joints, key=lambda joint: joint[1])
+        places = [joints.get(f"{rod.id}/{other}", joints.get(f"{other}/{rod.id}")) for other, _ in met]
+        rods += [(a[:2], b[:2]) for a, b in pairwise(places)]
+    lines = np.concatenate([1e3 * np.array(rods), braces])
+    assert [text.text for text in numbers if lines_meet(text.box(), lines)] == []
+    lengths = [f"{1e3 * one['final']:.1f}" for one in made.result["fabrication"]["bracing"]]
+    for number in numbers:  # of the brace that it lies along: nearest to both ends of its text
+        ends = 0.5 * (number.box()[[0, 1]] + number.box()[[3, 2]])
+        off = np.max([apart(end, braces) for end in ends], axis=0)
+        assert lengths[int(np.argmin(off))] == number.text
+
+
+@pytest.mark.parametrize(("name", "spans"), [("roof", ("12000", "8000")), ("dome", ("400.0", "400.0"))])
+def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[str, str]) -> None:
+    """Rod ends are some hundredths of a millimetre off the edge: to a ten-thousandth a roof of 12 by 8 m is that."""
+    made = formed(name)
+    plan = flat_plan(made)
+    texts = [text.text for text in elevations_drawing(made, plan.text).texts]
+    assert texts[0] == spans[0]
+    assert texts[3] == spans[1]
+    longer = {**made.states, made.final: made.states[made.final or ""] * 1.0002}
+    assert elevations_drawing(replace(made, states=longer), plan.text).texts[0].text != spans[0]
 
 
 def test_strips_show_the_schedule(tmp_path: Path) -> None:

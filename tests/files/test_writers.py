@@ -4,6 +4,7 @@ import io
 import re
 import zlib
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from PIL import Image
 from sample_archive import sample_archive
 
+from gridshell.output import Archive
 from gridshell.output.colours import mixed
 from gridshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
 from gridshell.output.labels import Room, lines_meet
@@ -19,6 +21,8 @@ from gridshell.output.pdf import POINTS, WIDTHS, drawings_pdf
 from gridshell.output.pictures import LAYERS, PAPER, picture
 from gridshell.output.png import drawing_png
 from gridshell.output.rods import rods_of
+from gridshell.output.scale import scale_of
+from gridshell.output.shapes import shape_of
 from gridshell.output.svg import drawing_svg, number
 
 numbers = st.floats(-1e6, 1e6).map(lambda x: float(np.round(x, 4))) | st.sampled_from([0.0, -0.001, 100.0, -0.5, 1.005])
@@ -143,6 +147,74 @@ def test_a_picture_draws_every_rod_whole_and_once_over_a_halo(state: str) -> Non
     assert pieces == sum(len(rod.nodes) - 1 for rod in rods_of(archive))
     assert len({path.pen.width for path in ink if path.pen}) <= LAYERS
     assert len(ink) >= len(rods_of(archive))
+
+
+def covered_of_rods(archive: Archive, state: str) -> float:
+    """Share of the points on drawn rods that are as light as paper in the PNG."""
+    shape = picture(archive, state)
+    pixels = np.asarray(Image.open(io.BytesIO(drawing_png(shape, 1600))).convert("RGB"), dtype=int)
+    (left, _), (right, top) = shape.box()
+    scale = pixels.shape[1] / (right - left)
+    rods = [path.points for path in shape.paths if path.layer == "CUT" and path.pen and path.pen.colour != PAPER]
+    share = np.linspace(0.1, 0.9, 9)[:, None]
+    points = np.concatenate([a + share * (b - a) for rod in rods for a, b in pairwise(rod)])
+    column, row = (scale * (points - (left, top)) * (1, -1)).astype(int).T
+    return float(np.mean(pixels[row, column].min(axis=1) > 225))
+
+
+def test_rods_are_set_off_only_against_what_they_pass_over() -> None:
+    """On the flat grid no rod is broken at a joint; the back of a dome is, where the front passes over it."""
+    archive = sample_archive(25, 4)
+    assert covered_of_rods(archive, "flat") == 0.0
+    assert covered_of_rods(archive, "popped_clamped") > 0.01
+
+
+@pytest.mark.parametrize(("rise", "filled"), [(0.0, True), (0.03, False)])
+def test_only_a_level_edge_is_filled(rise: float, filled: bool) -> None:
+    """An edge that rises by 3 % of its width would look like a surface."""
+    archive = sample_archive(9)
+    tilted = archive.states["popped_clamped"].copy()
+    tilted[:, 2] += rise * tilted[:, 0]
+    shape = picture(replace(archive, states={**archive.states, "popped_clamped": tilted}), "popped_clamped")
+    (edge,) = (path for path in shape.paths if path.layer == "BOUNDARY-FINAL")
+    assert edge.pen is not None
+    assert bool(edge.pen.fill) == filled
+
+
+def test_a_stress_has_its_own_scale_and_stages_share_one() -> None:
+    plain = sample_archive(5)
+    count = len(plain.states["rod_nodes"])
+    stages = np.array([0.0, 2e6, 9e6, 4e6])
+    states = {
+        **plain.states,
+        "stress_pinned": np.full(count, 3e6),
+        "history": np.tile(plain.states["draped"], (4, 1, 1)),
+        "history_share": np.linspace(0, 1, 4),
+        "history_stress": stages[:, None] * np.ones(count),
+    }
+    archive = replace(plain, states=states)
+    found = {
+        name: scale_of(archive, shape_of(archive, name), "stress") for name in ("popped_pinned", "stage_1", "stage_2")
+    }
+    limits = {name: (scale.high, scale.caption) for name, scale in found.items() if scale}
+    assert limits == {
+        "popped_pinned": (3.0, "stress in MPa, here up to 3"),
+        "stage_1": (10.0, "stress in MPa, here up to 2"),
+        "stage_2": (10.0, "stress in MPa, here up to 9"),
+    }
+
+
+@pytest.mark.parametrize(("gap", "unit", "high"), [(3.3e-5, "mm", 0.04), (0.8, "mm", 800.0), (2.4, "m", 3.0)])
+def test_gaps_are_shown_in_a_unit_of_their_size(gap: float, unit: str, high: float) -> None:
+    plain = sample_archive(5)
+    gaps = np.zeros(len(plain.states["draped"]))
+    gaps[7] = -gap
+    archive = replace(plain, states={**plain.states, "gap_draped": gaps}, result={**plain.result, "agreement": {}})
+    scale = scale_of(archive, shape_of(archive, "draped"), "gap")
+    assert scale is not None
+    assert scale.caption == f"gap to target in {unit}, + outside"
+    assert (scale.low, scale.high) == pytest.approx((-high, high))
+    assert np.abs(scale.values).max() == pytest.approx(gap if unit == "m" else 1e3 * gap)
 
 
 def test_what_is_made_of_an_archive_is_made_again_for_another() -> None:

@@ -45,14 +45,21 @@ class Label:
 
 
 class Room:
-    """The boxes (4, 2) that are taken, found by the square of the plane that they lie in."""
+    """The boxes (4, 2) that are taken, found by the square of the plane that they lie in.
 
-    def __init__(self, square: float) -> None:
+    within : another, in which all that is taken is taken here too.
+    """
+
+    def __init__(self, square: float, within: "Room | None" = None) -> None:
         self._square = square
         self._taken: dict[tuple[int, int], list[tuple[Extent, Floats]]] = {}
+        self._own = list[Floats]()
+        self._within = within
 
     def free(self, box: Floats) -> bool:
         """Whether no box that was taken is met."""
+        if self._within is not None and not self._within.free(box):
+            return False
         extent = left, low, right, high = _extent(box)
         near = [
             other
@@ -63,6 +70,7 @@ class Room:
         return not near or not boxes_meet(box, np.array(near))
 
     def take(self, box: Floats) -> None:
+        self._own.append(box)
         extent = _extent(box)
         for square in self._squares(extent):
             self._taken.setdefault(square, []).append((extent, box))
@@ -73,6 +81,11 @@ class Room:
         if free:
             self.take(box)
         return free
+
+    def join(self, other: "Room") -> None:
+        """Take all that the other has taken."""
+        for box in other._own:
+            self.take(box)
 
     def _squares(self, extent: Extent) -> list[tuple[int, int]]:
         left, low, right, high = (int(value // self._square) for value in extent)
@@ -85,17 +98,19 @@ def _extent(box: Floats) -> Extent:
     return min(a, b, c, d), min(e, f, g, h), max(a, b, c, d), max(e, f, g, h)
 
 
-def place(texts: Sequence[str], rods: Floats, size: float, *, both: bool = True) -> list[Label]:
+def place(texts: Sequence[str], rods: Floats, size: float, *, at: NDArray[np.bool_] | None = None) -> list[Label]:
     """Labels at both ends of the rods (m, 2, 2); a second end that is too crowded goes without.
 
     size : of the text, in the unit of `rods`.
-    both : else at the first end only.
+    at : (m, 2) whether an end is to have one; default: all.
     """
     placed: list[Label] = []
     room = Room(4 * size)
-    for end in (0, 1) if both else (0,):
-        for k, text in enumerate(texts):
-            label = _first_free(text, rods[k, end], rods[k, 1 - end], size, room, rods, must=end == 0)
+    wanted = np.ones((len(rods), 2), dtype=bool) if at is None else at
+    for end in (0, 1):
+        for k in np.flatnonzero(wanted[:, end]).tolist():
+            must = end == 0 or not wanted[k, 0]
+            label = _first_free(texts[k], rods[k, end], rods[k, 1 - end], size, room, rods, must=must)
             if label is not None:
                 placed.append(label)
                 room.take(label.box(size))
@@ -181,8 +196,12 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2): no axis separates them."""
     sides = box[[1, 3]] - box[0]
     axes = (2.0 * sides / np.sum(sides**2, axis=1)[:, None]).T
-    ends = (lines - box.mean(axis=0)) @ axes  # in which the rectangle is +-1
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    off = ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 0, 1] * ends[:, 1, 0]
-    apart = (low >= 1.0).any(axis=1) | (high <= -1.0).any(axis=1) | (np.abs(off) > (high - low).sum(axis=1))
-    return not apart.all()
+    return bool(runs_through((lines - box.mean(axis=0)) @ axes).any())
+
+
+def runs_through(lines: Floats) -> NDArray[np.bool_]:
+    """(...) whether each of the lines (..., 2, 2) runs through the square from -1 to 1: no axis separates them."""
+    low, high = lines.min(axis=-2), lines.max(axis=-2)
+    off = lines[..., 0, 0] * lines[..., 1, 1] - lines[..., 0, 1] * lines[..., 1, 0]
+    apart = (low >= 1.0).any(axis=-1) | (high <= -1.0).any(axis=-1) | (np.abs(off) > (high - low).sum(axis=-1))
+    return np.asarray(~apart)

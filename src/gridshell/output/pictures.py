@@ -10,7 +10,7 @@ from gridshell.output.archive import SHELLS, Archive, made_once
 from gridshell.output.colours import mixed
 from gridshell.output.drawing import Drawing, Path, Pen, Pencil
 from gridshell.output.rods import RodRecord, outlines_of, rods_of
-from gridshell.output.scale import FINEST, Colour, Scale, colour_bar, scale_of
+from gridshell.output.scale import FINEST, Colour, Scale, colour_bar, largest_gap, length_unit, scale_of
 from gridshell.output.shapes import Shape, shape_of
 from gridshell.output.svg import picture_document
 from gridshell.output.view import View, ground_axes
@@ -24,9 +24,10 @@ WIDTH = 540.0  # drawing units of the shell itself
 SIDE, TOP, BELOW, BAR = 50.0, 22.0, 40.0, 28.0  # margins; the colour bar needs more below
 PAPER, INK, SOFT, GROUND = "#fdfdfb", "#22282f", "#7b838a", "#f1efe8"
 FAMILIES = ("#1f5f8b", "#a8552a")
-LAYERS = 20  # of depth: rods of a nearer layer pass over those of a farther one
+LAYERS = 20  # of depth: rods of a nearer layer pass over those of a farther one,
+LAG = 2  # and are set off against those so many layers farther: rods that meet at a joint do not cut each other
 SEGMENTS = 14000  # pieces of rods at most, so that files stay small
-LEVEL = 0.1  # of its width: an outline that rises more is not filled
+LEVEL = 0.01  # of its width: an outline that rises more is not filled, which would look like a surface
 FADE = 0.42  # share of paper in the colour of the farthest rods
 
 
@@ -49,7 +50,8 @@ class Pieces:
 def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
     """A picture of "flat", "draped", "popped_pinned", "popped_clamped" or "stage_1", ... as a complete SVG.
 
-    All shapes in space share one view and one colour scale, so that they can be compared.
+    All shapes in space share one view; each has a colour scale of its own, but for the stages of the way up, which are
+    compared.
 
     Raises
     ------
@@ -153,17 +155,25 @@ class _Rods:
         return _Rods(view.project(shape.positions)[nodes], halos, lines, palette, fade, pen)
 
     def draw(self, pencil: Pencil, layers: range) -> None:
-        """Some layers from far to near, each over a halo of paper that sets it off."""
+        """Some layers from far to near, each over halos of paper that set off what passes over it and farther ones."""
         for depth in layers:
-            near = (depth + 0.5) / LAYERS
-            width = self.pen * (0.75 + 0.4 * near)
-            halo = Pen(PAPER, 2.2 * width)
-            pencil.paths += [Path(self.plane[chain], "CUT", pen=halo) for _, chain in self.halos[depth]]
+            for nearer in range(0 if depth == 0 else depth + LAG, min(depth + LAG + 1, LAYERS)):
+                halo = Pen(PAPER, 2.2 * self._width(nearer))
+                pencil.paths += [Path(self.plane[chain], "CUT", pen=halo) for _, chain in self.halos[nearer]]
+            near, width = _nearness(depth), self._width(depth)
             pens = {
                 shade: Pen(mixed(self.palette[shade], PAPER, self.fade * (1 - near) ** 1.3), width)
                 for shade in {shade for shade, _ in self.lines[depth]}
             }
             pencil.paths += [Path(self.plane[chain], "CUT", pen=pens[shade]) for shade, chain in self.lines[depth]]
+
+    def _width(self, depth: int) -> float:
+        return self.pen * (0.75 + 0.4 * _nearness(depth))
+
+
+def _nearness(depth: int) -> float:
+    """Of the middle of a layer, 0 to 1."""
+    return (depth + 0.5) / LAYERS
 
 
 def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
@@ -211,18 +221,13 @@ def _dot(pencil: Pencil, at: Floats, radius: float, pen: Pen) -> None:
 def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None:
     """A ring around the largest gap, and its size: the agreement's own, which also looks between the nodes."""
     assert shape.gap is not None
-    points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
-    place, gap = points[int(np.argmax(np.abs(gaps)))], float(gaps[int(np.argmax(np.abs(gaps)))])
-    found = (archive.result.get("agreement") or {}).get(shape.name.removeprefix("popped_")) or {}
-    if found.get("where") is not None and found.get("max") is not None:
-        place = np.array(found["where"], dtype=float)
-        nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
-        gap = float(np.copysign(1e3 * found["max"], gaps[nearest]))
+    gap, at = largest_gap(archive, shape)
     if abs(gap) <= FINEST:
         return
-    x, y = view.project(place[None])[0]
+    x, y = view.project(at[None])[0]
     side = -1 if x > view.size[0] / 2 else 1
-    text = (f"{gap:+.3g} mm" if abs(gap) < 1e3 else f"{gap:+.0f} mm").replace("-", MINUS)
+    factor, unit = length_unit(abs(gap))
+    text = f"{gap / factor:+.3g} {unit}".replace("-", MINUS)
     _dot(pencil, np.array([x, y]), 6.0, Pen(INK, 1.1))
     anchor = "end" if side < 0 else "start"
     pencil.write(text, (x + 9 * side, y + 7), 13.0, "TITLE", anchor=anchor, bold=True, halo=PAPER)

@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.output.archive import GAPS, Archive
+from gridshell.output.archive import Archive
 from gridshell.output.colours import HEIGHT, SIGNED, STRESS, hex_colours
 from gridshell.output.drawing import Pen, Pencil
 from gridshell.output.plan import nice_step, nice_ticks
-from gridshell.output.shapes import Shape
+from gridshell.output.shapes import STAGE, Shape
 from gridshell.output.svg import number
 from gridshell.output.wording import MINUS, PRESSURES
 
@@ -50,37 +50,64 @@ class Scale:
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
-    """The scale of a shape, one for all shapes, to compare them; None where nothing is known to colour it by."""
+    """The scale of a shape, by its own largest value; None where nothing is known to colour it by."""
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
-        return None if shape.stress is None else _stress_scale(archive, shape.stress)
+        return None if shape.stress is None else _stress_scale(archive, shape)
     if shape.gap is not None:
-        known = [archive.states[name] for name in GAPS.values() if name in archive.states]
-        largest = max(float(np.nanmax(np.abs(gaps), initial=0.0)) for gaps in known)
-        largest = max(1e3 * largest, FINEST)
-        step = nice_step(largest, 4)
-        limit = float(step * np.ceil(largest / step - 1e-9))
-        return Scale(1e3 * shape.gap[nodes], -limit, limit, SIGNED, "gap to target in mm, + outside")
+        largest = abs(largest_gap(archive, shape)[0])
+        factor, unit = length_unit(largest)
+        limit = _rounded_up(max(largest, FINEST) / factor)
+        caption = f"gap to target in {unit}, + outside"
+        return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
     if shape.flat or archive.result.get("target"):
         return None
     heights = 1e3 * shape.positions[nodes, 2]
-    low, high = float(heights.min()), float(heights.max())
-    return Scale(heights, low, max(high, low + FINEST), HEIGHT, "height in mm")
+    factor, unit = length_unit(float(np.abs(heights).max()))
+    low, high = float(heights.min()) / factor, float(heights.max()) / factor
+    return Scale(heights / factor, low, max(high, low + FINEST), HEIGHT, f"height in {unit}")
 
 
-def _stress_scale(archive: Archive, stress: Floats) -> Scale:
-    """Utilisation where the strength is known, else the stress in a unit of its size."""
+def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
+    """The largest gap [mm] with its sign, and where (3,) [m]: the agreement's own, which also looks between the nodes.
+
+    shape : one whose gaps are known.
+    """
+    assert shape.gap is not None
+    points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
+    worst = int(np.argmax(np.abs(gaps)))
+    found = (archive.result.get("agreement") or {}).get(shape.name.removeprefix("popped_")) or {}
+    if found.get("where") is None or found.get("max") is None:
+        return float(gaps[worst]), points[worst]
+    place = np.array(found["where"], dtype=float)
+    nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
+    return float(np.copysign(1e3 * found["max"], gaps[nearest])), place
+
+
+def length_unit(largest: float) -> tuple[float, str]:
+    """The unit that fits a length [mm]: how many mm it is, and its name."""
+    return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
+
+
+def _stress_scale(archive: Archive, shape: Shape) -> Scale:
+    """Utilisation where the strength is known, else the stress in a unit of its size; one for all stages."""
+    assert shape.stress is not None
     strength = (archive.result.get("bending") or {}).get("strength")
-    known = [values for name, values in archive.states.items() if "stress" in name]
-    top = max(float(np.max(values)) for values in known)
+    top = float(np.max(archive.states["history_stress"] if shape.name.startswith(STAGE) else shape.stress))
     if strength:
         unit, caption = strength / 100, "utilisation in %"
     else:
         unit, name = next((one for one in PRESSURES if top >= one[0]), PRESSURES[-1])
         caption = f"stress in {name}"
-    high = max(top / unit, FINEST)
-    step = nice_step(high, 4)
-    return Scale(stress / unit, 0.0, float(step * np.ceil(high / step - 1e-9)), STRESS, caption)
+    largest = float(np.max(shape.stress)) / unit
+    limit = _rounded_up(max(top / unit, FINEST))
+    return Scale(shape.stress / unit, 0.0, limit, STRESS, f"{caption}, here up to {largest:.3g}")
+
+
+def _rounded_up(largest: float) -> float:
+    """To a whole number of ticks."""
+    step = nice_step(largest, 4)
+    return float(step * np.ceil(largest / step - 1e-9))
 
 
 def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:

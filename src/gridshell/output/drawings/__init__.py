@@ -2,10 +2,12 @@
 
 from gridshell.output.archive import Archive
 from gridshell.output.drawing import Drawing
-from gridshell.output.drawings.final import bracing_drawing, elevations_drawing, erection_drawing, supports_drawing
+from gridshell.output.drawings.bracing import bracing_drawing
+from gridshell.output.drawings.final import elevations_drawing, erection_drawing
 from gridshell.output.drawings.flat import flat_drawing
 from gridshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, room, table, tiled
 from gridshell.output.drawings.strips import per_sheet, strips_drawing
+from gridshell.output.drawings.supports import supports_drawing
 from gridshell.output.drawings.titleblock import title_block, with_title
 from gridshell.output.plan import FlatPlan
 from gridshell.output.schedules import bracing_table, joints_table, rods_table, seams_table, stock_table, supports_table

@@ -1,14 +1,12 @@
-"""Drawings of the shell as it stands: supports, bracing, elevations, and the stages of its erection."""
+"""Drawings of the shell as it stands, from the side and at the stages of its erection, and what its plans share."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.output.archive import Archive
 from gridshell.output.drawing import INK, PALE, SOFT, Drawing, Pen, Pencil
-from gridshell.output.labels import Room, leaders, place, upright
-from gridshell.output.plan import FlatPlan, nice_ticks
-from gridshell.output.rods import joint_places, rods_of
-from gridshell.output.schedules import seam_meetings
+from gridshell.output.plan import nice_ticks
+from gridshell.output.rods import rods_of
 
 Floats = NDArray[np.float64]
 
@@ -18,86 +16,23 @@ def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
     return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
 
 
-def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
-    """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
-    pencil, final = Pencil(), archive.final
-    assert final is not None
-    _seen_from_above(pencil, archive, text)
-    curves = rod_curves(archive, archive.states[final])
-    ends, inner = (
-        np.array([curve[k, :2] for curve in curves for k in two]).reshape(-1, 2) for two in ((0, -1), (1, -2))
-    )
-    for outline in plan.boundary:
-        pencil.line(outline[:, :2], "BOUNDARY-FINAL", closed=True)
-    names = [f"{rod.id}.{end}" for rod in plan.rods if len(rod.nodes) > 1 for end in (0, 1)]
-    for name, end, behind in zip(names, ends, inner, strict=True):
-        away = (end - behind) / max(float(np.linalg.norm(end - behind)), 1e-9)
-        pencil.mark(end, 0.3 * text, "MARK", note=name)
-        pencil.line([end, end + 1.2 * text * away], "DIM")
-    sewn = {end for seam in archive.result.get("seams") or [] for one in seam["meetings"] for end in one["ends"]}
-    apart = np.array([name not in sewn for name in names])
-    _labels_outside(pencil, [name for name in names if name not in sewn], ends[apart], text)
-    _meetings(pencil, archive, text)
-    _axes(pencil, text)
-    return pencil.done("supports", "Support plan", text)
-
-
-def _meetings(pencil: Pencil, archive: Archive, text: float) -> None:
-    """The numbers of the places on seams where rods meet, as in the table of the seams, where there is room."""
-    room, size = Room(3 * text), 0.7 * text
-    for number, meeting in seam_meetings(archive.result):
-        at = 1e3 * np.array(meeting["point"][:2])
-        for corner in ((0.5, 0.4), (0.5, -1.1), (-0.5, 0.4), (-0.5, -1.1)):
-            anchor = "start" if corner[0] > 0 else "end"
-            pencil.write(number, at + text * np.array(corner), size, "LABEL", anchor=anchor)
-            if room.claim(pencil.texts[-1].box()):
-                break
-            pencil.texts.pop()
-
-
-def bracing_drawing(archive: Archive, text: float) -> Drawing:
-    """The diagonals of the cells in the final shape, seen from above, with their true lengths."""
-    pencil, final = Pencil(), archive.final
-    assert final is not None
-    _seen_from_above(pencil, archive, text)
-    places = joint_places(archive, archive.states[final])
-    room = Room(3 * text)
-    size = 0.75 * text
-    for brace in (archive.result.get("fabrication") or {}).get("bracing", []):
-        if brace["from"] not in places or brace["to"] not in places:
-            continue
-        a, b = 1e3 * places[brace["from"]][:2], 1e3 * places[brace["to"]][:2]
-        pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.07 * text), note=f"{brace['from']} to {brace['to']}")
-        words, along = f"{1e3 * brace['final']:.1f}", b - a
-        angle = upright(float(np.arctan2(along[1], along[0])))
-        above = 0.3 * size * np.array([-np.sin(angle), np.cos(angle)])
-        for share in (0.27, 0.73, 0.5):
-            pencil.write(
-                words, a + share * along + above, size, "LABEL", anchor="middle", angle=angle, colour="#6b5212"
-            )
-            if room.claim(pencil.texts[-1].box()):
-                break
-            pencil.texts.pop()
-    _axes(pencil, text)
-    return pencil.done("bracing", "Bracing, true lengths in the final shape", text)
-
-
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
     """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
     pencil, final = Pencil(), archive.final
     assert final is not None
     curves = rod_curves(archive, archive.states[final])
     heights = np.concatenate(curves)[:, 2]
-    tall = float(np.ptp(heights)) + 10 * text
+    tall, digits = float(np.ptp(heights)) + 10 * text, decimals(float(np.ptp(np.concatenate(curves), axis=0).max()))
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
         flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
         for curve in flat:
             pencil.line(thinned(curve), "CUT", pen=Pen(INK, 0.08 * text))
         cloud = np.concatenate(flat)
         low, high = cloud.min(axis=0), cloud.max(axis=0)
-        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text)
-        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text)
+        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, digits)
+        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, digits)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
+        words = f"{words}, dimensions to {10.0**-digits:g} mm"
         pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
     return pencil.done("elevations", "Elevations", text)
 
@@ -132,29 +67,26 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     return pencil.done("erection", "Erection stages, front elevations", text)
 
 
+def decimals(largest: float) -> int:
+    """Of dimensions [mm], the largest of which is shown to about a ten-thousandth of it, whole mm at the coarsest."""
+    return max(round(4 - float(np.log10(max(largest, 1e-9)))), 0)
+
+
 def thinned(curve: Floats) -> Floats:
     """A curve by about every third of its nodes, its ends kept."""
     return curve[np.unique(np.append(np.arange(0, len(curve), 3), len(curve) - 1))]
 
 
-def _seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
+def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
+    """The rods of the final shape, pale."""
     assert archive.final is not None
     for curve in rod_curves(archive, archive.states[archive.final]):
         pencil.line(thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
 
 
-def _labels_outside(pencil: Pencil, names: list[str], ends: Floats, text: float) -> None:
-    """Names beyond the ends (m, 2), away from the middle of all, each with a line to its end where it stands off."""
-    middle = ends.mean(axis=0)
-    away = (ends - middle) / np.maximum(np.linalg.norm(ends - middle, axis=1), 1e-9)[:, None]
-    starts = ends + 1.5 * text * away
-    labels = place(names, np.stack([starts, np.broadcast_to(middle, ends.shape)], axis=1), text, both=False)
-    pencil.texts += [label.written(text) for label in labels]
-    for line in leaders(labels, text):
-        pencil.line(line, "DIM")
-
-
-def _span(pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float) -> None:
+def _span(
+    pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, digits: int
+) -> None:
     """A dimension line with its length [mm] beside it."""
     start, end = np.array(a), np.array(b)
     along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
@@ -164,10 +96,10 @@ def _span(pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length
         pencil.line([place_ - across, place_ + across], "DIM")
     angle = float(np.arctan2(along[1], along[0]))
     side = 0.5 * text * np.array([-along[1], along[0]]) if angle else np.array([0.0, -1.4 * text])
-    pencil.write(f"{length:.1f}", 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
+    pencil.write(f"{length:.{digits}f}", 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
 
 
-def _axes(pencil: Pencil, text: float) -> None:
+def axes(pencil: Pencil, text: float) -> None:
     """Ticks of x and y [mm] along two sides of all that is there."""
     low, high = pencil.done("", "", text).box()
     low, high = low - text, high + text

@@ -1,10 +1,18 @@
 """Flat plan: both families as cut, their joints, labels, the footprint, and what it is set out by."""
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from gridshell.layout.outline import opens
+from gridshell.output.callouts import callouts, outward
 from gridshell.output.drawing import INK, LETTER, Drawing, Pen, Pencil
 from gridshell.output.labels import Room, leaders, place
 from gridshell.output.plan import FlatPlan, nice_ticks
+from gridshell.output.rods import outlines_of
+
+Floats = NDArray[np.float64]
 
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
 TITLE = "Flat plan"
@@ -64,49 +72,84 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float) -> None:
 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float) -> None:
-    labels = place([rod.id for rod in plan.rods], plan.cuts, text)
+    """Each rod's at its ends, on its own line; in an opening, around it."""
+    names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
+    inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
+    outside = np.ones(2 * len(names), dtype=bool)
+    outside[[end for loop in inside for end in loop]] = False
+    labels, room = place(names, plan.cuts, text, at=outside.reshape(-1, 2)), Room(4 * text)
     pencil.texts += [label.written(text) for label in labels]
     for line in leaders(labels, text):
         pencil.line(line, "DIM")
+    for label in labels:
+        room.take(label.box(text))
+    for loop in inside:
+        places = plan.cuts.reshape(-1, 2)[loop]
+        away = outward(places)
+        for callout in callouts([names[end // 2] for end in loop], places, away, text, room, plan.cuts):
+            pencil.texts.append(callout.written)
+            pencil.line(callout.line, "DIM")
 
 
-def diagonals(plan: FlatPlan) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The two diagonals of the largest rectangle of joints, by which the grid is set out square."""
-    sides = [[k for k, rod in enumerate(plan.rods) if rod.family == family] for family in "uv"]
-    if min(map(len, sides)) < 2:
+def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
+    """The two diagonals of each grid's largest rectangle with a joint at every crossing: by them it is set out square.
+
+    No diagonal runs over an opening; grids that do not touch each other, the patches of a sewn shell, have two each.
+    """
+    found = []
+    for patch in _patches(plan):
+        x, y = (np.unique(np.round([float(plan.rods[pair[k]].offset or 0.0) for pair in patch], 9)) for k in (1, 0))
+        met = np.zeros((len(y), len(x)), dtype=bool)
+        for u, v in patch:
+            row, column = (
+                int(np.abs(offsets - float(plan.rods[k].offset or 0.0)).argmin()) for offsets, k in ((y, u), (x, v))
+            )
+            met[row, column] = True
+        best = _largest_full(met, x, y)
+        if best is not None:
+            left, right, low, high = (1e3 * value for value in best)
+            found.append((np.array([left, low]), np.array([right, high])))
+            found.append((np.array([left, high]), np.array([right, low])))
+    return found
+
+
+def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
+    """The rods u and v of each joint of two families, grid by grid."""
+    pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
+    if not pairs:
         return []
-    column = {rod: k for k, rod in enumerate(sides[1])}
-    row = {rod: k for k, rod in enumerate(sides[0])}
-    met = np.zeros((len(row), len(column)), dtype=bool)
-    for joint in plan.joints:
-        u, v = joint.rods
-        if u in row and v in column:
-            met[row[u], column[v]] = True
-    best: tuple[float, list[int]] = (0.0, [])
-    offsets = [np.array([plan.rods[k].offset for k in side], dtype=float) for side in sides]
-    for low in range(len(row)):
-        for high in range(len(row) - 1, low, -1):
-            both = np.flatnonzero(met[low] & met[high])
-            if len(both) > 1:
-                area = (offsets[0][high] - offsets[0][low]) * (offsets[1][both[-1]] - offsets[1][both[0]])
-                best = max(best, (float(area), [low, high, int(both[0]), int(both[-1])]))
-    if not best[1]:
-        return []
-    low, high, left, right = best[1]
-    x, y = 1e3 * offsets[1][[left, right]], 1e3 * offsets[0][[low, high]]
-    return [(np.array([x[0], y[0]]), np.array([x[1], y[1]])), (np.array([x[0], y[1]]), np.array([x[1], y[0]]))]
+    first, second = np.array(pairs).T
+    graph = coo_array((np.ones(len(pairs)), (first, second)), shape=(len(plan.rods),) * 2)
+    patch = connected_components(graph, directed=False)[1][first]
+    return [[pair for pair, own in zip(pairs, patch, strict=True) if own == one] for one in dict.fromkeys(patch)]
 
 
-def _dimension(pencil: Pencil, plan: FlatPlan, a: np.ndarray, b: np.ndarray, text: float) -> None:
-    """A thin line with its length, written a third of the way along, off the joints."""
+def _largest_full(met: NDArray[np.bool_], x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
+    """Lowest and highest x, then y, of the largest rectangle of a lattice within which all of it is there."""
+    best: tuple[float, tuple[float, float, float, float] | None] = (0.0, None)
+    for low in range(len(y)):
+        full = met[low].copy()
+        for high in range(low + 1, len(y)):
+            full &= met[high]
+            steps = np.diff(np.concatenate([[False], full, [False]]).astype(int))
+            begin, end = np.flatnonzero(steps > 0), np.flatnonzero(steps < 0) - 1
+            for left, right in zip(x[begin], x[end], strict=True):
+                area = float((right - left) * (y[high] - y[low]))
+                if area > best[0]:
+                    best = (area, (float(left), float(right), float(y[low]), float(y[high])))
+    return best[1]
+
+
+def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float) -> None:
+    """A thin line with its length, written off the labels, a third of the way along if it can be."""
     along = b - a
     pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.05 * text, (1.5 * text, 0.5 * text, 0.3 * text, 0.5 * text)))
-    size, words = 0.7 * text, f"{np.linalg.norm(along):.1f}"
+    words, angle = f"{np.linalg.norm(along):.1f}", float(np.arctan2(along[1], along[0]))
     room = Room(plan.spacing)
     for other in pencil.texts:
         room.take(other.box())
-    for share in (0.33, 0.36, 0.3, 0.39, 0.27, 0.42, 0.24, 0.45, 0.2):
-        angle = float(np.arctan2(along[1], along[0]))
+    shares = sorted(np.linspace(0.1, 0.9, 81).tolist(), key=lambda share: abs(share - 0.33))
+    for size, share in ((size, share) for size in (0.7 * text, 0.5 * text) for share in shares):
         pencil.write(words, a + share * along, size, "DIM", anchor="middle", angle=angle, colour="#8a6a1c")
         if room.free(pencil.texts[-1].box()):
             return
