@@ -101,8 +101,7 @@ def _worst(bent: Bending) -> float:
 
 
 def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:
-    """A popped-up shell one Newton step further: the pop-up stops at its step tolerance, and forces are far more
-    sensitive than shapes."""
+    """A popped-up shell and its equilibrium, with what the pop-up does not keep of it: the gradient and the pattern."""
     shell = popped.shell
     length = 0.5 * float(np.ptp(popped.positions, axis=0).max())
     problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), length, places=shell.places)

@@ -26,12 +26,12 @@ from gridshell.formfinding.trim import (
 )
 from gridshell.joints import Ball, Joint
 from gridshell.layout import FlatGrid, GridLayout, mesh_grid
+from gridshell.layout.gridlayout import EDGES_A_SPAN
 from gridshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
 
-EDGES_A_SPAN = 6
 SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
 STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
 ROOM = 0.5  # of the clear distance of parallel rods: wider ones leave no room for joints

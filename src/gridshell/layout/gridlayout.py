@@ -13,7 +13,7 @@ from gridshell.layout.flatgrid import Family, FlatGrid, FlatRod
 
 Auto = Literal["auto"]
 
-EDGES = 6  # of the mesh to a spacing, where the edge is "auto"
+EDGES_A_SPAN = 6  # of the mesh to a spacing, where the edge is "auto"
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class GridLayout:
 
 def auto_edge(spacing: tuple[float, float]) -> float:
     """The edge of the mesh [m] that goes with spacings [m]."""
-    return min(spacing) / EDGES
+    return min(spacing) / EDGES_A_SPAN
 
 
 def rod_name(family: Family, index: int, count: int) -> str:
