@@ -15,7 +15,8 @@ from benchmarks.rows import Row, Section
 RODS = {True: (17, 31, 57), False: (17, 31, 57, 101, 171)}  # by whether it must be quick; 6 edges a spacing
 EDGES = {True: (3, 6, 12), False: (3, 6, 12, 24, 48)}  # 17 rods
 JOB = """
-import json, resource, sys, time
+import json, re, sys, time
+from pathlib import Path
 import gridshell as gs
 rods, edges = int(sys.argv[1]), int(sys.argv[2])
 target = gs.Hemisphere(radius=0.2)
@@ -33,7 +34,7 @@ print(json.dumps({
     "dofs": popped.report.dofs, "seconds": seconds, "drape": found.draped.report.seconds,
     "pinned": found.popped["pinned"].report.seconds, "clamped": popped.report.seconds,
     "rods": len(found.footprint.rods),
-    "memory": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
+    "memory": 1024 * int(re.search("VmHWM:\\s*([0-9]+)", Path("/proc/self/status").read_text())[1]),
 }))
 """
 
