@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
 WARN_ANGLE = 25.0  # degrees
+PENALTY, LEAST_PENALTY = 2e4, 1e5 / 0.15**3  # forces settle by 0.06 a step at 200 rods
 
 
 def bound_drape(
@@ -55,7 +56,7 @@ def bound_drape(
     shell = Shell.of(mesh, rod_within)
     problem = Problem(
         elements=shell.elements,
-        stretch=_penalty(shell.stretch, rod_within, target, len(grid.rods)),
+        stretch=_penalty(shell.stretch, rod_within, target),
         constraint=_bind(target, mesh, start),
         length=target.size,
         inextensible=True,
@@ -115,9 +116,9 @@ def _within_surface(rod: Rod) -> Rod:
     return Rod(GivenSection(rod.stretch_stiffness, within, within, rod.twist_stiffness))
 
 
-def _penalty(stretch: Stretch, rod: Rod, target: Target, rods: int) -> Stretch:
-    """Edges whose stiffness only has to outweigh bending: 1e5 (1e6 above 50 rods) at EI = (0.15 Lc)^3."""
-    weight = (1e5 if rods <= 100 else 1e6) / 0.15**3
+def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
+    """Edges whose stiffness only has to outweigh bending, which goes with the square of the size over the edge."""
+    weight = max(LEAST_PENALTY, PENALTY * (target.size / float(np.median(stretch.rest_lengths))) ** 2)
     stiffness = weight * rod.bend_stiffness / target.size**2
     return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
 
