@@ -359,3 +359,13 @@ def test_end_directions_point_outwards_and_down_along_the_rods():
     for k, rod in enumerate(trimmed.mesh.grid.rods):
         if rod.offset == 0.0:
             np.testing.assert_allclose(boundary.tangents[2 * k : 2 * k + 2], [[0, 0, -1]] * 2, rtol=0, atol=2e-3)
+
+
+def test_many_short_edges_take_no_more_factorisations_than_few_long_ones():
+    """Bending outweighs a penalty that does not follow the edge length: forces then settle slowly."""
+    few, many = (
+        gs.drape(gs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 6), ROD, gs.Hemisphere(0.2)).report
+        for spacing in (0.03, 0.008)
+    )
+    assert many.dofs > 10 * few.dofs
+    assert many.factorizations <= few.factorizations
