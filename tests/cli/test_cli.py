@@ -480,7 +480,12 @@ sys.exit(main(["form", "hemisphere"]))
 def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it() -> None:
     pty = pytest.importorskip("pty")
     ours, theirs = pty.openpty()
-    job = subprocess.Popen([sys.executable, "-c", WAITING], stderr=theirs, env={**os.environ, "TERM": "xterm"})
+    job = subprocess.Popen(
+        [sys.executable, "-c", WAITING],
+        stderr=theirs,
+        env={**os.environ, "TERM": "xterm"},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
+    )
     os.close(theirs)
     said, deadline = b"", time.monotonic() + 20
     while b"residual 1.0e-04" not in said and time.monotonic() < deadline:

@@ -60,16 +60,23 @@ def test_what_fails_in_the_child_is_done_and_told_here() -> None:
 
 @forked
 @pytest.mark.usefixtures("always")
-def test_an_error_in_the_block_ends_the_child_too(tmp_path: Path) -> None:
+def test_an_error_in_the_block_ends_the_child_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    fork, children = os.fork, []
+
+    def noted() -> int:
+        children.append(fork())
+        return children[-1]
+
     def work() -> None:
         threading.Event().wait(5.0)
         (tmp_path / "done").touch()
 
+    monkeypatch.setattr(os, "fork", noted)
     with pytest.raises(KeyboardInterrupt), beside(work):
         raise KeyboardInterrupt
     assert not (tmp_path / "done").exists()
     with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)  # nobody is left
+        os.waitpid(children[0], os.WNOHANG)  # it is gone
 
 
 def test_there_is_no_child_where_threads_run(monkeypatch: pytest.MonkeyPatch) -> None:
