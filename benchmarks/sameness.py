@@ -23,8 +23,7 @@ print(json.dumps([[value.hex() for value in state.ravel().tolist()] for state in
 
 
 def sameness(quick: bool) -> Section:
-    """Drape and both pop-ups of the hemisphere, compared bit by bit. Kernels run in one thread; the BLAS under large
-    fronts is kept to one."""
+    """Drape and both pop-ups of the hemisphere, compared bit by bit; factorisations alone use threads."""
     spacing = 0.02 if quick else 0.01
     one, again, two = (_run(spacing, threads) for threads in (1, 1, 2))
     bitwise = "bitwise equal" if one == again else f"differ by {_apart(one, again):.1e} R"

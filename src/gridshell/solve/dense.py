@@ -1,87 +1,237 @@
-"""The one dense product that compiled code hands to BLAS: C = beta C - A^T B, rows stored one after the other."""
+"""The dense work on a front: elimination of its pivots, the update of what is left, and the two substitutions.
 
-from functools import lru_cache
+A front is stored row after row, its rows padded to a multiple of `PAD` numbers. Memory comes from `room`: kernels read
+up to a register past the end of what they need, and begin where a register would.
+"""
 
 import numba as nb
 import numpy as np
-from llvmlite import ir
-from numba.core import cgutils, types
-from numba.extending import get_cython_function_address, intrinsic
-from threadpoolctl import ThreadpoolController
+from numpy.typing import NDArray
+
+from gridshell.solve.tiles import BYTES, LANES, REGISTERS, ROWS, adding, eliminating, multiplying, subtracting
+
+Floats = NDArray[np.float64]
+
+PAD = 8  # numbers in the largest register
+BLOCK = 32  # pivots after which all rows below are updated
+DEPTH = 128  # pivots whose rows are multiplied at a time: so many stay in the nearest cache
+TALL = 48  # rows of a product from which on they are laid side by side first
+
+_WIDE = LANES * REGISTERS
+_FACTORS = ROWS * LANES  # where they lie in the workspace, behind the rows they are found from
+_PACKED = 2 * _FACTORS  # where rows are laid side by side
+
+_subtract_43, _subtract_42, _subtract_41 = (subtracting(ROWS, k) for k in (3, 2, 1))
+_subtract_13, _subtract_12, _subtract_11 = (subtracting(1, k) for k in (3, 2, 1))
+_eliminate_43, _eliminate_42, _eliminate_41 = (eliminating(ROWS, k) for k in (3, 2, 1))
+_eliminate_13, _eliminate_12, _eliminate_11 = (eliminating(1, k) for k in (3, 2, 1))
+_multiply_4, _multiply_1 = multiplying(ROWS), multiplying(1)
+_add = adding()
 
 
-@lru_cache
-def dgemm() -> int:
-    """Where SciPy's BLAS keeps its matrix product: compiled code takes it as a number, so that it can be cached."""
-    return int(get_cython_function_address("scipy.linalg.cython_blas", "dgemm"))
+def room(numbers: int) -> Floats:
+    """Memory for so many numbers, and a register's more."""
+    memory = np.empty(numbers + 2 * PAD)
+    begin = -(memory.ctypes.data // BYTES) % PAD
+    return memory[begin : begin + numbers + PAD]
 
 
-@lru_cache
-def blas() -> ThreadpoolController:
-    """SciPy's BLAS. Its threads are kept to one: on fronts of a few hundred rows they only wait."""
-    dgemm()  # loads that BLAS, so that it is found
-    return ThreadpoolController().select(user_api="blas")
-
-
-@intrinsic
-def _call(typing, address, integers, numbers, a, b, c):  # type: ignore[no-untyped-def]
-    """Call dgemm('N', 'T', *integers[:3], alpha, a, lda, b, ldb, beta, c, ldc); all by address, as Fortran wants."""
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        target, integer, number, *arrays = arguments
-        byte = ir.IntType(8).as_pointer()
-
-        def pointer(value, offset=0):  # type: ignore[no-untyped-def]
-            return builder.inttoptr(builder.add(value, ir.Constant(value.type, offset)), byte)
-
-        def letter(one):  # type: ignore[no-untyped-def]
-            return cgutils.alloca_once_value(builder, ir.Constant(ir.IntType(8), ord(one)))
-
-        a, b, c = (pointer(array) for array in arrays)
-        m, n, k, lda, ldb, ldc = (pointer(integer, 4 * i) for i in range(6))
-        alpha, beta = pointer(number), pointer(number, 8)
-        function = ir.FunctionType(ir.VoidType(), [byte] * 13).as_pointer()
-        builder.call(
-            builder.inttoptr(target, function),
-            [letter("N"), letter("T"), m, n, k, alpha, a, lda, b, ldb, beta, c, ldc],
-        )
-        return context.get_dummy_value()
-
-    return types.void(*[types.int64] * 6), generate
-
-
-def _interpreted(dgemm, integers, numbers, a, b, c):  # type: ignore[no-untyped-def]
-    """What `_call` does, where Numba compiles nothing (NUMBA_DISABLE_JIT=1) and there are no intrinsics."""
-    import ctypes
-
-    def values(address, kind, count):  # type: ignore[no-untyped-def]
-        return np.ctypeslib.as_array(ctypes.cast(ctypes.c_void_p(int(address)), ctypes.POINTER(kind)), (count,))
-
-    def matrix(address, rows, columns, stride):  # type: ignore[no-untyped-def]
-        flat = values(address, ctypes.c_double, (rows - 1) * stride + columns)
-        return np.lib.stride_tricks.as_strided(flat, (rows, columns), (8 * stride, 8))
-
-    m, n, k, lda, ldb, ldc = values(integers, ctypes.c_int32, 6).tolist()
-    alpha, beta = values(numbers, ctypes.c_double, 2).tolist()
-    if min(m, n, k) > 0:
-        target = matrix(c, n, m, ldc)
-        kept = beta * target if beta else 0.0
-        target[:] = kept + alpha * matrix(b, k, n, ldb).T @ matrix(a, k, m, lda)
-
-
-if nb.config.DISABLE_JIT:
-    _call = _interpreted
+def workspace(largest: int) -> Floats:
+    """What `eliminate` and `subtract_product` need for fronts of up to `largest` rows."""
+    return room(_PACKED + DEPTH * (largest + ROWS))
 
 
 @nb.njit(cache=True, inline="always")
-def subtract_product(  # type: ignore[no-untyped-def]
-    dgemm, integers, numbers, rows, columns, depth, a, lda, b, ldb, beta, c, ldc
-):
-    """C (rows, columns) = beta C - A^T B for A (depth, rows) and B (depth, columns), given by their addresses.
+def padded(length):  # type: ignore[no-untyped-def]
+    """The length of a row with its padding."""
+    return (length + PAD - 1) // PAD * PAD
 
-    `lda`, `ldb`, `ldc` are the strides of their rows; integers (6,) int32 and numbers (2,) are scratch.
+
+@nb.njit(cache=True, inline="always")
+def _place(matrix, row, column):  # type: ignore[no-untyped-def]
+    """The address of an element."""
+    return matrix.ctypes.data + row * matrix.strides[0] + column * BYTES
+
+
+@nb.njit(cache=True, error_model="numpy")
+def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
+    """Eliminate the pivots of a front: D L^T in `rows` (own, stride), which holds the front's upper triangle before;
+    L^T in `panel` (own, stride), D in `pivots` (own,). False where a pivot vanishes or is not finite."""
+    own = len(rows)
+    for begin in range(0, own, BLOCK):
+        end = min(begin + BLOCK, own)
+        k = begin
+        while k < end:
+            count = ROWS if k + ROWS <= end else 1
+            if not _find_factors(rows, panel, begin, k, count, pivots, work):
+                return False
+            _eliminate_rows(rows, panel, begin, k, count, work)
+            k += count
+        if end < own:
+            subtract_product(panel, rows, begin, end, end, 1, rows[end:, end:], work)
+    return True
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _find_factors(rows, panel, begin, k, count, pivots, work):  # type: ignore[no-untyped-def]
+    """The `count` pivots from k on, and in the workspace the factors that the kernel asks for."""
+    left, stride = k // LANES * LANES, rows.shape[1]
+    for r in range(count):
+        for c in range(LANES):
+            work[r * LANES + c] = rows[k + r, left + c]
+    _subtract(
+        count, 1, work.ctypes.data, LANES, _place(panel, begin, k), stride, _place(rows, begin, left), stride,
+        k - begin, 1,
+    )  # fmt: skip
+    at, here = _FACTORS, k - left
+    for r in range(count):
+        for above in range(r):
+            factor = work[above * LANES + here + r] / pivots[k + above]
+            for c in range(here + r, here + count):
+                work[r * LANES + c] -= factor * work[above * LANES + c]
+            work[at] = -factor
+            at += 1
+        pivot = work[r * LANES + here + r]
+        if not np.isfinite(pivot) or pivot == 0.0:
+            return False
+        pivots[k + r], work[at] = pivot, 1.0 / pivot
+        at += 1
+    return True
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-untyped-def]
+    """The rows of `count` pivots from k on, whose factors are known, after those of the pivots from `begin` on."""
+    stride, depth = rows.shape[1], k - begin
+    a, factors = _place(panel, begin, k), work.ctypes.data + _FACTORS * BYTES
+    for j in range(k // LANES * LANES, stride, _WIDE):
+        registers = min(REGISTERS, (stride - j) // LANES)
+        b, c, d = _place(rows, begin, j), _place(rows, k, j), _place(panel, k, j)
+        if count == ROWS:
+            if registers == 3:
+                _eliminate_43(c, d, a, b, stride, depth, factors)
+            elif registers == 2:
+                _eliminate_42(c, d, a, b, stride, depth, factors)
+            else:
+                _eliminate_41(c, d, a, b, stride, depth, factors)
+        elif registers == 3:
+            _eliminate_13(c, d, a, b, stride, depth, factors)
+        elif registers == 2:
+            _eliminate_12(c, d, a, b, stride, depth, factors)
+        else:
+            _eliminate_11(c, d, a, b, stride, depth, factors)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def subtract_product(panel, rows, begin, end, first, keep, target, work):  # type: ignore[no-untyped-def]
+    """target = keep target - panel[begin:end, first:]^T rows[begin:end, first:], but for what is below the diagonal.
+
+    Parameters
+    ----------
+    panel, rows : (own, stride).
+    keep : 0 or 1.
+    target : (n, m), for as many columns from `first` on.
+    work : `workspace`.
     """
-    integers[0], integers[1], integers[2] = columns, rows, depth
-    integers[3], integers[4], integers[5] = ldb, lda, ldc
-    numbers[0], numbers[1] = -1.0, beta
-    _call(dgemm, integers.ctypes.data, numbers.ctypes.data, b, a, c)
+    n, m = target.shape
+    for start in range(begin, end, DEPTH):
+        depth, a, step, apart = min(DEPTH, end - start), _place(panel, start, first), panel.shape[1], 1
+        if n >= TALL:
+            _pack(panel, start, depth, first, n, work)
+            a, step, apart = work.ctypes.data + _PACKED * BYTES, ROWS, depth
+        for j in range(0, m, _WIDE):
+            registers, b = min(REGISTERS, (m - j + LANES - 1) // LANES), _place(rows, start, first + j)
+            for i in range(0, min(n, j + _WIDE), ROWS):
+                _subtract(
+                    min(ROWS, n - i), registers, _place(target, i, j), target.strides[0] // BYTES,
+                    a + i * apart * BYTES, step, b, rows.shape[1], depth, keep,
+                )  # fmt: skip
+        keep = 1
+
+
+@nb.njit(cache=True)
+def _pack(panel, start, depth, first, n, work):  # type: ignore[no-untyped-def]
+    """`n` columns of the panel into the workspace, `ROWS` at a time side by side."""
+    at = _PACKED
+    for i in range(first, first + n, ROWS):
+        wide = min(ROWS, first + n - i)
+        for k in range(start, start + depth):
+            for r in range(wide):
+                work[at + r] = panel[k, i + r]
+            at += ROWS
+
+
+@nb.njit(cache=True, inline="always")
+def _subtract(rows, registers, c, stride_c, a, stride_a, b, stride_b, depth, keep):  # type: ignore[no-untyped-def]
+    """A tile; one of fewer rows row by row."""
+    for _ in range(1 if rows == ROWS else rows):
+        if rows == ROWS:
+            if registers == 3:
+                _subtract_43(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+            elif registers == 2:
+                _subtract_42(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+            else:
+                _subtract_41(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        elif registers == 3:
+            _subtract_13(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        elif registers == 2:
+            _subtract_12(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        else:
+            _subtract_11(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        c, a = c + stride_c * BYTES, a + BYTES
+
+
+@nb.njit(cache=True)
+def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
+    """Add to the rows from `begin` to `end` of a front, whose columns from `begin` on are `target`, what a child's
+    update matrix has for them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to."""
+    count = len(runs)
+    for low in range(count):
+        past = runs[low + 1, 0] if low + 1 < count else len(update)
+        shift = runs[low, 1] - runs[low, 0] - begin
+        for i in range(max(runs[low, 0], -shift), min(past, end - begin - shift)):
+            _add(_place(target, i + shift, i + shift), _place(update, i, i), past - i)
+            for high in range(low + 1, count):
+                first, stop = runs[high, 0], runs[high + 1, 0] if high + 1 < count else len(update)
+                _add(_place(target, i + shift, runs[high, 1] - begin), _place(update, i, first), stop - first)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def forward(panel, values, aside):  # type: ignore[no-untyped-def]
+    """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
+    what that takes. `aside` (own,) is scratch."""
+    own, stride = panel.shape
+    for k in range(own):
+        value, row = values[k], panel[k]
+        for i in range(k + 1, own):
+            values[i] -= row[i] * value
+    aside[:own] = values[:own]
+    begin = own // LANES * LANES
+    for j in range(begin, stride, _WIDE):
+        _subtract(
+            1, min(REGISTERS, (stride - j) // LANES), values.ctypes.data + j * BYTES, stride, aside.ctypes.data, 1,
+            _place(panel, 0, j), stride, own, 1,
+        )  # fmt: skip
+    values[begin:own] = aside[begin:own]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
+    """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x, with 0 for
+    padding. `aside` (2 own,) is scratch."""
+    own, stride = panel.shape
+    begin = own // LANES * LANES
+    for k in range(own):
+        aside[k] = values[k] / pivots[k]
+    values[begin:own] = 0.0
+    x, count = values.ctypes.data + begin * BYTES, stride - begin
+    whole = own // ROWS * ROWS
+    for k in range(0, whole, ROWS):
+        _multiply_4(aside.ctypes.data + (own + k) * BYTES, _place(panel, k, begin), stride, x, count)
+    for k in range(whole, own):
+        _multiply_1(aside.ctypes.data + (own + k) * BYTES, _place(panel, k, begin), stride, x, count)
+    for k in range(own - 1, -1, -1):
+        value, row = aside[k] - aside[own + k], panel[k]
+        for i in range(k + 1, own):
+            value -= row[i] * values[i]
+        values[k] = value

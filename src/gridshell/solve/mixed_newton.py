@@ -318,15 +318,26 @@ class _Step:
         if self._chord:
             return self._solver.solve(right)
         self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
-        self.factorizations += 1
-        self.negative_modes = self._solver.factor(self._data)
-        if self.negative_modes and not descend:
+        regular = self._count_negative_modes()
+        if self.negative_modes and regular and not descend:
             step = self._solver.solve(right)
             if np.abs(step).max() < NEAR * self._problem.length:
                 return step
         if self.negative_modes:
             self._shift_until_definite()
         return self._solver.solve(right)
+
+    def _count_negative_modes(self) -> bool:
+        """Factorise the Hessian; whether that can be done. A mode without stiffness counts as a negative one."""
+        self.factorizations += 1
+        try:
+            self.negative_modes = self._solver.factor(self._data)
+        except SingularError:
+            if not np.isfinite(self._data).all():
+                raise
+            self.negative_modes = 1
+            return False
+        return True
 
     def _shift_until_definite(self) -> None:
         """Factorise with the diagonal shifted by about twice the most negative eigenvalue.

@@ -10,6 +10,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from gridshell.solve.dense import padded
+
 Ints = NDArray[np.int64]
 
 SHARE = 1 / 12  # of all work: no part that is eliminated by itself holds more
@@ -23,9 +25,10 @@ class Plan(NamedTuple):
     first: Ints  # (n_s + 1,) first column of each supernode
     row_start: Ints  # (n_s + 1,) where its rows begin in `rows`
     rows: Ints  # permuted row indices of each front, its own columns first
-    relative: Ints  # beside `rows`: place of each update row in the parent's front
     child_start: Ints  # (n_s + 1,)
     children: Ints
+    run_start: Ints  # beside `children`
+    runs: Ints  # (r, 2) rows of a child's update matrix that stay side by side in the front: the first, and its place
     entry_start: Ints  # (n_s + 1,)
     entry_source: Ints  # which value of the matrix
     entry_place: Ints  # where it goes in the rows of the front's pivots
@@ -281,10 +284,11 @@ def _maps(  # type: ignore[no-untyped-def]
     total = 0
     for k in rows:
         total += weight[k]
-    all_rows, relative = np.empty(total, dtype=np.int64), np.zeros(total, dtype=np.int64)
+    all_rows = np.empty(total, dtype=np.int64)
     all_start, panel_start = np.zeros(supers + 1, dtype=np.int64), np.zeros(supers + 1, dtype=np.int64)
     entry_place, local = np.empty(len(indices), dtype=np.int64), np.empty(n, dtype=np.int64)
     below = np.empty(supers, dtype=np.int64)
+    run_start, runs = np.zeros(len(children) + 1, dtype=np.int64), np.empty((len(rows), 2), dtype=np.int64)
     used, largest, widest = 0, 0, 0
     for s in range(supers):
         for e in range(row_start[s], row_start[s + 1]):
@@ -296,20 +300,24 @@ def _maps(  # type: ignore[no-untyped-def]
         all_start[s + 1] = used
         size, own = used - all_start[s], column[first[s + 1]] - column[first[s]]
         below[s] = size - own
-        panel_start[s + 1] = panel_start[s] + own * size
-        largest, widest = max(largest, size), max(widest, own * size)
+        stride = padded(size)
+        panel_start[s + 1] = panel_start[s] + own * stride
+        largest, widest = max(largest, size), max(widest, own * stride)
         for e in range(child_start[s], child_start[s + 1]):
-            c = children[e]
-            for k in range(all_start[c + 1] - below[c], all_start[c + 1]):
-                i = all_rows[k]
-                relative[k] = local[block[i]] + i - column[block[i]]
+            c, count, at, past = children[e], run_start[e], 0, -1
+            for k in rows[row_start[c] + first[c + 1] - first[c] : row_start[c + 1]]:
+                if local[k] != past:
+                    runs[count, 0], runs[count, 1] = at, local[k]
+                    count += 1
+                at, past = at + weight[k], local[k] + weight[k]
+            run_start[e + 1] = count
         for e in range(entry_start[s], entry_start[s + 1]):
             low, high = by_front[e, 1], by_front[e, 2]
-            entry_place[e] = (low - column[first[s]]) * size + local[block[high]] + high - column[block[high]]
+            entry_place[e] = (low - column[first[s]]) * stride + local[block[high]] + high - column[block[high]]
     part_start, parts = _parts(up, np.diff(column[first]), below)
     update_start, deepest = _stack(up, below, child_start, children, part_start, parts)
     return (
-        original, column[first], all_start, all_rows, relative, child_start, children, entry_start,
+        original, column[first], all_start, all_rows, child_start, children, run_start, runs, entry_start,
         by_front[:, 0].copy(), entry_place, panel_start, update_start, part_start, parts, deepest, largest, widest,
     )  # fmt: skip
 
@@ -383,9 +391,9 @@ def _stack(up, below, child_start, children, part_start, parts):  # type: ignore
         for s in here:
             for e in range(child_start[s], child_start[s + 1]):
                 if part[children[e]] == p:
-                    height[1 - odd[s]] -= below[children[e]] ** 2
+                    height[1 - odd[s]] -= below[children[e]] * padded(below[children[e]])
             start[s] = height[odd[s]]
-            height[odd[s]] += below[s] ** 2
+            height[odd[s]] += below[s] * padded(below[s])
             deepest[odd[s]] = max(deepest[odd[s]], height[odd[s]])
         for s in here:
             start[s] += room + odd[s] * deepest[0]
