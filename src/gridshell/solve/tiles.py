@@ -23,7 +23,16 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Kernel = Callable[..., None]
 
-LANES = 8 if binding.get_host_cpu_features().get("avx512f") else 4  # numbers in a register
+
+def _lanes() -> int:
+    """Numbers in a register of this processor; a wider one than it has is made of two."""
+    try:
+        return 8 if binding.get_host_cpu_features().get("avx512f") else 4
+    except RuntimeError:  # a processor that LLVM does not know
+        return 4
+
+
+LANES = _lanes()
 ROWS, REGISTERS = 4, 3  # of a whole tile: twelve sums under way; of sixteen registers four are left for what is read
 BYTES = 8
 
