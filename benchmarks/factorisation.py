@@ -20,9 +20,9 @@ from threadpoolctl import threadpool_limits
 import gridshell as gs
 from benchmarks.rows import Row, Section, clock, ms
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Problem
-from gridshell.solve.mixed_newton import _Step as Newton
 from gridshell.solve.multifrontal import Multifrontal
+from gridshell.solve.newton_step import NewtonStep
+from gridshell.solve.problem import Problem
 
 PATIENCE = 20.0
 RADIUS = 0.2
@@ -37,7 +37,7 @@ def system(unknowns: int) -> tuple[csc_matrix, np.ndarray]:
     trimmed = gs.trim(gs.drape(layout, rod, gs.Hemisphere(radius=RADIUS)))
     shell = gs.Shell.of(trimmed.mesh, rod, joint=gs.Pin())
     state, free = shell.state(trimmed.positions), shell.held_ends()
-    step = Newton(Problem(shell.elements, shell.stretch, Supports(free), RADIUS, places=shell.places), state)
+    step = NewtonStep(Problem(shell.elements, shell.stretch, Supports(free), RADIUS, places=shell.places), state)
     step.take(state, np.zeros(len(shell.stretch.blocks)), False)
     pattern = step._assembly
     matrix = csc_matrix((step._data, pattern.indices, pattern.indptr), shape=(free.size, free.size))

@@ -12,7 +12,7 @@ from scipy.sparse import csc_matrix
 import gridshell as gs
 from benchmarks.rows import Row, Section, clock, ms, timed
 from gridshell.nets import chebyshev_net
-from gridshell.solve.mixed_newton import _Step as Newton
+from gridshell.solve.newton_step import NewtonStep
 
 RADIUS = 0.2
 ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
@@ -88,7 +88,7 @@ def _units() -> tuple[float, float, int]:
     return unit, timed(lambda: theirs.update(matrix, upper=True), runs=15), step.dofs
 
 
-def bound_system(layout: gs.GridLayout) -> tuple[Newton, np.ndarray, np.ndarray]:
+def bound_system(layout: gs.GridLayout) -> tuple[NewtonStep, np.ndarray, np.ndarray]:
     """The bound drape's own system, and where its solve starts."""
     asked = list[tuple[object, ...]]()
     solve: Callable[..., object] = bound.find_equilibrium
@@ -103,7 +103,7 @@ def bound_system(layout: gs.GridLayout) -> tuple[Newton, np.ndarray, np.ndarray]
     finally:
         bound.find_equilibrium = solve
     problem, state, forces = asked[0][:3]
-    return Newton(problem, state), state, forces  # type: ignore[arg-type]
+    return NewtonStep(problem, state), state, forces  # type: ignore[arg-type]
 
 
 def slider(runs: int) -> Section:

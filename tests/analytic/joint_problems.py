@@ -17,7 +17,8 @@ import gridshell as gs
 from gridshell.model import Assembly
 from gridshell.solve.constraint import Supports
 from gridshell.solve.linear import Qdldl
-from gridshell.solve.mixed_newton import Problem, find_equilibrium
+from gridshell.solve.mixed_newton import find_equilibrium
+from gridshell.solve.problem import Problem
 from tests.analytic.rod_problems import threshold
 
 X, Y, Z = np.eye(3)

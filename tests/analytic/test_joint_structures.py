@@ -10,7 +10,8 @@ import pytest
 
 import gridshell as gs
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Problem, find_equilibrium
+from gridshell.solve.mixed_newton import find_equilibrium
+from gridshell.solve.problem import Problem
 from tests.analytic.joint_problems import (
     EI,
     JOINTS,

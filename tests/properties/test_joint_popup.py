@@ -12,7 +12,8 @@ from gridshell.checks.joint_loads import joint_loads
 from gridshell.checks.reactions import reactions
 from gridshell.joints.crossings import Places
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Problem, find_equilibrium
+from gridshell.solve.mixed_newton import find_equilibrium
+from gridshell.solve.problem import Problem
 
 ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
 SPACING = 0.05

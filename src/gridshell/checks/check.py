@@ -15,7 +15,8 @@ from gridshell.formfinding.progress import Progress, silent
 from gridshell.model import Shell
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Equilibrium, Problem, find_equilibrium
+from gridshell.solve.mixed_newton import Equilibrium, find_equilibrium
+from gridshell.solve.problem import Problem
 
 THIN = 0.05  # strain of the outermost fibre up to which rods are thin: radii of ten depths
 

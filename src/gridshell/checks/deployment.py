@@ -19,8 +19,9 @@ from gridshell.geometry.vectors import cross
 from gridshell.model import Shell
 from gridshell.rods.elements import Elements
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Equilibrium, Pattern, Problem, find_equilibrium
+from gridshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from gridshell.solve.path import EASY, SMALLEST_STEP, follow
+from gridshell.solve.problem import Pattern, Problem
 
 Floats = NDArray[np.float64]
 Told = Callable[[float], None]

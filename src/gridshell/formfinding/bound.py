@@ -22,14 +22,15 @@ from gridshell.nets import ChebyshevNet, chebyshev_net
 from gridshell.nets.apron import with_apron
 from gridshell.rods.section import GivenSection, Rod
 from gridshell.rods.stretch import Stretch
-from gridshell.solve.mixed_newton import Problem, find_equilibrium
+from gridshell.solve.mixed_newton import find_equilibrium
+from gridshell.solve.problem import Problem
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
 WARN_ANGLE = 25.0  # degrees
-PENALTY, LEAST_PENALTY = 2e4, 1e5 / 0.15**3  # forces settle by 0.06 a step at 200 rods
+PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces settle by 0.05 a step at 200 rods
 
 
 def bound_drape(

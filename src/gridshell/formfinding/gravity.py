@@ -21,7 +21,8 @@ from gridshell.layout import GridLayout, GridMesh, mesh_grid
 from gridshell.model import Freedom, Shell
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Equilibrium, Problem, find_equilibrium
+from gridshell.solve.mixed_newton import Equilibrium, find_equilibrium
+from gridshell.solve.problem import Problem
 from gridshell.solve.report import SolveReport, Status
 from gridshell.targets import Target
 

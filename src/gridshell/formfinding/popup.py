@@ -21,8 +21,9 @@ from gridshell.joints import Ball, Joint
 from gridshell.model import Shell
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import Equilibrium, Problem, find_stable
+from gridshell.solve.mixed_newton import Equilibrium, find_stable
 from gridshell.solve.path import follow
+from gridshell.solve.problem import Problem
 from gridshell.solve.report import SolveReport
 
 Floats = NDArray[np.float64]
@@ -32,6 +33,7 @@ Start = Literal["draped", "flat"]
 UP = np.array([0.0, 0.0, 1.0])
 FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
 CLAMP_STEP = 0.25
+MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
 MOST_AGAIN = 8  # iterations from the last form before starting afresh
 NEARBY = 0.1  # of the length: a state further from the guess may be another one
 
@@ -138,6 +140,8 @@ class _PopUp:
             self.problem(shell),
             state,
             forces,
+            cut=True,
+            most_iterations=MOST_AT_ONCE,
             progress=lambda k, step: self.progress("pop-up", f"{ends}, iteration {k}", step),
         )
         if at_once.report.stable:

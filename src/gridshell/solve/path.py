@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.solve.mixed_newton import Equilibrium, Problem, find_stable
+from gridshell.solve.mixed_newton import Equilibrium, find_stable
+from gridshell.solve.problem import Problem
 from gridshell.solve.report import SolveReport, Status
 
 Floats = NDArray[np.float64]

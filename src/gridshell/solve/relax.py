@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
-from gridshell.solve.mixed_newton import Equilibrium, Problem, find_stable, linear_solver
+from gridshell.solve.mixed_newton import Equilibrium, find_stable
+from gridshell.solve.problem import Problem, linear_solver
 from gridshell.solve.summed import SparseSum
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,8 @@ from gridshell.model.rod_line import End
 from gridshell.rods.bend_twist import BendTwist
 from gridshell.rods.elements import Elements
 from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import NUDGE, Equilibrium, Problem, find_equilibrium
+from gridshell.solve.mixed_newton import NUDGE, Equilibrium, find_equilibrium
+from gridshell.solve.problem import Problem
 from gridshell.solve.report import SolveReport, Status
 from gridshell.solve.rod_supports import RodSupports, SupportPath, index_of
 
