@@ -527,6 +527,15 @@ def test_lines_are_cut_wherever_they_cross_the_base():
     assert np.array(mirrored[2]) == pytest.approx(np.array([[-0.93, -0.11], [0.42, 0.81]]), abs=1e-4)
 
 
+def test_a_piece_counts_where_any_of_it_is_deep_enough():
+    """With a waist in its middle, 8 mm above the base, and 50 mm beside it."""
+    s = np.linspace(-1.0, 1.0, 41)
+    heights = (0.81 - s**2) * (0.01 + 0.3 * s**2) * np.array([[1.0], [0.1]])
+    ((deep, grazing),) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights, s), heights > 0)], depth=0.02)
+    assert np.array(deep) == pytest.approx(np.array([[-0.9, 0.9]]), abs=1e-4)
+    assert grazing == []
+
+
 @pytest.mark.parametrize("beyond", [1, 2, 3])
 def test_a_line_that_stops_just_past_the_base_is_cut_from_within(beyond):
     """Next to the net's limit nodes are missing: of those outside only the first `beyond` are left."""
@@ -769,7 +778,7 @@ def test_too_many_nodes_are_refused_before_any_is_marched_and_the_remedy_does(mo
     from gridshell.nets import chebyshev
 
     with monkeypatch.context() as patched:
-        patched.setattr(chebyshev, "_march_lines", None)
+        patched.setattr(chebyshev, "march_lines", None)
         with pytest.raises(InputError) as caught:
             chebyshev_net(ROOF, GridLayout.orthogonal(spacing=0.5, edge=0.005))
     said = str(caught.value)

@@ -41,16 +41,53 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     return lagrange(near, around, s)
 
 
-def cubic_windows(knots: Floats, s: Floats, beyond: float) -> tuple[NDArray[np.intp], Floats]:
-    """The four nearest of the ascending `knots` (m,) and their weights, both (n, 4), as `on_curve` takes them.
+@nb.njit(cache=True)
+def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
+    """Points (m, n, 3) at `s` (n,) of m lines through `points` (k, m, 3) at `knots` (k,), as `on_curve` takes them.
 
-    NaN weights where `s` (n,) lies further outside the knots than the share `beyond` of their extent.
+    Of each line the nodes around the one at `origin` count that are known without a gap: those between two that are
+    NaN. So many of their steps `beyond` them the cubics go on; further away the line has no points, but NaN.
     """
-    window = _nearest(knots, s)
-    weight = lagrange(knots[window], np.broadcast_to(np.eye(window.shape[1]), (*window.shape, window.shape[1])), s)
-    slack = beyond * (knots[-1] - knots[0])
-    weight[(s < knots[0] - slack) | (s > knots[-1] + slack)] = np.nan
-    return window, weight
+    count, lines, spare, most = len(knots), points.shape[1], len(s), min(4, len(knots))
+    result = np.empty((lines, len(s), 3))
+    right, windows, shares = np.searchsorted(knots, s), np.empty(len(s), dtype=np.intp), np.empty((spare + 1, 4))
+    for n in range(len(s)):
+        windows[n] = _window(knots, s[n], right[n], 0, count - 1, shares, n)
+    for m in range(lines):
+        first, last = origin, origin
+        while first > 0 and not np.isnan(points[first - 1, m, 0]):
+            first -= 1
+        while last < count - 1 and not np.isnan(points[last + 1, m, 0]):
+            last += 1
+        near = min(4, last - first + 1)
+        low = knots[first] - beyond * (knots[min(first + 1, last)] - knots[first])
+        high = knots[last] + beyond * (knots[last] - knots[max(first, last - 1)])
+        for n in range(len(s)):
+            own, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
+            if window < first or window + most - 1 > last:
+                own, window = spare, _window(knots, s[n], right[n], first, last, shares, spare)
+            if not low <= s[n] <= high:
+                x = y = z = np.nan
+            for k in range(near):
+                x += shares[own, k] * points[window + k, m, 0]
+                y += shares[own, k] * points[window + k, m, 1]
+                z += shares[own, k] * points[window + k, m, 2]
+            result[m, n, 0], result[m, n, 1], result[m, n, 2] = x, y, z
+    return result
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _window(knots, at, right, first, last, shares, own):  # type: ignore[no-untyped-def]
+    """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, and their `shares` (:, 4) in
+    the row `own`."""
+    near = min(4, last - first + 1)
+    window = min(max(right - near // 2, first), last + 1 - near)
+    for j in range(near):
+        shares[own, j] = 1.0
+        for k in range(near):
+            if j != k:
+                shares[own, j] *= (at - knots[window + k]) / (knots[window + j] - knots[window + k])
+    return window
 
 
 @nb.njit(cache=True)

@@ -43,14 +43,16 @@ def with_apron(net: ChebyshevNet, clearance: float) -> FlatGrid:
         last = int(np.searchsorted(stations, rod.end + clearance, side="left")) + RINGS - 1
         span = np.arange(max(first, 0), min(last, len(stations) - 1) + 1)
         met[family][line, span[live[span]]] = True
+    spanned: dict[tuple[str, int], set[int]] = {}
+    for family, line, stretch in spans:
+        spanned.setdefault((family, line), set()).add(stretch)
     points = met["u"] | met["v"].T
     rods = list[FlatRod]()
     for family, table in (("u", points), ("v", points.T)):
         own = lines[family]
         for line, offset in enumerate(own.offsets.tolist()):
             stations, stretches = own.stations[table[line]], own.stretches[line][table[line]]
-            spanned = {stretch for one, at, stretch in spans if (one, at) == (family, line)}
-            for stretch in sorted(spanned.union(stretches.tolist())):
+            for stretch in sorted(spanned.get((family, line), set()).union(stretches.tolist())):
                 rods += _prolonged(spans.get((family, line, stretch)), family, offset, stations[stretches == stretch])
     return FlatGrid.of(rods)
 

@@ -18,22 +18,18 @@ from gridshell.errors import InputError, NetLimitError
 from gridshell.geometry.curves import on_curve
 from gridshell.layout import FlatRod, GridLayout
 from gridshell.layout.flatgrid import Family
-from gridshell.layout.gridlayout import auto_edge, rod_name
-from gridshell.layout.mesh import edge_counts
-from gridshell.nets.compass import Net, axes, geodesics, march
-from gridshell.nets.cuts import Cut, Lines, cut_lines, extrapolated, inside_nodes
-from gridshell.nets.nearby import march_near
+from gridshell.layout.gridlayout import rod_name
+from gridshell.nets.cuts import Cut, Lines, cut_lines, extrapolated
+from gridshell.nets.lines import LatticeLines, find_lines, march_lines
+from gridshell.nets.reach import Covering
 from gridshell.targets import Target
-from gridshell.units import length_text
 
 Floats = NDArray[np.float64]
 
-MARGIN = 2.3  # spacings marched past the end of the target: a cut is interpolated between nodes on both sides
 SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
 SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further
 LOOSE = 0.05  # spacings: ends known no better than that are warned of
 GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count
-MOST_NODES = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ class ChebyshevNet:
     layout: GridLayout
     rods: tuple[FlatRod, ...]
     lines: tuple[Floats, Floats]
-    net: Net
+    net: Covering
     error_estimate: float
     min_angle: float
     min_angle_at: tuple[float, float, float]
@@ -99,22 +95,19 @@ def chebyshev_net(
             "use a smaller spacing"
         )
     for parts in SEARCHES:
-        lines, rough = _find_lines(target, layout, start, heading, near.net if near else None, parts)
-        _refuse_too_many(target, layout, lines)
-        coarse = _march_lines(target, layout, lines, start, heading, 1, rough)
-        fine = _march_lines(target, layout, lines, start, heading, 2, coarse, rough)
-        inside = inside_nodes(target, fine)
-        if not (inside[[0, -1]].any() or inside[:, [0, -1]].any()):
+        lines, rough = find_lines(target, layout, start, heading, near.net if near else None, parts)
+        coarse = march_lines(target, layout, lines, start, heading, 2, rough)
+        fine = march_lines(target, layout, lines, start, heading, 1, coarse, rough)
+        if not (fine.inside[[0, -1]].any() or fine.inside[:, [0, -1]].any()):
             break
     else:
         raise InputError(
             f"the target bends too sharply for a spacing of {max(layout.spacing):g} m: use a smaller spacing"
         )
-    _refuse_holes(fine, inside)
-    angle, where = _smallest_angle(target, fine, inside)
+    angle, where = _smallest_angle(fine)
     if degrees(angle) < SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
-    ends, error, loosest = _extrapolate(target, lines, (coarse, fine), inside, GRAZING * min(layout.spacing))
+    ends, error, loosest = _extrapolate(target, lines, (coarse, fine), GRAZING * min(layout.spacing))
     rods, dropped, warnings = _name_rods(layout, lines, ends)
     if error > LOOSE * min(layout.spacing):
         x, y, z = np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest)
@@ -144,112 +137,13 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
     return point[0], np.array([*plan * n[2], -plan @ n[:2]])
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """Offsets of all lines of one march: `u` are those of family v (they cross the u axis), `v` those of u."""
-
-    u: Floats
-    v: Floats
-
-
-def _find_lines(
-    target: Target, layout: GridLayout, start: Floats, heading: Floats, near: Net | None, parts: int
-) -> tuple[_Lines, Net]:
-    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them, in
-    so many parts of a spacing."""
-    step = np.array(layout.spacing[::-1]) / parts  # along u, the lines of family v: their spacing
-    spare = MARGIN * parts * np.repeat(step, 2)
-    if near is not None:  # towards -u, +u, -v, +v
-        reach = np.minimum([-near.u[0], near.u[-1], -near.v[0], near.v[-1]], 4 * target.size)
-    else:
-        reach = _length_of_axes(target, start, heading) + spare
-    for _ in range(12):
-        u, v = (
-            np.arange(-np.ceil(reach[2 * k] / step[k]), np.ceil(reach[2 * k + 1] / step[k]) + 1) * step[k]
-            for k in (0, 1)
-        )
-        if len(u) * len(v) > MOST_NODES / 10:
-            raise InputError(
-                f"the net needs more than {len(u) // parts} x {len(v) // parts} lines, "
-                f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
-                f"unit, or use {_coarser(target)}"
-            )
-        net = march_near(target, u, v, start, heading, near) if near else march(target, u, v, start, heading)
-        inside = inside_nodes(target, net)
-        if not inside.any():
-            raise InputError("no node of the net lies inside the target: move the anchor away from the rim")
-        touched_u, touched_v = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
-        needed = np.array([-u[touched_u[0]], u[touched_u[-1]], -v[touched_v[0]], v[touched_v[-1]]])
-        needed += spare
-        if np.all(needed <= reach + 1e-12):
-            break
-        reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
-        near = net
-    return _Lines(_lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])), net
-
-
-def _length_of_axes(target: Target, start: Floats, heading: Floats) -> Floats:
-    """How far the axes run inside the target, towards -u, +u, -v and +v [m]; at most twice its size, roughly."""
-    step = 0.1 * target.size
-    arms = geodesics(target, np.tile(start, (4, 1)), axes(target, start, heading), [np.full(20, step)] * 4)
-    inside = target.margin(np.concatenate(arms)).reshape(4, -1) > 0
-    last = np.where(inside.any(axis=1), inside.shape[1] - np.argmax(inside[:, ::-1], axis=1), 0)
-    return step * (1.0 + last[[1, 0, 3, 2]])
-
-
-def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
-    """Offsets of the lattice lines of a family between -below and above, with the axis."""
-    spacing = layout.spacing[0 if family == "u" else 1]
-    offsets = layout.lattice(family, -below, above)
-    offsets[np.abs(offsets) < 1e-9 * spacing] = 0.0
-    return offsets if (offsets == 0.0).any() else np.sort(np.append(offsets, 0.0))
-
-
-def _march_lines(
-    target: Target, layout: GridLayout, lines: _Lines, start: Floats, heading: Floats, refine: int, *near: Net
-) -> Net:
-    u, v = (_subdivide(offsets, layout.edge, refine) for offsets in (lines.u, lines.v))
-    return march_near(target, u, v, start, heading, *near)
-
-
-def _refuse_too_many(target: Target, layout: GridLayout, lines: _Lines) -> None:
-    """Before the finer march takes memory for nodes that are too many."""
-    counts = [len(_subdivide(offsets, layout.edge, 2)) for offsets in (lines.u, lines.v)]
-    if counts[0] * counts[1] > MOST_NODES:
-        auto = auto_edge(layout.spacing)
-        fine = layout.edge < 0.99 * auto
-        remedy = f'set layout.edge = "auto" ({length_text(auto)} here)' if fine else f"use {_coarser(target)}"
-        raise InputError(
-            f"the net would have {counts[0]} x {counts[1]} nodes, with edges of {length_text(layout.edge)} on a target "
-            f"{length_text(2 * target.size)} wide: check its unit, or {remedy}"
-        )
-
-
-def _coarser(target: Target) -> str:
-    return f"a larger spacing, such as {length_text(target.size / 8)}"
-
-
-def _subdivide(offsets: Floats, edge: float, refine: int) -> Floats:
-    """Three steps or more from line to line, twice as many where `refine` is 2, meeting the nodes of the mesh."""
-    edges = edge_counts(np.diff(offsets), edge)
-    steps = refine * np.where((edges % 2 == 0) & (edges >= 6), edges // 2, np.maximum(3, edges))
-    span = np.repeat(np.arange(len(edges)), steps)
-    along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)
-    return np.append(offsets[span] + np.diff(offsets)[span] * along / steps[span], offsets[-1])
-
-
-def _refuse_holes(net: Net, inside: NDArray[np.bool_]) -> None:
-    """A node that the march could not find next to one inside the target: the net ends there."""
-    lost = ~np.isfinite(net.points[:, :, 0])
-    beside = np.zeros_like(inside)
-    beside[:-1] |= lost[1:]
-    beside[1:] |= lost[:-1]
-    beside[:, :-1] |= lost[:, 1:]
-    beside[:, 1:] |= lost[:, :-1]
-    holes = np.argwhere(beside & inside)
-    if len(holes):
-        i, j = holes[np.argmin(np.abs(net.u[holes[:, 0]]) + np.abs(net.v[holes[:, 1]]))]
-        raise _net_limit(tuple(net.points[i, j].tolist()), "the rods of the two families become parallel")
+def _hole(net: Covering) -> NetLimitError:
+    """The net ends at a node that the march could not find beside one inside the target: of these at the nearest."""
+    lost = np.pad(np.isnan(net.points[:, :, 0]), 1)
+    beside = lost[:-2, 1:-1] | lost[2:, 1:-1] | lost[1:-1, :-2] | lost[1:-1, 2:]
+    holes = np.argwhere(beside & net.inside)
+    i, j = holes[np.argmin(np.abs(net.u[holes[:, 0]]) + np.abs(net.v[holes[:, 1]]))]
+    return _net_limit(tuple(net.points[i, j].tolist()), "the rods of the two families become parallel")
 
 
 def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
@@ -261,9 +155,16 @@ def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
     )
 
 
-def _smallest_angle(target: Target, net: Net, inside: NDArray[np.bool_]) -> tuple[float, tuple[float, float, float]]:
-    """Smallest angle between the families over the inside nodes [rad], from central differences."""
-    i, j = _sharpest(net.points, inside)
+def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
+    """Smallest angle between the families over the inside nodes [rad], from central differences, and its place.
+
+    Raises
+    ------
+    NetLimitError : a node beside an inside one is missing.
+    """
+    i, j, whole = _sharpest(net.points, net.inside)
+    if not whole:
+        raise _hole(net)
     along, across = net.points[i + 1, j] - net.points[i - 1, j], net.points[i, j + 1] - net.points[i, j - 1]
     x, y, z = net.points[i, j].tolist()
     return float(np.arctan2(np.linalg.norm(np.cross(along, across)), abs(along @ across))), (x, y, z)
@@ -271,8 +172,9 @@ def _smallest_angle(target: Target, net: Net, inside: NDArray[np.bool_]) -> tupl
 
 @nb.njit(cache=True, error_model="numpy")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
-    """Indices of the inside node with the smallest angle, which has the largest cosine."""
-    i_found, j_found, largest = 0, 0, -1.0
+    """Indices of the inside node with the smallest angle, which has the largest cosine; and whether the net has all
+    nodes beside the inside ones."""
+    i_found, j_found, largest, whole = 0, 0, -1.0, True
     for i in range(1, len(inside) - 1):
         for j in range(1, inside.shape[1] - 1):
             if inside[i, j]:
@@ -280,9 +182,10 @@ def _sharpest(points, inside):  # type: ignore[no-untyped-def]
                 for k in range(3):
                     a, b = points[i + 1, j, k] - points[i - 1, j, k], points[i, j + 1, k] - points[i, j - 1, k]
                     aa, ab, bb = aa + a * a, ab + a * b, bb + b * b
+                whole &= not np.isnan(aa + bb)
                 if ab * ab > largest * aa * bb:
                     i_found, j_found, largest = i, j, ab * ab / (aa * bb)
-    return i_found, j_found
+    return i_found, j_found, whole
 
 
 @dataclass(frozen=True)
@@ -294,15 +197,14 @@ class _Ends:
 
 
 def _extrapolate(
-    target: Target, lines: _Lines, nets: tuple[Net, Net], inside_fine: NDArray[np.bool_], depth: float
+    target: Target, lines: LatticeLines, nets: tuple[Covering, Covering], depth: float
 ) -> tuple[_Ends, float, Floats]:
     """The pieces of all lines, the largest error of an end before extrapolation [m], and a point of that line."""
     sets = list[Lines]()
     for net in nets:
-        inside = inside_fine if net is nets[1] else inside_nodes(target, net)
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
-        sets.append(Lines(net.u, net.points[:, column].transpose(1, 0, 2), inside[:, column].T))
-        sets.append(Lines(net.v, net.points[row], inside[row]))
+        sets.append(Lines(net.u, net.points[:, column].transpose(1, 0, 2), net.inside[:, column].T))
+        sets.append(Lines(net.v, net.points[row], net.inside[row]))
     cuts = cut_lines(target, sets, depth=depth)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
     error, where = 0.0, nets[1].points[nets[1].origin]
@@ -318,7 +220,7 @@ def _extrapolate(
 
 
 def _name_rods(
-    layout: GridLayout, lines: _Lines, ends: _Ends
+    layout: GridLayout, lines: LatticeLines, ends: _Ends
 ) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
     """Rods from the lines: those of the layout get their labels, all other lines are virtual."""
     rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), list[str]()
@@ -328,9 +230,9 @@ def _name_rods(
         touching = {float(c): cut for c, cut in zip(offsets, cuts, strict=True) if cut}
         built = layout.offsets(family)
         if built is None:
-            lattice = layout.lattice(family, min(touching, default=0.0), max(touching, default=0.0))
-            tiny = 1e-6 * max(layout.spacing)
-            built = np.array([c for c in touching if np.abs(lattice - c).min() < tiny])
+            near = np.array(list(touching))
+            lattice = layout.lattice(family, near.min(initial=0.0), near.max(initial=0.0))
+            built = near[(np.abs(near[:, None] - lattice) < 1e-6 * max(layout.spacing)).any(axis=1)]
         for k, c in enumerate(built):
             name = rod_name(family, k, len(built))
             here = min(touching, key=lambda offset: abs(offset - c), default=np.inf)

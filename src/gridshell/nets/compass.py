@@ -6,6 +6,7 @@ second order in the step, with an error expansion in even powers when every inte
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba as nb
 import numpy as np
@@ -15,6 +16,7 @@ from gridshell.geometry.vectors import cross, dot, unit
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 SMALLEST_SINE = 0.02  # of a crossing angle: beyond it the two circles of the compass hardly cut (1.1 degrees)
 NEWTON_STEPS = 12
@@ -35,7 +37,7 @@ class Net:
     v: Floats
     points: Floats
 
-    @property
+    @cached_property
     def origin(self) -> tuple[int, int]:
         """Indices of the anchor, (u, v) = (0, 0)."""
         return int(np.argmin(np.abs(self.u))), int(np.argmin(np.abs(self.v)))
@@ -137,54 +139,44 @@ def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # ty
     return going
 
 
-def fill_quadrants(target: Target, net: Net) -> None:
-    """What is not known of all four quadrants: first all nodes whose neighbours are known, then what follows from them,
-    one anti-diagonal at a time, since a node depends only on those of earlier ones."""
-    tried = np.zeros(net.points.shape[:2], dtype=bool)
-    found = _next_nodes(net.points, tried, net.u, net.v, *net.origin, 2, len(net.u) + len(net.v))
+def fill_quadrants(target: Target, net: Net, wanted: Mask | None = None) -> None:
+    """What is not known of all four quadrants, all nodes or those `wanted` (nu, nv): again and again those whose
+    neighbours are known. Of a net of which only the axes are known these lie on one anti-diagonal after the other."""
+    tried = np.zeros(net.points.shape[:2], dtype=bool) if wanted is None else ~wanted
     diagonal = 2
-    while len(found[1]):
-        diagonal, i, j, *rest = found
+    while True:
+        diagonal, i, j, *rest = _next_nodes(net.points, tried, net.u, net.v, *net.origin, diagonal)
+        if len(i) == 0:
+            return
         tried[i, j] = True
         net.points[i, j] = _compass(target, *rest)
-        found = _next_nodes(net.points, tried, net.u, net.v, *net.origin, diagonal, 1)
 
 
 @nb.njit(cache=True)
-def _next_nodes(points, tried, u, v, i0, j0, diagonal, some):  # type: ignore[no-untyped-def]
-    """Of the first anti-diagonals from `diagonal` on that have any, `some` at a time: the nodes that are unknown, not
-    `tried`, and whose neighbours are known. Where to go on; their indices; the neighbours A towards the u axis, B
-    towards the v axis, and D across; the two chords; and the side of the net's quadrant."""
-    nu, nv = len(u), len(v)
-    last, most = nu + nv - 2, nu * nv
-    while True:
-        stop = min(diagonal + some - 1, last)
-        room = min(most, 4 * stop * (stop - diagonal + 1)) if stop >= diagonal else 0
-        i, j, side = np.empty(room, dtype=np.intp), np.empty(room, dtype=np.intp), np.empty(room)
-        a, b, d = np.empty((room, 3)), np.empty((room, 3)), np.empty((room, 3))
-        from_a, from_b = np.empty(room), np.empty(room)
-        count = 0
-        for quadrant in range(4):
-            i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-            rows, columns = (nu - 1 - i0 if i_side > 0 else i0), (nv - 1 - j0 if j_side > 0 else j0)
-            for along in range(max(1, diagonal - columns), min(rows, stop - 1) + 1):
-                for across in range(max(1, diagonal - along), min(columns, stop - along) + 1):
-                    p, q = i0 + i_side * along, j0 + j_side * across
-                    p_back, q_back = p - i_side, q - j_side
-                    if tried[p, q] or np.isfinite(points[p, q, 0]):
-                        continue
-                    if not np.isfinite(points[p, q_back, 0] + points[p_back, q, 0] + points[p_back, q_back, 0]):
-                        continue
-                    i[count], j[count], side[count] = p, q, i_side * j_side
-                    a[count], b[count], d[count] = points[p, q_back], points[p_back, q], points[p_back, q_back]
-                    from_a[count], from_b[count] = abs(v[q] - v[q_back]), abs(u[p] - u[p_back])
-                    count += 1
-        if count or stop >= last:
-            break
-        diagonal = stop + 1
-    return (
-        diagonal, i[:count], j[:count], a[:count], b[:count], d[:count], from_a[:count], from_b[:count], side[:count]
-    )  # fmt: skip
+def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
+    """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
+    The anti-diagonal to go on from; their indices; the neighbours A towards the u axis, B towards the v axis, and D
+    across; the two chords; and the side of the net's quadrant."""
+    nodes, count, first = np.empty((tried.size, 4), dtype=np.intp), 0, len(u) + len(v)
+    for quadrant in range(4):
+        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
+        rows, columns = (len(u) - 1 - i0 if i_side > 0 else i0), (len(v) - 1 - j0 if j_side > 0 else j0)
+        for along in range(1, rows + 1):
+            for across in range(max(1, diagonal - along), columns + 1):
+                i, j = i0 + i_side * along, j0 + j_side * across
+                if tried[i, j] or np.isfinite(points[i, j, 0]):
+                    continue
+                p, q = i - i_side, j - j_side
+                if np.isfinite(points[i, q, 0] + points[p, j, 0] + points[p, q, 0]):
+                    nodes[count, 0], nodes[count, 1], nodes[count, 2], nodes[count, 3] = i, j, p, q
+                    count, first = count + 1, min(first, along + across)
+    a, b, d = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    from_a, from_b, side = np.empty(count), np.empty(count), np.empty(count)
+    for n in range(count):
+        i, j, p, q = nodes[n]
+        a[n], b[n], d[n] = points[i, q], points[p, j], points[p, q]
+        from_a[n], from_b[n], side[n] = abs(v[j] - v[q]), abs(u[i] - u[p]), (i - p) * (j - q)
+    return first + 1, nodes[:count, 0], nodes[:count, 1], a, b, d, from_a, from_b, side
 
 
 def _compass(target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: Floats) -> Floats:
@@ -193,45 +185,57 @@ def _compass(target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, fr
     NaN where there is none, or where the net folds: (P - B) x (P - A) no longer points along the normal.
     """
     p = a + b - d
-    change = np.empty(len(p))
+    change, sine = np.empty(len(p)), np.empty(len(p))
     for _ in range(NEWTON_STEPS):
         value, gradient = target.level(p)
-        if not _towards(p, a, b, from_a, from_b, value, gradient, change):
+        if not _towards(p, a, b, from_a, from_b, value, gradient, change, sine):
             break
-    sine = dot(cross(p - b, p - a), gradient) * side
-    sine /= np.linalg.norm(gradient, axis=1) * from_a * from_b
-    p[~(change < TOLERANCE) | ~(sine > SMALLEST_SINE)] = np.nan
+    p[~(change < TOLERANCE) | ~(sine * side > SMALLEST_SINE)] = np.nan
     return p
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _towards(p, a, b, from_a, from_b, value, gradient, change):  # type: ignore[no-untyped-def]
-    """One Newton step of all points p (n, 3), in place; `change` (n,) its size over the chords. Whether to go on.
-
-    The three equations |p - a|^2 = from_a^2, |p - b|^2 = from_b^2 and f(p) = 0 have the gradients pa, pb and g, whose
-    inverse is made of their cross products. A point that runs away is not waited for.
-    """
+def _towards(p, a, b, from_a, from_b, value, gradient, change, sine):  # type: ignore[no-untyped-def]
+    """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
+    the crossing angle's before it. Whether to go on, as long as there is hope for any."""
     going = False
-    x, y, g, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for m in range(len(p)):
-        ra, rb = -from_a[m] * from_a[m], -from_b[m] * from_b[m]
+        x = (p[m, 0] - a[m, 0], p[m, 1] - a[m, 1], p[m, 2] - a[m, 2])
+        y = (p[m, 0] - b[m, 0], p[m, 1] - b[m, 1], p[m, 2] - b[m, 2])
+        slope = (gradient[m, 0], gradient[m, 1], gradient[m, 2])
+        step, sine[m] = compass_step(x, y, slope, from_a[m], from_b[m], value[m])
         for k in range(3):
-            x[k], y[k], g[k] = p[m, k] - a[m, k], p[m, k] - b[m, k], gradient[m, k]
-            ra += x[k] * x[k]
-            rb += y[k] * y[k]
-        volume = 0.0
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            normal = x[i] * y[j] - x[j] * y[i]
-            volume += normal * g[k]
-            step[k] = (
-                0.5 * ra * (y[i] * g[j] - y[j] * g[i]) + 0.5 * rb * (g[i] * x[j] - g[j] * x[i]) + value[m] * normal
-            )
-        largest = 0.0
-        for k in range(3):
-            p[m, k] -= step[k] / volume
-            largest = max(largest, abs(step[k] / volume)) if volume != 0.0 else np.nan
-        change[m] = largest / min(from_a[m], from_b[m])
-        if TOLERANCE <= change[m] < 1.0:
+            p[m, k] -= step[k]
+        change[m] = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a[m], from_b[m])
+        if change[m] >= TOLERANCE:
             going = True
     return going
+
+
+@nb.njit(cache=True, error_model="numpy")
+def compass_step(x, y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
+    """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
+    gradient g, to be taken away from P; and the sine of the crossing angle, y x x along the normal.
+
+    The three equations have the gradients x, y and g, whose inverse is made of their cross products.
+    """
+    normal, along, across = _cross(x, y), _cross(y, g), _cross(g, x)
+    volume = _dot(normal, g)
+    ra, rb = 0.5 * (_dot(x, x) - from_a * from_a) / volume, 0.5 * (_dot(y, y) - from_b * from_b) / volume
+    rest = level / volume
+    step = (
+        ra * along[0] + rb * across[0] + rest * normal[0],
+        ra * along[1] + rb * across[1] + rest * normal[1],
+        ra * along[2] + rb * across[2] + rest * normal[2],
+    )
+    return step, -volume / (np.sqrt(_dot(g, g)) * from_a * from_b)
+
+
+@nb.njit(cache=True)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@nb.njit(cache=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -5,6 +5,7 @@ from itertools import pairwise
 from math import inf
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,11 +41,28 @@ def inside_nodes(target: Target, net: Net) -> Mask:
         for axis, seeds in ((region[i:, j], reached[i:, j]), (region[i::-1, j], reached[i::-1, j]),
                             (region[i, j:], reached[i, j:]), (region[i, j::-1], reached[i, j::-1])):  # fmt: skip
             seeds[np.argmax(axis)] = axis.any()
-    while True:  # whole runs at a time, along rows and columns in turn: a few sweeps suffice
-        grown = _fill_runs(region.T, _fill_runs(region, reached).T).T
-        if np.array_equal(grown, reached):
-            return grown
-        reached = grown
+    _connect(region, reached)
+    return reached
+
+
+@nb.njit(cache=True)
+def _connect(region, reached):  # type: ignore[no-untyped-def]
+    """Extend the nodes `reached` (nu, nv) to all of the `region` (nu, nv) that hang together with them."""
+    nu, nv = region.shape
+    stack, top = np.empty((region.size, 2), dtype=np.intp), 0
+    for i in range(nu):
+        for j in range(nv):
+            if reached[i, j]:
+                stack[top, 0], stack[top, 1] = i, j
+                top += 1
+    while top > 0:
+        top -= 1
+        i, j = stack[top, 0], stack[top, 1]
+        for p, q in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+            if 0 <= p < nu and 0 <= q < nv and region[p, q] and not reached[p, q]:
+                reached[p, q] = True
+                stack[top, 0], stack[top, 1] = p, q
+                top += 1
 
 
 def _region(target: Target, net: Net) -> Mask:
@@ -52,32 +70,46 @@ def _region(target: Target, net: Net) -> Mask:
 
     A square of nodes in whose middle the end is further away than the way to its corners is asked about but once.
     """
-    known = np.isfinite(net.points[:, :, 0])
-    inside, asked = np.zeros(known.shape, dtype=bool), known.copy()
-    nu, nv = (count // SQUARE * SQUARE for count in known.shape)
-    squares = (nu // SQUARE, SQUARE, nv // SQUARE, SQUARE)
-    middle = slice(SQUARE // 2, None, SQUARE)
-    whole = known[:nu, :nv].reshape(squares).all(axis=(1, 3))
-    margin = np.zeros(whole.shape)
-    margin[whole] = target.margin(net.points[:nu, :nv][middle, middle][whole])
-    way = [np.abs(s[:n].reshape(-1, SQUARE) - s[:n][middle, None]).max(axis=1) for s, n in ((net.u, nu), (net.v, nv))]
-    clear = np.abs(margin) > way[0][:, None] + way[1]
-    asked[:nu, :nv] &= ~np.repeat(np.repeat(clear, SQUARE, axis=0), SQUARE, axis=1)
-    inside[:nu, :nv] = np.repeat(np.repeat(clear & (margin > 0), SQUARE, axis=0), SQUARE, axis=1)
-    inside[asked] = target.margin(net.points[asked]) > 0
-    return inside
+    middles, way = _squares(net.points, net.u, net.v)
+    margin = target.margin(net.points[middles[:, 0], middles[:, 1]])
+    inside, asked = _by_squares(net.points, middles, np.where(np.abs(margin) > way, margin, 0.0))
+    inside[asked[:, 0], asked[:, 1]] = target.margin(net.points[asked[:, 0], asked[:, 1]]) > 0
+    return np.asarray(inside)
 
 
-def _fill_runs(region: Mask, seeds: Mask) -> Mask:
-    """Extend seeds to the whole run of `region` along each row in which they lie."""
-    fenced = np.zeros((region.shape[0], region.shape[1] + 1), dtype=bool)
-    fenced[:, :-1] = region
-    run = np.cumsum(~fenced.ravel())
-    seeded = np.zeros(run[-1] + 1, dtype=bool)
-    padded = np.zeros_like(fenced)
-    padded[:, :-1] = seeds & region
-    seeded[run[padded.ravel()]] = True
-    return np.asarray((seeded[run].reshape(fenced.shape) & fenced)[:, :-1])
+@nb.njit(cache=True)
+def _squares(points, u, v):  # type: ignore[no-untyped-def]
+    """Indices (n, 2) of the middle of each square of nodes that are all known, and the ways (n,) to its corners."""
+    half, count = SQUARE // 2, 0
+    middles = np.empty(((len(u) // SQUARE) * (len(v) // SQUARE), 2), dtype=np.intp)
+    way = np.empty(len(middles))
+    for i in range(half, len(u) - half, SQUARE):
+        for j in range(half, len(v) - half, SQUARE):
+            if not np.isnan(points[i - half : i + half + 1, j - half : j + half + 1, 0]).any():
+                middles[count, 0], middles[count, 1] = i, j
+                way[count] = max(u[i + half] - u[i], u[i] - u[i - half]) + max(v[j + half] - v[j], v[j] - v[j - half])
+                count += 1
+    return middles[:count], way[:count]
+
+
+@nb.njit(cache=True)
+def _by_squares(points, middles, margin):  # type: ignore[no-untyped-def]
+    """Which nodes (nu, nv) lie in squares with a positive `margin` (n,), and indices (m, 2) of the known ones that lie
+    in none with a margin other than 0."""
+    nu, nv = points.shape[:2]
+    half, count = SQUARE // 2, 0
+    inside, asked = np.zeros((nu, nv), dtype=np.bool_), np.empty((nu * nv, 2), dtype=np.intp)
+    clear = np.zeros((nu, nv), dtype=np.bool_)
+    for n in range(len(middles)):
+        i, j = middles[n]
+        clear[i - half : i + half + 1, j - half : j + half + 1] = margin[n] != 0.0
+        inside[i - half : i + half + 1, j - half : j + half + 1] = margin[n] > 0.0
+    for i in range(nu):
+        for j in range(nv):
+            if not clear[i, j] and not np.isnan(points[i, j, 0]):
+                asked[count, 0], asked[count, 1] = i, j
+                count += 1
+    return inside, asked[:count]
 
 
 class Lines(NamedTuple):
@@ -117,11 +149,9 @@ def _runs(target: Target, lines: Lines, depth: float) -> tuple[Ints, Ints, Ints]
     """The line, and the first and the last node, of each run of inside nodes that is `depth` [m] inside somewhere."""
     change = np.diff(lines.inside.astype(np.int8), axis=1, prepend=0, append=0)
     (row, first), last = np.nonzero(change == 1), np.nonzero(change == -1)[1] - 1
-    margin = np.append(np.full(lines.inside.shape, -np.inf), -np.inf)  # of a run that ends with the last line
-    margin[:-1][lines.inside.ravel()] = target.margin(lines.points[lines.inside])
-    begin = row * len(lines.s)
-    bounds = np.column_stack([begin + first, begin + last + 1]).ravel()
-    deep = np.maximum.reduceat(margin, bounds)[::2] > depth if len(row) else np.empty(0, dtype=bool)
+    deep = target.margin(lines.points[row, (first + last) // 2]) > depth
+    for k in np.flatnonzero(~deep):  # not in the middle, but elsewhere?
+        deep[k] = (target.margin(lines.points[row[k], first[k] : last[k] + 1]) > depth).any()
     return row[deep], first[deep], last[deep]
 
 

@@ -10,70 +10,81 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from gridshell.geometry.curves import cubic_windows
-from gridshell.nets.compass import NEWTON_STEPS, SMALLEST_SINE, Net, axes, fill_quadrants, lay_axes
+from gridshell.geometry.curves import resampled
+from gridshell.geometry.vectors import cross
+from gridshell.nets.compass import (
+    NEWTON_STEPS,
+    SMALLEST_SINE,
+    TOLERANCE,
+    Net,
+    axes,
+    compass_step,
+    fill_quadrants,
+    lay_axes,
+)
 from gridshell.targets import Target
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 ROUNDS = 6
-SETTLED = 5e-5  # of the target's size: what a round moves; the error left is its third power
+SETTLED = 2e-5  # of the target's size: what a round moves; the error left is its third power
 EXACT = 1e-13  # of the step, on a local model
 CLEARLY = 1.5  # times the square of the step: what two nets in steps nearer to each other differ by tells little
-BEYOND = 0.1  # of the known net's extent that a guess may lie outside it
+BEYOND = 2.5  # steps of the known net that a guess may lie outside it
 
 
 def march_near(
-    target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, near: Net, coarser: Net | None = None
+    target: Target,
+    u: Floats,
+    v: Floats,
+    anchor: Floats,
+    heading: Floats,
+    near: Net,
+    *,
+    coarser: Net | None = None,
+    wanted: Mask | None = None,
 ) -> Net:
     """As `march`, from a guess taken out of a net `near`; any guess is safe, a bad one is only of no use.
 
     coarser : the same net as `near` in longer steps: what the two differ by tells by how much this one will.
+    wanted : (nu, nv) nodes to find beside the axes, with all between them and the axes; the others stay NaN.
     """
-    net = Net(u, v, interpolated(near, u, v))
-    if coarser is not None:
-        change = net.points - interpolated(coarser, u, v)
-        own, once, twice = (
-            float(np.median(np.diff(one.u)) * np.median(np.diff(one.v))) for one in (net, near, coarser)
-        )
-        if twice > CLEARLY * once:  # errors go with the square of the step
-            net.points[:] += np.where(np.isfinite(change), (once - own) / (twice - once) * change, 0.0)
+    guess = near if coarser is None else _foreseen(near, coarser, u, v)
+    net = Net(u, v, interpolated(guess, u, v))
     if not _settle_axes(target, net, anchor, heading):
         lay_axes(target, net, anchor, heading)
-    _settle(target, net)
-    fill_quadrants(target, net)
+    _settle(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted)
+    fill_quadrants(target, net, wanted)
     return net
 
 
+def _foreseen(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
+    """The nodes of `near` moved to where the net with the lines u and v has them: errors go with the square of the
+    step."""
+    own, once, twice = (
+        (along[-1] - along[0]) * (across[-1] - across[0]) / ((len(along) - 1) * (len(across) - 1))
+        for along, across in ((u, v), (near.u, near.v), (coarser.u, coarser.v))
+    )
+    if twice <= CLEARLY * once:
+        return near
+    change = near.points - interpolated(coarser, near.u, near.v)
+    change[np.isnan(change)] = 0.0
+    return Net(near.u, near.v, near.points + (once - own) / (twice - once) * change)
+
+
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
-    """(nu, nv, 3) points of a net at other coordinates, by local cubics both ways; NaN where it has none."""
-    (rows, along), (columns, across) = (cubic_windows(k, s, BEYOND) for k, s in ((net.u, u), (net.v, v)))
-    return np.asarray(_interpolate(net.points, rows, along, columns, across))
-
-
-@nb.njit(cache=True)
-def _interpolate(points, rows, along, columns, across):  # type: ignore[no-untyped-def]
-    line, result = np.empty(3 * points.shape[1]), np.empty((len(rows), 3 * len(columns)))
-    for i in range(len(rows)):
-        line[:] = 0.0
-        for k in range(rows.shape[1]):
-            share, row = along[i, k], points[rows[i, k]].reshape(-1)
-            for m in range(len(line)):
-                line[m] += share * row[m]
-        for j in range(len(columns)):
-            x, y, z = 0.0, 0.0, 0.0
-            for k in range(columns.shape[1]):
-                share, c = across[j, k], 3 * columns[j, k]
-                x, y, z = x + share * line[c], y + share * line[c + 1], z + share * line[c + 2]
-            result[i, 3 * j], result[i, 3 * j + 1], result[i, 3 * j + 2] = x, y, z
-    return result.reshape(len(rows), len(columns), 3)
+    """(nu, nv, 3) points of a net at other coordinates, by local cubics both ways, which go on some way past its last
+    nodes; NaN further away."""
+    i0, j0 = net.origin
+    return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
 
 
 def _settle_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; whether they were found."""
     i0, j0 = net.origin
     along, back, across, aback = axes(target, anchor, heading)
-    normal = np.cross(along, across)
+    normal = cross(along, across)
     net.points[i0, j0] = anchor
     arms = (
         (net.points[i0 + 1 :, j0], np.diff(net.u[i0:]), along),
@@ -136,26 +147,40 @@ def _geodesic(start, direction, normal, steps, points, value, gradient, hessian)
     return moved
 
 
-def _settle(target: Target, net: Net) -> None:
-    """Move the guess of all nodes but those of the axes to the net; what does not settle is left NaN.
+def _settle(target: Target, net: Net, wanted: Mask) -> None:
+    """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for what does not settle.
 
     A round asks the target only where the last one moved a node: elsewhere its model is still good.
     """
-    (i0, j0), shape = net.origin, net.points.shape[:2]
-    models, flat = net.points.copy(), net.points.reshape(-1, 3)
-    known = np.flatnonzero(np.isfinite(flat[:, 0]))
-    row = np.full(len(flat), -1)
-    row[known] = np.arange(len(known))
-    value, gradient, hessian = target.implicit(flat[known])
-    moved, new = np.zeros(shape), np.ones(shape, dtype=bool)
+    i0, j0 = net.origin
+    models, row = np.empty_like(net.points), np.empty(wanted.shape, dtype=np.intp)
+    value, gradient, hessian = target.implicit(_chosen(net.points, wanted, i0, j0, models, row))
+    moved, new = np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
     for _ in range(ROUNDS):
-        _sweep(net.points, models, row.reshape(shape), value, gradient, hessian, net.u, net.v, i0, j0, new, moved)
+        _sweep(net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, new, moved)
         new = moved >= SETTLED * target.size
         if not new.any():
             return
-        models[new], rows = net.points[new], row[new.ravel()]
+        models[new], rows = net.points[new], row[new]
         value[rows], gradient[rows], hessian[rows] = target.implicit(models[new])
     _forget(net.points, moved >= SETTLED * target.size, i0, j0)
+
+
+@nb.njit(cache=True)
+def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def]
+    """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
+    `row` (nu, nv) is where each stands there, -1 for the others; `models` (nu, nv, 3) is a copy of all."""
+    chosen, count = np.empty((row.size, 3)), 0
+    for i in range(row.shape[0]):
+        for j in range(row.shape[1]):
+            guessed = (wanted[i, j] or i == i0 or j == j0) and not np.isnan(points[i, j, 0])
+            row[i, j] = count if guessed else -1
+            for k in range(3):
+                if not guessed:
+                    points[i, j, k] = np.nan
+                models[i, j, k] = chosen[count, k] = points[i, j, k]
+            count += guessed
+    return chosen[:count]
 
 
 @nb.njit(cache=True, error_model="numpy")
@@ -163,64 +188,67 @@ def _sweep(points, models, row, value, gradient, hessian, u, v, i0, j0, new, mov
     """One march of the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), whose values, gradients and
     Hessians are in the rows `row` (nu, nv), -1 where there is none; from them the points then lie away by `moved`
     (nu, nv). Nodes whose models and neighbours are not `new` (nu, nv) stay.
-
-    As `compass`: the three equations are |p - a| = from_a, |p - b| = from_b and f(p) = 0.
     """
-    p, x, y, cross, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    away, g = np.empty(3), np.empty(3)
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         i_stop, j_stop = (len(u) if i_side > 0 else -1), (len(v) if j_side > 0 else -1)
         for i in range(i0 + i_side, i_stop, i_side):
-            from_b = abs(u[i] - u[i - i_side])
+            p = i - i_side
             for j in range(j0 + j_side, j_stop, j_side):
-                new[i, j] |= new[i, j - j_side] | new[i - i_side, j] | new[i - i_side, j - j_side]
+                q = j - j_side
+                new[i, j] |= new[i, q] | new[p, j] | new[p, q]
                 if not new[i, j]:
                     continue
-                r = row[i, j]
+                moved[i, j], r = np.nan, row[i, j]
                 if r < 0:
-                    moved[i, j] = np.nan
                     continue
-                from_a = abs(v[j] - v[j - j_side])
-                a, b, d = points[i, j - j_side], points[i - i_side, j], points[i - i_side, j - j_side]
-                slope, bend, here = gradient[r], hessian[r], models[i, j]
-                for k in range(3):  # as far from its model as its neighbours are from theirs
-                    p[k] = here[k] + (a[k] - models[i, j - j_side, k]) + (b[k] - models[i - i_side, j, k])
-                    p[k] -= d[k] - models[i - i_side, j - j_side, k]
-                change, tries = np.inf, 0
-                while change > 1e-10 and tries < NEWTON_STEPS:
-                    ra, rb, level, volume = -from_a * from_a, -from_b * from_b, value[r], 0.0
-                    for k in range(3):
-                        away[k], x[k], y[k] = p[k] - here[k], p[k] - a[k], p[k] - b[k]
-                        ra += x[k] * x[k]
-                        rb += y[k] * y[k]
-                    for k in range(3):
-                        bent = bend[k, 0] * away[0] + bend[k, 1] * away[1] + bend[k, 2] * away[2]
-                        level += (slope[k] + 0.5 * bent) * away[k]
-                        g[k] = slope[k] + bent
-                    for k in range(3):
-                        m, n = (k + 1) % 3, (k + 2) % 3
-                        cross[k] = x[m] * y[n] - x[n] * y[m]
-                        volume += cross[k] * g[k]
-                        step[k] = 0.5 * ra * (y[m] * g[n] - y[n] * g[m]) + 0.5 * rb * (g[m] * x[n] - g[n] * x[m])
-                        step[k] += level * cross[k]
-                    change = 0.0
-                    for k in range(3):
-                        p[k] -= step[k] / volume
-                        change = max(change, abs(step[k] / volume))
-                    change /= min(from_a, from_b)
+                a, b, d, here = _at(points, i, q), _at(points, p, j), _at(points, p, q), _at(models, i, j)
+                away = _less(d, _at(models, p, q))  # as far from its model as its neighbours are from theirs
+                away = _less(_plus(_less(a, _at(models, i, q)), _less(b, _at(models, p, j))), away)
+                from_a, from_b = abs(v[j] - v[q]), abs(u[i] - u[p])
+                change, sine, tries = np.inf, 0.0, 0
+                while change > TOLERANCE and tries < NEWTON_STEPS:
+                    now = _plus(here, away)
+                    level, slope = _model(r, away, value, gradient, hessian)
+                    step, sine = compass_step(_less(now, a), _less(now, b), slope, from_a, from_b, level)
+                    away = _less(away, step)
+                    change = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
                     tries += 1
-                # (p - b) x (p - a) along the normal, or the net folds
-                sine = -volume * i_side * j_side / (np.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2) * from_a * from_b)
-                found = change < 1e-8 and sine > SMALLEST_SINE
-                moved[i, j] = np.nan
-                for k in range(3):
-                    if found:
-                        moved[i, j] = max(abs(p[k] - here[k]), moved[i, j] if k else 0.0)
-                    points[i, j, k] = p[k] if found else np.nan
+                if change <= TOLERANCE and sine * i_side * j_side > SMALLEST_SINE:
+                    moved[i, j] = max(abs(away[0]), abs(away[1]), abs(away[2]))
+                    points[i, j, 0], points[i, j, 1], points[i, j, 2] = _plus(here, away)
+                else:
+                    points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
 
 
-def _forget(points: Floats, unsettled: NDArray[np.bool_], i0: int, j0: int) -> None:
+@nb.njit(cache=True)
+def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
+    """Value and gradient `away` from where the second order model r was made."""
+    x, y, z = away
+    bx = hessian[r, 0, 0] * x + hessian[r, 0, 1] * y + hessian[r, 0, 2] * z
+    by = hessian[r, 1, 0] * x + hessian[r, 1, 1] * y + hessian[r, 1, 2] * z
+    bz = hessian[r, 2, 0] * x + hessian[r, 2, 1] * y + hessian[r, 2, 2] * z
+    gx, gy, gz = gradient[r, 0], gradient[r, 1], gradient[r, 2]
+    level = value[r] + (gx + 0.5 * bx) * x + (gy + 0.5 * by) * y + (gz + 0.5 * bz) * z
+    return level, (gx + bx, gy + by, gz + bz)
+
+
+@nb.njit(cache=True)
+def _at(points, i, j):  # type: ignore[no-untyped-def]
+    return points[i, j, 0], points[i, j, 1], points[i, j, 2]
+
+
+@nb.njit(cache=True)
+def _plus(a, b):  # type: ignore[no-untyped-def]
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@nb.njit(cache=True)
+def _less(a, b):  # type: ignore[no-untyped-def]
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _forget(points: Floats, unsettled: Mask, i0: int, j0: int) -> None:
     """NaN for every node that has not settled, and for all that hang on it: those beyond it in its quadrant."""
     for rows in (slice(i0, None), slice(i0, None, -1)):
         for columns in (slice(j0, None), slice(j0, None, -1)):
