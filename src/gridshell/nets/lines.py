@@ -26,6 +26,7 @@ Mask = NDArray[np.bool_]
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `apron`
 STRIDE = 0.2  # of the target's size: the steps of the first march of all
 STRIDES = 10  # from the anchor, each way
+FEWEST_STEPS = 6  # from line to line
 MOST_NODES = 4_000_000
 
 
@@ -129,9 +130,9 @@ def _coarser(target: Target) -> str:
 
 
 def _subdivided(offsets: Floats, edge: float) -> Floats:
-    """Six steps or more from line to line, always an even number, meeting the nodes of the mesh."""
+    """As many steps from line to line as edges, but six or more, and an even number."""
     edges, gaps = edge_counts(np.diff(offsets), edge), np.diff(offsets)
-    steps = 2 * np.where((edges % 2 == 0) & (edges >= 6), edges // 2, np.maximum(3, edges))
+    steps = 2 * np.maximum(FEWEST_STEPS // 2, (edges + 1) // 2)
     span = np.repeat(np.arange(len(edges)), steps)
     along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)
     return np.append(offsets[span] + gaps[span] * along / steps[span], offsets[-1])
