@@ -71,7 +71,7 @@ def test_substitutions_solve_with_the_front(own, more):
     np.testing.assert_array_equal(values[own:size], known)
 
 
-@pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
+@pytest.mark.parametrize("bad", [0.0, -0.0, np.nan, np.inf, 1e-310])
 @pytest.mark.parametrize("at", [0, 2, 4, 6, 40])
 def test_a_pivot_that_vanishes_or_is_not_finite_is_told(at, bad):
     rows = np.zeros((42, padded(42)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sparse
 
-from gridshell.solve import multifrontal
+from gridshell.solve import dense, multifrontal
 from gridshell.solve.linear import Qdldl, SingularError
 from gridshell.solve.multifrontal import Multifrontal
 from gridshell.solve.ordering import dissect
@@ -161,3 +161,26 @@ def test_dissection_orders_every_block_once_and_separators_last():
     assert sorted(order) == list(range(400))
     last = places[order[-40:]]  # the first separator: two lines of nodes, since bending couples second neighbours
     assert np.ptp(last, axis=0).min() == 1.0
+
+
+def test_what_memory_held_before_does_not_matter(monkeypatch):
+    """Kernels read some numbers past what is theirs; nothing of it may get into the solution."""
+    matrix, places = grid_matrix(23)
+    triangle, right = upper(matrix), RANDOM.standard_normal(matrix.shape[0])
+    found = []
+    for rubbish in (0.0, np.nan, 1e300):
+        make = multifrontal.room
+
+        def filled(numbers, make=make, rubbish=rubbish):
+            memory = make(numbers)
+            memory[:] = rubbish
+            return memory
+
+        with monkeypatch.context() as patched:
+            patched.setattr(multifrontal, "room", filled)
+            patched.setattr(dense, "room", filled)
+            solver = Multifrontal(triangle.indptr, triangle.indices, places)
+            solver.factor(triangle.data)
+            found.append(solver.solve(right))
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(found[2], found[0])

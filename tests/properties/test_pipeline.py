@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from functools import cache, partial
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 import gridshell as gs
 from gridshell.errors import InputError
 from gridshell.formfinding import bound, pipeline
+from gridshell.formfinding.roll import roll
 from gridshell.output import read
 from gridshell.output.archive import json_text
 from gridshell.solve.report import Status
@@ -122,6 +124,67 @@ def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remed
         sprung = [text for text in form.warnings if "springs off" in text]
         assert len(sprung) == 1
         assert sprung[0].endswith("even with clamped ends")
+
+
+STANDING, LYING = gs.RectangularSection(width=4e-3, height=1e-3), gs.RectangularSection(width=1e-3, height=4e-3)
+
+
+@cache
+def of_laths(section, joint=None):
+    cap = gs.Cap(SIZE, 0.6 * SIZE)
+    return gs.find_form(cap, layout_of(spacing=0.04), replace(ROD, section=section), joint=joint, ends=("pinned",))
+
+
+@pytest.mark.parametrize(
+    ("section", "joint", "degrees"),
+    [(STANDING, None, 90), (LYING, None, 0), (STANDING, gs.Pin(), 0), (LYING, gs.Pin(), 0), (ROD.section, None, 0)],
+    ids=["standing", "lying", "standing, pinned", "lying, pinned", "round"],
+)
+def test_laths_that_lie_down_are_warned_of(section, joint, degrees):
+    """With ball joints a lath lies down, however it was laid; with pins it stays."""
+    found = [text for text in of_laths(section, joint).warnings if "about their own axes" in text]
+    assert [f"up to {degrees} (pinned" in text for text in found] == [True] * (degrees > 0)
+
+
+def test_laid_either_way_a_lath_takes_the_same_shape_where_nothing_holds_it():
+    standing, lying = (of_laths(section).popped["pinned"].positions for section in (STANDING, LYING))
+    np.testing.assert_allclose(standing, lying, rtol=0, atol=1e-9 * SIZE)
+
+
+@pytest.mark.parametrize("turn", [0.1, 1.0, 2.0, -2.5])
+def test_roll_is_what_the_twist_angles_add(turn):
+    """Laths held by pins lie nearly flat; turned by more than a quarter they are nearer to their other side."""
+    popped = of_laths(LYING, gs.Pin()).popped["pinned"]
+    before = roll(popped)
+    assert np.degrees(before).max() < 7.0
+    state = popped.state.copy()
+    state[popped.shell.first_angle :, 0] += turn
+    turned = roll(replace(popped, state=state))
+    assert np.all(np.abs(turned - np.arccos(abs(np.cos(turn)))) <= before + 1e-9)
+    assert roll(hemisphere_form().popped["pinned"]) is None
+
+
+@pytest.mark.parametrize(("ending", "tail", "left"), [(6, 0.5, 5), (4, 0.7, 7), (10, None, 0), (11, None, 0)])
+def test_a_rod_that_runs_far_past_its_last_joint_is_warned_of(ending, tail, left):
+    """One rod of 1.1 m, met every 0.1 m; from `ending` on those that meet it end 10 mm past it."""
+    crossing = [gs.FlatRod.v(f"V{k:02d}", k / 10, -0.2, 0.01 if k >= ending else 0.2) for k in range(1, 11)]
+    grid = gs.FlatGrid.of([gs.FlatRod.u("U01", 0.0, 0.0, 1.1), *crossing], margin=0.015)
+    layout = gs.GridLayout.orthogonal(spacing=0.1)
+    trimmed = SimpleNamespace(mesh=SimpleNamespace(grid=grid), draped=SimpleNamespace(layout=layout))
+    found = pipeline._long_tails(trimmed)
+    assert len(found) == (tail is not None)
+    if tail is not None:
+        assert found[0].startswith(
+            f"U01 runs {1e3 * (tail + 0.1):.0f} mm past its last joint: no joint is made within 0.15"
+        )
+        assert f"here at {left} crossings" in found[0]
+
+
+def test_a_layout_beside_the_target_is_refused():
+    with pytest.raises(InputError, match="none of the layout's rods touches the target"):
+        gs.find_form(
+            HEMISPHERE, gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.03, length=1.2, offset=(1.0, 1.0)), ROD
+        )
 
 
 def test_a_wave_that_springs_off_is_advised_seams():

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import degrees, sin
+from math import degrees, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from gridshell.formfinding.draped import Draped
 from gridshell.formfinding.fall import Fall
 from gridshell.formfinding.popup import Ends, Popped, pop_up
 from gridshell.formfinding.progress import Progress, silent
+from gridshell.formfinding.roll import roll
 from gridshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -29,11 +30,14 @@ from gridshell.layout import FlatGrid, GridLayout, mesh_grid
 from gridshell.layout.gridlayout import EDGES_A_SPAN
 from gridshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
 from gridshell.targets import Target
+from gridshell.units import length_text
 
 Floats = NDArray[np.float64]
 
 SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
 STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
+ROLLED = pi / 4  # rad: a lath that turns by more bends about its other axis rather than its own
+LONG_TAIL = 3.0  # spacings past a rod's last joint
 ROOM = 0.5  # of the clear distance of parallel rods: wider ones leave no room for joints
 
 
@@ -68,7 +72,8 @@ class FoundForm:
         """Sentences that a user should read before anything else."""
         stretched = _stretched(self.draped)
         off = _springs_off(self.agreement, advise=not stretched)
-        return (*self.draped.warnings, *stretched, *_crowded(self.draped), *_popped_warnings(self.popped), *off)
+        built = (*_crowded(self.draped), *_long_tails(self.trimmed))
+        return (*self.draped.warnings, *stretched, *built, *_popped_warnings(self.popped), *off)
 
 
 @dataclass(frozen=True)
@@ -202,6 +207,28 @@ def _crowded(draped: Draped) -> tuple[str, ...]:
     )
 
 
+def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
+    """Rods that run far past their last joint, since crossings there lie too near to an end."""
+    grid = trimmed.mesh.grid
+    ends = np.array([(rod.start, rod.end) for rod in grid.rods])
+    first, last = ends[:, 1].copy(), ends[:, 0].copy()
+    np.minimum.at(first, grid.crossings.rods, grid.crossings.at)
+    np.maximum.at(last, grid.crossings.rods, grid.crossings.at)
+    tails = np.maximum(first - ends[:, 0], ends[:, 1] - last)
+    spacing = max(trimmed.draped.layout.spacing)
+    long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), int(np.argmax(tails))
+    if not long:
+        return ()
+    left = len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
+    others = f" ({long} rods do so by more than {LONG_TAIL:g} spacings)" if long > 1 else ""
+    near = f"no joint is made within {NEAREST_JOINT:g} spacings of a rod's end, here at {left} crossings"
+    why = f": {near}" if left else ""
+    return (
+        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
+        "anchor of the layout may help, or leave such rods out",
+    )
+
+
 def _breadth(rod: Rod) -> float:
     """What a rod covers of the grid's plane across its line [m]; 0 where the shape of its section is not known."""
     section = rod.section
@@ -229,8 +256,24 @@ def _springs_off(compared: dict[Ends, Agreement], *, advise: bool) -> tuple[str,
 
 
 def _popped_warnings(popped: dict[Ends, Popped]) -> tuple[str, ...]:
-    return tuple(
+    found = {ends: shell for ends, shell in popped.items() if shell.report.converged}
+    unstable = tuple(
         f"the popped-up shell with {ends} ends is not stable: {shell.report.negative_modes} negative modes"
-        for ends, shell in popped.items()
-        if shell.report.converged and not shell.report.stable
+        for ends, shell in found.items()
+        if not shell.report.stable
     )
+    return (*unstable, *_rolled(found))
+
+
+def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+    """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
+    for ends, shell in popped.items():
+        angles = roll(shell)
+        if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
+            return (
+                f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "
+                f"{degrees(angles.max()):.0f} ({ends} ends), and bend the easy way, since nothing holds them: bolted "
+                'laths stay as they are laid and are stressed more; set joint.kind = "pin", or swap the width and the '
+                "height of the section",
+            )
+    return ()

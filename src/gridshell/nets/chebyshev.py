@@ -109,6 +109,10 @@ def chebyshev_net(
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
     ends, error, loosest = _extrapolate(target, lines, (coarse, fine), GRAZING * min(layout.spacing))
     rods, dropped, warnings = _name_rods(layout, lines, ends)
+    if all(rod.virtual for rod in rods):
+        raise InputError(
+            "none of the layout's rods touches the target: move the layout (offset, anchor), or give more rods"
+        )
     if error > LOOSE * min(layout.spacing):
         x, y, z = np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest)
         warnings.append(
@@ -254,7 +258,8 @@ def _in_pieces(names: list[str]) -> str:
     """That some rods do not go from rim to rim."""
     return (
         f"{len(names)} rods meet the target in several pieces, each with ends of its own: {', '.join(names)}; an "
-        "opening needs a ring that carries the reactions of the rods that end there"
+        "opening where they end needs a ring that carries their reactions; where they only run out over the edge and "
+        "in again another offset of the layout may help"
     )
 
 

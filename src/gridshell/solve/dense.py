@@ -92,7 +92,7 @@ def _find_factors(rows, panel, begin, k, count, pivots, work):  # type: ignore[n
             work[at] = -factor
             at += 1
         pivot = work[r * LANES + here + r]
-        if not np.isfinite(pivot) or pivot == 0.0:
+        if not (np.isfinite(pivot) and np.isfinite(1.0 / pivot)):
             return False
         pivots[k + r], work[at] = pivot, 1.0 / pivot
         at += 1

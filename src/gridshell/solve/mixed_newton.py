@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6
+LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
 
 
@@ -128,7 +129,7 @@ def find_stable(
                     start,
                     first.forces,
                     descend=True,
-                    most_iterations=2 * most_iterations,
+                    most_iterations=min(2 * most_iterations, LONGEST_SLIDE),
                     progress=progress,
                 )
             )

@@ -51,7 +51,7 @@ class Multifrontal:
 
     @property
     def fill(self) -> int:
-        """Stored values of the factor."""
+        """Stored values of the factor, with the padding of its rows."""
         return int(self._plan.panel_start[-1])
 
     def factor(self, data: Floats) -> int:

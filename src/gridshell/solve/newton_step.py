@@ -3,8 +3,8 @@
 Near the end a factorisation serves for the steps after it, too, which then cost a gradient and a solve (chord steps).
 
 A step along which rods turn by a leaves them strained by a^2/2, with forces that may buckle them. The next
-factorisation tells: where it counts more negative modes than the one that the step was made with, the step was too
-long, and a part of it is taken instead. It is a trust region, with the modes as its measure: the energy would not
+factorisation tells: where it counts several negative modes more than the one that the step was made with, the step was
+too long, and a part of it is taken instead. It is a trust region, with the modes as its measure: the energy would not
 do, for it jumps with those strains.
 """
 
@@ -160,9 +160,10 @@ class NewtonStep:
         return near
 
     def _too_far(self) -> bool:
-        """Whether the last step led to more negative modes than it began with, and was not short."""
+        """Whether the last step was not short and led to more negative modes than it began with: by several, which are
+        rods that buckle; one more is a saddle on the way."""
         last = self._stride
-        if last is None or not self._cut or self.negative_modes <= last.negative_modes:
+        if last is None or not self._cut or self.negative_modes <= last.negative_modes + 1:
             return False
         return last.share * last.reach > NEAR * self._problem.length
 
