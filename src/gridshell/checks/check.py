@@ -12,11 +12,13 @@ from gridshell.checks.reactions import Reactions, reactions
 from gridshell.formfinding import Popped
 from gridshell.formfinding.popup import Ends
 from gridshell.formfinding.progress import Progress, silent
+from gridshell.layout import GridMesh
 from gridshell.model import Shell
 from gridshell.rods.section import Rod
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from gridshell.solve.problem import Problem
+from gridshell.units import length_text
 
 THIN = 0.05  # strain of the outermost fibre up to which rods are thin: radii of ten depths
 
@@ -54,25 +56,30 @@ class Checks:
             f"thin rods holds up to {100 * THIN:.0f} % or so; use thinner rods or a larger target",
         )
 
-    def overstress(self, strength: float | None) -> tuple[str, ...]:
-        """A sentence where the rods would break, in a final shape or on the way up.
+    def overstress(self, strength: float | None, mesh: GridMesh) -> tuple[str, ...]:
+        """A sentence where the rods would break, in a final shape or on the way up, with the place.
 
         strength : of the rods' material [Pa], or None.
         """
         if strength is None:
             return ()
         shares = () if self.deployment is None else self.deployment.share
-        final = [(_worst(bent) / strength, f"with {ends} ends") for ends, bent in self.bending.items()]
+        final = [(_worst(bent) / strength, f"with {ends} ends", bent) for ends, bent in self.bending.items()]
         way = [
-            (_worst(bent) / strength, f"on the way up (stage at {100 * share:.0f} %)")
+            (_worst(bent) / strength, f"on the way up (stage at {100 * share:.0f} %)", bent)
             for share, bent in zip(shares, self.on_the_way, strict=True)
             if share < 1
         ]
-        broken = sorted((max(each) for each in (final, way) if each and max(each)[0] > 1), reverse=True)
+        worst = [max(each, key=lambda one: one[0]) for each in (final, way) if each]
+        broken = sorted((one for one in worst if one[0] > 1), key=lambda one: -one[0])
         if not broken:
             return ()
-        found = ", ".join(f"{max(101, round(100 * used))} % of the strength {where}" for used, where in broken)
-        return (f"the rods would break: {found}; use thinner, softer or stronger rods, or a flatter target",)
+        found = ", ".join(
+            f"{max(101, round(100 * used))} % of the strength {where} in {_most_stressed(bent, mesh)}"
+            for used, where, bent in broken
+        )
+        only = "" if any(one[0] > 1 for one in final) else ", or close the joints near that place last"
+        return (f"the rods would break: {found}; use thinner, softer or stronger rods, or a flatter target{only}",)
 
 
 def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress: Progress = silent) -> Checks:
@@ -99,6 +106,14 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
 
 def _worst(bent: Bending) -> float:
     return 0.0 if bent.stress is None else float(bent.stress.max())
+
+
+def _most_stressed(bent: Bending, mesh: GridMesh) -> str:
+    """The rod, and how far along it."""
+    assert bent.stress is not None
+    at = int(np.argmax(bent.stress))
+    rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
+    return f"{rod.name}, {length_text(float(mesh.stations[at]) - rod.start)} from its start"
 
 
 def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:

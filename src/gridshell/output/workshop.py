@@ -39,7 +39,7 @@ def workshop_result(
             entry["pop_up"] = _bent([*checks.bending.values(), *checks.on_the_way], here, strength)
     return {
         **result,
-        "warnings": [*result["warnings"], *checks.overstress(strength), *checks.warnings, *made.warnings],
+        "warnings": [*result["warnings"], *checks.overstress(strength, mesh), *checks.warnings, *made.warnings],
         "rods": rods,
         "bending": _bending(checks, strength),
         "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
