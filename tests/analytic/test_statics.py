@@ -15,8 +15,10 @@ from scipy.special import ellipe, ellipk
 import gridshell as gs
 from gridshell.layout import FlatGrid, FlatRod
 from gridshell.model import Shell
+from gridshell.solve import mixed_newton
 from gridshell.solve.constraint import Supports
 from gridshell.solve.mixed_newton import find_equilibrium, find_stable
+from gridshell.solve.newton_step import NewtonStep
 from gridshell.solve.path import follow
 from gridshell.solve.problem import Problem
 from gridshell.solve.report import Status
@@ -338,6 +340,35 @@ def test_near_a_saddle_newton_finds_it_unless_told_to_descend(descend):
     assert found.report.stable == descend
     if not descend:
         np.testing.assert_allclose(found.state, straight.state, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("steps", "circles"), [
+    ([0.1] * 14, True),
+    ([0.3, 0.1] * 7, True),
+    ([5.0, 4.0] + [0.3, 0.1] * 7, True),
+    ([0.1] * 13, False),
+    ([0.1] * 13 + [0.09995], True),
+    ([0.1] * 13 + [0.09], False),
+    ([0.5**k for k in range(20)], False),
+    ([0.1 * 0.99**k for k in range(20)], False),
+])  # fmt: skip
+def test_steps_that_repeat_themselves_are_told_from_slow_ones(steps, circles):
+    assert mixed_newton._in_circles(steps) == circles
+
+
+def test_a_solve_that_goes_in_circles_is_given_up(monkeypatch):
+    """Where every step is as long as the last, sixty are not waited for."""
+    taken = []
+
+    def take(self, state, forces, descend):
+        taken.append(1)
+        self.iterations += 1
+        return 0.1, state, forces, 1.0
+
+    monkeypatch.setattr(NewtonStep, "take", take)
+    _, found = squeezed_column(8, 0.5)
+    assert found.report.status is Status.STALLED
+    assert len(taken) == mixed_newton.CIRCLES + 2
 
 
 @pytest.mark.parametrize("push", [20, 20.5, 23])

@@ -187,6 +187,17 @@ def test_a_layout_beside_the_target_is_refused():
         )
 
 
+@pytest.mark.parametrize(("method", "status", "times"), [
+    ("gravity", Status.STALLED, 1), ("bound", Status.STALLED, 0), ("gravity", Status.SLID_OFF, 1)
+])  # fmt: skip
+def test_a_drape_by_weight_that_fails_is_told_of_the_bound_one_once(method, status, times):
+    draped = hemisphere_form().draped
+    levels = (replace(draped.report, status=status),)
+    form = replace(hemisphere_form(), draped=replace(draped, method=method, levels=levels))
+    assert form.status.startswith("drape ")
+    assert form.status.count("bound") == times
+
+
 def test_a_wave_that_springs_off_is_advised_seams():
     gap = replace(hemisphere_form().agreement["clamped"], max=0.03 * SIZE)
     (words,) = replace(hemisphere_form(), agreement={"clamped": gap}).warnings

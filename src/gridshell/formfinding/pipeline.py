@@ -64,7 +64,10 @@ class FoundForm:
     def status(self) -> str:
         """ "converged", or which stage stopped and what to do."""
         if not self.draped.converged:
-            return f"drape {self.draped.report.status.sentence}"
+            sentence = self.draped.report.status.sentence
+            weighed = self.draped.method != "bound" and "bound" not in sentence
+            other = ', or use method = "bound", which asks for no weight' if weighed else ""
+            return f"drape {sentence}{other}"
         return _popped_status(self.popped)
 
     @property
@@ -72,7 +75,7 @@ class FoundForm:
         """Sentences that a user should read before anything else."""
         stretched = _stretched(self.draped)
         off = _springs_off(self.agreement, advise=not stretched)
-        built = (*_crowded(self.draped), *_long_tails(self.trimmed))
+        built = (*_crowded(self.draped), *(_long_tails(self.trimmed) if self.draped.converged else ()))
         return (*self.draped.warnings, *stretched, *built, *_popped_warnings(self.popped), *off)
 
 

@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6
+CIRCLES, ALIKE = 12, 1e-3  # steps; and how near to each other
 LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
 
@@ -69,7 +70,7 @@ def find_equilibrium(
     """
     begin = time.perf_counter()
     step = NewtonStep(problem, state, cut=cut)
-    status = Status.STALLED
+    status, steps = Status.STALLED, list[float]()
     while step.iterations + step.counts <= most_iterations:
         new = step.counts
         try:
@@ -85,6 +86,9 @@ def find_equilibrium(
             progress(step.iterations, moved / problem.length)
         if step.settled and mismatch < STRAIN_TOLERANCE:
             status = Status.CONVERGED
+            break
+        steps.append(moved)
+        if _in_circles(steps):
             break
         step.refresh(state)
     gradient = step.gradient(state, forces)
@@ -102,6 +106,12 @@ def find_equilibrium(
     mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     step.refresh(state)
     return Equilibrium(state, forces, gradient, report, step.elements, step.pattern, mode)
+
+
+def _in_circles(steps: list[float]) -> bool:
+    """Whether the last `CIRCLES` steps are as long as those two before: to and fro between two states, for ever."""
+    last = np.array(steps[-CIRCLES - 2 :])
+    return len(last) == CIRCLES + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
 
 
 def find_stable(
