@@ -31,6 +31,7 @@ from gridshell.rods.section import Rod
 from gridshell.targets import Target
 from gridshell.targets.seam import Seam
 
+FOUND = "a form that an earlier gridshell.find_form returned (one read from a folder: run its case.toml again)"
 LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
 
 
@@ -188,7 +189,7 @@ def find_form(
     for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
         require(name, value, kind)
     if start is not None:
-        require("start", start, FoundForm, "a form that an earlier gridshell.find_form returned")
+        require("start", start, FoundForm, FOUND)
     found = find_stages(
         target, layout, rod,
         method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,

@@ -1,10 +1,11 @@
 """Quantities as people write them, "30 mm", "45 deg", "25 GPa", become SI numbers: at the edge only."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
-from math import inf, isfinite
+from math import fmod, inf, isfinite, tau
 from numbers import Real
 from typing import Literal
 
@@ -47,6 +48,7 @@ def _factors(*groups: str) -> dict[str, Decimal]:
     return {spelling: Decimal(factor) for factor, *spellings in rows for spelling in spellings}
 
 
+FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is one in degrees without its unit
 _DEGREE = Decimal("3.14159265358979323846264338327950288") / 180
 
 _KINDS: dict[Kind, _Units] = {
@@ -124,7 +126,10 @@ def parse_quantity(value: object, kind: Kind, key: str) -> float:
 
 
 def read_quantity(value: object, kind: Kind) -> float:
-    """As `parse_quantity`, but raises ValueError with the reason alone: the caller names the key."""
+    """As `parse_quantity`, but raises ValueError with the reason alone: the caller names the key.
+
+    An angle of more than a full turn needs a unit, and is given within one turn.
+    """
     units = _KINDS[kind]
     if isinstance(value, str):
         match = _QUANTITY.fullmatch(value)
@@ -137,7 +142,30 @@ def read_quantity(value: object, kind: Kind) -> float:
         raise ValueError(f"not a number; give {units.wanted}")
     if not isfinite(number):
         raise ValueError(f"not finite; give {units.wanted}")
+    if kind == "angle" and abs(number) > FULL_TURN:
+        if not _unit_of(value):
+            raise ValueError(f'a plain number is in radians, and this is more than a full turn; write "{number:g} deg"')
+        number = fmod(number, tau)
     return number
+
+
+def require_unit_of_all(values: Iterable[object]) -> None:
+    """Of values in one text, as "30, 40 mm", all but zeros have a unit or none has; else ValueError."""
+    texts = [text.strip() for text in values if isinstance(text, str) and _QUANTITY.fullmatch(text)]
+    bare = [text for text in texts if not _unit_of(text) and float(text) != 0]
+    full = [text for text in texts if _unit_of(text)]
+    if bare and full:
+        unit = _unit_of(full[-1])
+        raise ValueError(
+            "only some of these have a unit, and a decimal takes a point, not a comma: give each its own, such as "
+            f'"{bare[0]} {unit}, {full[-1]}"'
+        )
+
+
+def _unit_of(value: object) -> str:
+    """The unit in a text; empty without one."""
+    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    return match[2] if match else ""
 
 
 def read_unit(text: str, kind: Kind) -> Decimal:

@@ -1,6 +1,7 @@
 """The case file: what is left out, what is written back, and what is refused."""
 
 import tomllib
+from math import cos, tau
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,7 @@ def test_an_empty_table_is_written_without_a_gap_in_it() -> None:
     [
         *((name, {}) for name in BUILT_IN if name != "heightfield"),
         ("heightfield", {"target.formula": 'x*y + "é𝑥\\ \x7f\n"', "layout.rotate": "45 deg"}),
-        ("heightfield", {**FORMULA, "target.domain": "rectangle", "target.size": "0.1,7 in"}),
+        ("heightfield", {**FORMULA, "target.domain": "rectangle", "target.size": "0.1 m,7 in"}),
         ("hemisphere", {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm"}),
         ("cap", {"target.base": "-180 mm", "drape.anchor": "0.1,1e-7", "layout.spacing": "17 mm, 31 mm"}),
         ("hemisphere", {"drape.method": "gravity", "pop_up.ends": "clamped", "layout.rods": "auto"}),
@@ -223,6 +224,25 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ),
         ('target = { kind = "heightfield", formula = "x", domain = "square" }', '"disc" or "rectangle"'),
         ("target = ", "dome.toml is not valid TOML"),
+        ("layout.rotate = 30", "layout.rotate = 30: a plain number is in radians, and this is more than a full turn; "),
+        ('[target]\nkind = "mesh"\nfile = "a.obj"\nturn = [0, 0, 30]', "third value: a plain number is in radians"),
+        (
+            'layout.spacing = "700,5 mm"',
+            'a decimal takes a point, not a comma: give each its own, such as "700 mm, 5 mm"',
+        ),
+        ('layout.offset = "10 mm, 20"', "only some of these have a unit"),
+        ('[target]\nkind = "mesh"\nfile = "a.obj"\nmove = "1,0,2 m"', "only some of these have a unit"),
+        ('seams.lines = "0, -1000; 0, 1000 mm"', "only some of these have a unit"),
+        ("drape.friction = 0.3", 'method "bound" has no friction: leave it out, or set drape.method to "paper"'),
+        ("drape.gravity = 1.6", 'has no gravity: leave it out, or set drape.method to "gravity" or "paper"'),
+        ('drape = { method = "gravity", height = "1 m" }', 'method "gravity" has no height'),
+        ('drape = { method = "paper", C1 = 3 }', 'coupling "shared" has no springs'),
+        ('seams.unit = "mm"', "seams.unit is the unit of seams.file, which is missing"),
+        ('seams.patches = [{ name = "B" }]', "seams.patches needs seams"),
+        ('seams.patches = "B"', 'seams.patches = "B": give tables in a case file, such as [{ name'),
+        ("seams.patches = [3]", "seams.patches.0 = 3: give tables"),
+        ("seams.patches = [{ rotate = 1 }]", "seams.patches.0.name is missing: give the name of the patch"),
+        ("seams.patches = [{ name = 1 }]", "seams.patches.0.name = 1: must be text, the name of the patch"),
     ],
 )
 def test_a_bad_case_is_refused_in_one_clear_sentence(load: Any, text: str, message: str) -> None:
@@ -261,6 +281,26 @@ def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"\xff\xfe[target]")
     with pytest.raises(InputError, match="save it as UTF-8"):
         load_case(path)
+
+
+def test_a_file_of_another_type_is_named_with_what_would_do(tmp_path: Path) -> None:
+    for name, content in (("roof.skp", b"\xff\xfe\x00"), ("make.py", b"import gridshell")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(
+            InputError, match=rf"unknown file type \{Path(name).suffix}; use a case \(.toml\) or a surf"
+        ):
+            load_case(tmp_path / name)
+
+
+def test_a_folder_is_answered_with_a_file_that_is_in_it(tmp_path: Path) -> None:
+    for name, said in (
+        ("notes.txt", r"give a case \(.toml\) or a surface \(.obj, "),
+        ("roof.obj", r"such as .*roof\.obj$"),
+        ("zoo.toml", r"such as .*zoo\.toml$"),
+    ):
+        (tmp_path / name).write_text("")
+        with pytest.raises(InputError, match=said):
+            load_case(tmp_path)
 
 
 def test_a_byte_order_mark_is_no_obstacle(tmp_path: Path) -> None:
@@ -309,7 +349,7 @@ def test_a_height_field_gets_its_formula_and_its_domain(monkeypatch: pytest.Monk
     monkeypatch.setattr(targets, "HeightField", lambda **given: given, raising=False)
     disc = load_case("heightfield", {"target.formula": "x*y"}).target.build()
     assert disc == {"formula": "x*y", "domain": targets.Disc(0.2)}
-    overrides = {"target.formula": "x*y", "target.domain": "rectangle", "target.size": "0.4, 300 mm"}
+    overrides = {"target.formula": "x*y", "target.domain": "rectangle", "target.size": "0.4 m, 300 mm"}
     plan = load_case("heightfield", overrides).target.build()
     assert plan == {"formula": "x*y", "domain": targets.Rectangle((0.4, 0.3))}
 
@@ -326,6 +366,75 @@ def test_values_that_do_not_fit_together_are_refused_when_built(overrides: dict[
     case = load_case("hemisphere", overrides)
     with pytest.raises(InputError):
         case.build()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"drape.objective": "gap"}, "nothing is searched for: set drape.anchor or layout.rotate"),
+        ({"fabrication.kerf": "3 mm"}, "kerf of 0.003 m is lost where stock is cut: give its stock_length"),
+        (
+            {"fabrication.stock_length": "1 mm"},
+            "fabrication.stock_length = 0.001: shorter than the 30 mm between joints",
+        ),
+    ],
+)
+def test_what_would_do_nothing_is_refused_before_the_job(overrides: dict[str, object], message: str) -> None:
+    case = load_case("hemisphere", overrides)
+    with pytest.raises(InputError) as caught:
+        case.build(), case.takeaway()
+    assert message in str(caught.value)
+
+
+def test_seams_have_no_objective() -> None:
+    case = load_case("hemisphere", {"seams.lines": "-1,0;1,0", "layout.rotate": "auto", "drape.objective": "gap"})
+    with pytest.raises(InputError, match=r"drape\.objective"):
+        case.build_sewn()
+
+
+def test_a_patch_of_finer_spacing_may_have_shorter_stock() -> None:
+    seams = {"seams.lines": "-1,0;1,0", "seams.patches": [{"name": "A", "spacing": "8 mm"}]}
+    load_case("hemisphere", {**seams, "layout.edge": "5 mm", "fabrication.stock_length": "10 mm"}).build_sewn()
+
+
+def test_another_method_keeps_what_it_uses_alone(load: Any) -> None:
+    fall = '[drape]\nmethod = "paper"\ngravity = 3\nfriction = 0.3\ncoupling = "implicit"\nC1 = 5\n'
+    assert load(fall).drape.C1 == 5
+    hung = load(fall, {"drape.method": "gravity"}).drape
+    assert (hung.gravity, hung.friction, hung.coupling, hung.C1) == (3, 0, "shared", None)
+    assert load(fall, {"drape.method": "bound"}).drape == load("").drape
+    with pytest.raises(InputError, match="has no friction"):
+        load(fall, {"drape.method": "gravity", "drape.friction": 0.1})
+
+
+def test_a_found_anchor_leaves_a_case_that_can_be_run_again(load: Any) -> None:
+    asked = load_case("hemisphere", {"drape.anchor": "auto", "drape.objective": "gap"})
+    asked.build()
+    load(asked.decided((0.0, 0.0), 0.1).to_toml()).build()
+
+
+@pytest.mark.parametrize(
+    ("text", "spacing"),
+    [("300 mm, 40 mm", (0.3, 0.04)), ("0.3,0.4", (0.3, 0.4)), ("0.3 m,40 mm", (0.3, 0.04)), ("5 mm", (0.005, 0.005))],
+)
+def test_pairs_are_read_where_all_values_have_a_unit_or_none(text: str, spacing: tuple[float, float]) -> None:
+    assert load_case("hemisphere", {"layout.spacing": text}).layout.spacing == spacing
+
+
+def test_a_zero_needs_no_unit_beside_others() -> None:
+    assert load_case("hemisphere", {"layout.offset": "0, 5 mm"}).layout.offset == (0.0, 0.005)
+
+
+@pytest.mark.parametrize("angle", [7.0, -30.0, 0.3])
+def test_a_case_of_python_objects_can_be_read_again_whatever_its_angle(load: Any, angle: float) -> None:
+    import gridshell as gs
+    from gridshell.case.of import case_text
+
+    layout = gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02, rotate=angle)
+    rod = gs.Rod(gs.Circle(radius=1e-3), gs.Material(youngs_modulus=1e6, density=1e3))
+    case = load(case_text(gs.Hemisphere(radius=0.2), layout, rod, joint=gs.Ball(), gravity=3.0))
+    assert cos(case.layout.rotate - angle) == pytest.approx(1)
+    assert abs(case.layout.rotate) < tau
 
 
 def test_each_key_has_one_line_of_help() -> None:

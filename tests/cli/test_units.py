@@ -25,6 +25,9 @@ from gridshell.units import Kind, length_text, parse_quantity
         ("45 deg", "angle", math.pi / 4),
         ("90°", "angle", math.pi / 2),
         ("0.5 rad", "angle", 0.5),
+        (6.2832, "angle", 6.2832),
+        ("360 deg", "angle", 2 * math.pi),
+        ("-540 deg", "angle", -math.pi),
         ("1 MPa", "stress", 1e6),
         ("25 GPa", "stress", 25e9),
         ("3 N/mm²", "stress", 3e6),
@@ -100,3 +103,9 @@ def test_a_length_as_it_is_shown_can_be_read_again(length: float) -> None:
 )
 def test_a_length_is_shown_in_the_unit_that_reads_well(length: float, text: str) -> None:
     assert length_text(length) == text
+
+
+@pytest.mark.parametrize(("value", "written"), [(30, "30 deg"), ("-7", "-7 deg"), (6.31, "6.31 deg")])
+def test_degrees_without_their_unit_are_no_radians(value: object, written: str) -> None:
+    with pytest.raises(InputError, match=f'= .*: a plain number is in radians, .* full turn; write "{written}"'):
+        parse_quantity(value, "angle", "layout.rotate")

@@ -105,6 +105,47 @@ def test_splices_are_the_fewest_and_then_the_least_bent(at: list[int], stock: in
     assert max(np.interp(made, places, curvature), default=0.0) == pytest.approx(min(worst))
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(1, 30), min_size=2, max_size=7, unique=True), st.integers(8, 40), st.randoms())
+def test_of_the_fewest_pieces_the_fewest_are_short_and_then_the_bend_counts(
+    at: list[int], stock: int, random: object
+) -> None:
+    joints, length, short = sorted(float(one) for one in at), 32.0, 6.0
+    places = np.linspace(0, length, 33)
+    curvature = np.array([random.random() for _ in places])  # type: ignore[attr-defined]
+
+    def cost(way: tuple[float, ...]) -> tuple[int, int, float]:
+        pieces = np.diff([0.0, *way, length])
+        return len(way), int((pieces < short).sum()), max(np.interp(way, places, curvature), default=0.0)
+
+    made = splices(length, joints, float(stock), places=places, curvature=curvature, short=short)
+    ways = choices(length, joints, float(stock))
+    assert (made is None) == (not ways)
+    if made is not None:
+        assert cost(tuple(made)) == pytest.approx(min(map(cost, ways)))
+
+
+@pytest.mark.parametrize(("rods", "pieces"), [(1, [2.0, 4.0, 5.0]), (3, [1.0, 5.0, 5.0])])
+def test_short_pieces_are_avoided_where_that_takes_no_more_bars(rods: int, pieces: list[float]) -> None:
+    """Rods of 11 m from bars of 5 m: the least bend splices at 5 and 6 m, the next at 4 and 6 m.
+
+    Of one rod both ways take three bars. Of three the pieces of 1 m share a bar, and those of 2 m do not: 7 and not 8.
+    """
+    long = [[[0.0, 0.02 * k], [11.0, 0.02 * k]] for k in range(rods)]
+    mesh = mesh_grid(straight_rods([*long, *([[x + 0.5, -0.01], [x + 0.5, 0.05]] for x in range(11))]), 0.5)
+    bend = np.ones(len(mesh.rod_nodes))
+    for k, rod in enumerate(mesh.grid.rods[:rods]):
+        at = mesh.stations[mesh.rod_slice(k)] - rod.start
+        bend[mesh.rod_slice(k)] = [
+            next((b for b, s in ((0, (5, 6)), (0.5, (4,))) if np.isclose(x, s).any()), 1) for x in at
+        ]
+    made = fabricate(mesh, ROD, Fabrication(stock_length=5.0), curvature=bend)
+    for k in range(rods):
+        assert sorted(length for rod, _, length in made.pieces if rod == k) == pytest.approx(pieces)
+    assert made.nesting is not None
+    assert len(made.nesting.bars) == (3 if rods == 1 else 7)
+
+
 def test_a_rod_within_its_stock_is_not_spliced() -> None:
     assert splices(1.0, [0.2, 0.4], 1.0, places=[0.0, 1.0], curvature=[0.0, 0.0]) == []
 
@@ -158,19 +199,20 @@ def test_lengths_of_the_workshop_add_up() -> None:
 def test_stock_that_is_too_short_is_said() -> None:
     made = fabricate(mesh_grid(lattice(), 0.05), ROD, Fabrication(stock_length=0.08))
     assert made.nesting is None
-    assert made.warnings[0].startswith("9 rods (the first: U01) cannot be spliced between joints from stock of 0.08 m")
+    assert made.warnings[0].startswith("9 rods (the first: U01) cannot be spliced between joints from stock of 80 mm")
 
 
 def test_one_rod_that_cannot_be_spliced_is_named_alone() -> None:
     long = [[-0.3, 0.0], [0.3, 0.0]]
     grid = gs.straight_rods([long, *([[x, -0.03], [x, 0.03]] for x in np.linspace(-0.3, 0.3, 5))])
     made = fabricate(mesh_grid(grid, 0.02), ROD, Fabrication(stock_length=0.08))
-    assert made.warnings == ("rod R01 cannot be spliced between joints from stock of 0.08 m: give longer stock",)
+    assert made.warnings == ("rod R01 cannot be spliced between joints from stock of 80 mm: give longer stock",)
 
 
 @pytest.mark.parametrize(
     ("options", "reason"),
     [({"end_allowance": -0.01}, "end allowance"), ({"kerf": float("nan")}, "kerf"),
+     ({"kerf": 0.003}, "kerf of 0.003 m is lost where stock is cut: give its stock_length"),
      ({"stock_length": 0.0}, "stock of 0.0 m"), ({"stock_length": 0.002, "kerf": 0.003}, "longer bars")],
 )  # fmt: skip
 def test_lengths_that_cannot_be_are_refused(options: dict[str, float], reason: str) -> None:

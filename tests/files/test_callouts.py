@@ -81,8 +81,9 @@ def test_no_line_to_a_name_crosses_another_or_runs_through_a_name(name: str) -> 
     made = formed(name)
     plan = flat_plan(made)
     drawing = supports_drawing(made, plan, plan.text)
-    lines = [path.points for path in drawing.paths if path.layer == "DIM" and len(path.points) == 3]
-    lines = [line for line in lines if np.linalg.norm(np.diff(line, axis=0), axis=1).max() < 30 * plan.text]
+    ends = np.array([made.states[made.final or ""][rod.nodes[[0, -1]], :2] for rod in plan.rods]).reshape(-1, 2)
+    lines = [path.points for path in drawing.paths if path.layer == "DIM" and path.flat]
+    lines = [line for line in lines if np.linalg.norm(1e3 * ends - line[0], axis=1).min() < 1e-6]
     apart = [(a, b) for a, b in combinations(lines, 2) if np.linalg.norm(a[0] - b[0]) > 1.0]
     assert len(lines) >= len(supports_of(made))
     assert not [1 for a, b in apart if cross(a, b)]

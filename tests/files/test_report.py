@@ -178,7 +178,7 @@ def test_no_more_is_said_of_the_way_up_than_was_followed(
     assert re.findall(r">(on the way up[^<]*)</th>", page) == ([head] if head else [])
     lines = [line for line in made.summary().splitlines() if line.startswith("  bending   way up")]
     assert len(lines) == (head is not None)
-    assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)
+    assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)  # as the warning has it
 
 
 def test_a_way_up_that_nobody_followed_is_not_included() -> None:
@@ -230,7 +230,10 @@ def test_every_number_of_a_material_has_its_unit() -> None:
     ("rod", "line"),
     [(ROD, "circle, radius 1 mm; E = 1 MPa, 1000 kg/m3 (the paper's rubber; for another: rod.material)"),
      (gs.Rod(gs.Tube(0.02, 0.003), gs.Material(25e9, 1900.0)),
-      "tube, radius 20 mm, thickness 3 mm; E = 25 GPa, 1900 kg/m3"),
+      "tube, radius 20 mm, thickness 3 mm; E = 25 GPa, 1900 kg/m3 (Poisson's ratio is the paper's rubber's; "),
+     (gs.Rod(gs.Circle(0.02), gs.Material(11e9, 1000.0)),
+      "circle, radius 20 mm; E = 11 GPa, 1000 kg/m3 (density and Poisson's ratio are the paper's rubber's; for"),
+     (gs.Rod(gs.Circle(0.02), gs.Material(25e9, 1900.0, 0.3)), "circle, radius 20 mm; E = 25 GPa, 1900 kg/m3"),
      (gs.Rod(gs.RectangularSection(0.012, 0.05), gs.Material(11e9, 470.0, shear=0.69e9)),
       "rectangle, width 12 mm, height 50 mm; E = 11 GPa, 470 kg/m3"),
      (gs.Rod(gs.GivenSection(1e6, 20.0, 30.0, 5.0)), "given, EA 1000000 N, EI1 20 N m\N{SUPERSCRIPT TWO}")],
@@ -240,7 +243,24 @@ def test_the_summary_names_the_rod(rod: gs.Rod, line: str) -> None:
     text = replace(made, result={**made.result, "rod": rod_table(rod)}).summary()
     (said,) = [one for one in text.splitlines() if one.startswith("  rod ")]
     assert said.startswith(f"  rod       {line}")
-    assert said.endswith("rod.material)") == (rod is ROD)
+    assert said.endswith("rubber's; for another: rod.material)") == ("rubber's;" in line)
+    assert said.endswith("rod.material)") == ("rubber" in line)
+
+
+def test_lengths_with_allowances_are_told_from_those_without() -> None:
+    for made, added in ((archive("dome"), 0.0), (wished(), 0.024)):
+        plan = flat_plan(made)
+        cut = dict(dict(key_figures(made.result, plan))["Cut list"])
+        (bare,) = (float(text.split()[0]) for name, text in cut.items() if name.startswith("longest rod"))
+        assert ("longest rod, without allowances" in cut) == plan.summary.endswith(", with allowances") == (added > 0)
+        assert f"longest {bare + 1e3 * added:.1f} mm" in plan.summary
+
+
+def test_the_page_says_that_the_fewest_bars_are_a_bound(tmp_path: Path) -> None:
+    stock = wished().result["fabrication"]["stock"]
+    page = " ".join(page_of(wished(), tmp_path).read_text().split())
+    assert f"{len(stock['bars'])} bars, " in page
+    assert f"total length alone it takes {stock['fewest']} bars; that is a bound" in page
 
 
 def test_a_grid_that_rests_on_its_target_tells_depth_and_not_gap() -> None:

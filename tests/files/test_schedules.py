@@ -40,7 +40,7 @@ def test_the_sharpest_bend_is_that_of_the_rod_s_own_nodes(tables: dict[str, list
         assert strain >= 1.0 / float(row["min_radius_mm"]) * 0.999  # a rod of 1 mm radius, and some axial strain
         assert float(row["max_stress_MPa"]) == pytest.approx(strain, rel=1e-2)  # E = 1 MPa
         assert float(row["max_stress_pop_up_MPa"]) >= float(row["max_stress_MPa"])
-        assert float(row["utilisation"]) == pytest.approx(float(row["max_stress_pop_up_MPa"]) / 0.02, abs=1e-3)
+        assert float(row["utilisation_pop_up"]) == pytest.approx(float(row["max_stress_pop_up_MPa"]) / 0.02, abs=1e-3)
 
 
 def test_the_rod_of_the_higher_layer_lies_over_the_other(tables: dict[str, list[dict[str, str]]]) -> None:
@@ -112,5 +112,5 @@ def test_without_wishes_there_is_no_stock_and_no_utilisation(tmp_path: Path) -> 
     names = export(archive("ridge"), tmp_path, ["csv"])
     assert "schedule/stock.csv" not in names
     rows = list(csv.DictReader(io.StringIO((tmp_path / "schedule/rods.csv").read_text())))
-    assert all(row["utilisation"] == row["splices_at_mm"] == "" for row in rows)
+    assert all(row["utilisation_pop_up"] == row["splices_at_mm"] == "" for row in rows)
     assert all(row["cut_length_mm"] == row["length_mm"] for row in rows)

@@ -10,6 +10,7 @@ import gridshell as gs
 from gridshell.case import load_case
 from gridshell.cli import main
 from gridshell.targets import Freeform
+from gridshell.targets.curvefile import read_curves
 from tests.acceptance.targets_broken import WRITERS, broken_files, called
 from tests.targets.meshes import PARTS, Mesh
 
@@ -172,6 +173,40 @@ def test_broken_files_are_refused_in_one_sentence(tmp_path):
     for what, arguments in list(broken_files(tmp_path))[3::10]:
         result = called(what, arguments, tmp_path / "out")
         assert not result.wrong, (what, result)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("noise.stl", bytes(range(255, 0, -1)) * 9),
+        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999\n"),
+        ("short.ply", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                      b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0\n1\n"),
+        ("noise.off", b"OFF\n3 1 0\n0 0 0\n1 0 x\n"),
+        ("noise.glb", b"glTF" + bytes(range(200))),
+    ],
+)  # fmt: skip
+def test_what_went_wrong_inside_a_reader_is_not_the_users_business(name, content, tmp_path):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(gs.InputError) as caught:
+        gs.surface_from(path, unit=1.0)
+    assert f"cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export" in str(
+        caught.value
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [("noise.dxf", b"\x00\xff noise", "drawing of curves: it is damaged or of another format; export it anew"),
+     ("beyond.obj", b"v 0 0 0\nl 1 2 99999\n", "drawing of curves: it is damaged or of another format; export it anew"),
+     ("no.dxf", None, "give the path of one that is there")],
+)  # fmt: skip
+def test_curves_that_cannot_be_read_are_refused_in_plain_words(name, content, said, tmp_path):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(gs.InputError, match=said):
+        read_curves(tmp_path / name, 1.0)
 
 
 def test_saved_case_of_a_relative_file_runs_again_from_elsewhere(tmp_path, monkeypatch):

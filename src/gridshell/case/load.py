@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from gridshell.case.keys import BY_KIND, case_keys, case_tables
-from gridshell.case.schema import Case
+from gridshell.case.schema import IDLE, Case
 from gridshell.case.sentences import not_a_table, sentence, unknown_key
 from gridshell.errors import InputError
 from gridshell.units import shown
@@ -39,6 +39,8 @@ BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
 BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
 """Kinds of targets by the file that holds them: the file alone is a case."""
 
+CASE_FILE = ".toml"
+FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
 
@@ -93,6 +95,10 @@ def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
             for key in case_keys().values():
                 if key.table == path and key.kinds and kind not in key.kinds:
                     table.pop(key.name, None)
+    method = overrides.get("drape.method")
+    if method is not None and method != raw["drape"].get("method", "bound"):
+        for name in IDLE.get(str(method), ()):
+            raw["drape"].pop(name, None)
     domain, target = overrides.get("target.domain"), raw["target"]
     if domain is not None and domain != target.get("domain", "disc"):
         for name in ("radius", "size"):
@@ -106,7 +112,7 @@ def _read(name_or_path: str | PathLike[str]) -> Raw:
     if kind := BY_SUFFIX.get(path.suffix.lower()):
         return {"target": {"kind": kind, "file": name}}
     if path.is_dir():
-        raise InputError(f"{name} is a folder: give a case file, such as {path / 'case.toml'}")
+        raise InputError(f"{name} is a folder: give {_wanted_in(path)}")
     if not path.exists():
         near = get_close_matches(name, BUILT_IN, n=1)
         hint = f"did you mean {near[0]}?" if near else f"give a case file, a surface, or one of {', '.join(BUILT_IN)}"
@@ -116,9 +122,23 @@ def _read(name_or_path: str | PathLike[str]) -> Raw:
     except OSError as reason:
         raise InputError(f"{name} cannot be read: {reason.strerror}") from None
     except UnicodeDecodeError:
-        raise InputError(f"{name} is not text in UTF-8: save it as UTF-8") from None
+        raise InputError(_unknown_type(path) or f"{name} is not text in UTF-8: save it as UTF-8") from None
     except tomllib.TOMLDecodeError as reason:
-        raise InputError(f"{name} is not valid TOML: {reason}") from None
+        raise InputError(_unknown_type(path) or f"{name} is not valid TOML: {reason}") from None
+
+
+def _unknown_type(path: Path) -> str:
+    """What is wrong with a file that holds no case, if its name does not say that it does."""
+    if path.suffix.lower() in ("", CASE_FILE):
+        return ""
+    return f"{path}: unknown file type {path.suffix}; use {FILES}"
+
+
+def _wanted_in(folder: Path) -> str:
+    """The first file in a folder that could be meant, a case before a surface; without one, what could be."""
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (CASE_FILE, *BY_SUFFIX))
+    files.sort(key=lambda path: path.suffix.lower() != CASE_FILE)
+    return f"a file in it, such as {files[0]}" if files else FILES
 
 
 def _beside(path: Path, raw: Raw) -> Raw:

@@ -1,5 +1,6 @@
 """The case file of objects that were made in Python."""
 
+from math import fmod, tau
 from typing import Any
 
 from gridshell.case.schema import Case
@@ -26,20 +27,24 @@ def case_text(
     sewn: SewnForm | None = None,
 ) -> str:
     """A case file that gives these objects again; of a target that is a Python function, a note that says so."""
-    shape = target.parameters()
+    shape: dict[str, Any] = target.parameters()
     if "function" in shape:
         return f"# the target was the Python function {shape['function']}: no case file can give it again\n"
     if "vertices" in shape:
         return (
             f"# the target was a mesh of {shape['vertices']} vertices made in Python: no case file can give it again\n"
         )
-    drape: dict[str, Any] = {"method": method, "gravity": gravity, **(fall.parameters() if fall else {})}
+    if "turn" in shape:
+        shape = {**shape, "turn": [_within_a_turn(angle) for angle in shape["turn"]]}
+    drape: dict[str, Any] = {"method": method, **(fall.parameters() if fall else {})}
+    if method != "bound":
+        drape["gravity"] = gravity
     if anchor is not None:
         drape["anchor"] = anchor
     case = Case.model_validate(
         {
             "target": shape,
-            "layout": layout.parameters(),
+            "layout": {**layout.parameters(), "rotate": _within_a_turn(layout.rotate)},
             "rod": rod.parameters(),
             "joint": joint_parameters(joint),
             "drape": drape,
@@ -48,3 +53,8 @@ def case_text(
         }
     )
     return case.to_toml()
+
+
+def _within_a_turn(angle: float) -> float:
+    """The angle [rad] as a case file has it; one within a turn to the last bit."""
+    return fmod(angle, tau)

@@ -5,7 +5,7 @@ Those of targets, and of rods and joints, have modules of their own.
 
 from math import floor, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -37,7 +37,7 @@ from gridshell.case.values import (
     unit,
 )
 from gridshell.errors import InputError
-from gridshell.units import shown
+from gridshell.units import length_text, shown
 
 if TYPE_CHECKING:
     from gridshell.formfinding.fall import Fall
@@ -69,6 +69,11 @@ class LayoutTable(Table):
         return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "rotate": rotate})
 
 
+FALLING = ("height", "coupling", "C1", "C2", "time_step", "duration", "friction", "drag", "frames")
+IDLE: dict[str, tuple[str, ...]] = {"bound": ("gravity", *FALLING), "gravity": FALLING, "paper": ()}
+"""Keys of [drape] that a method does not use."""
+
+
 class DrapeTable(Table):
     method: Literal["bound", "gravity", "paper"] = Field(
         default="bound", description="slide on the target, hang on it at rest, or fall on it in time"
@@ -91,6 +96,22 @@ class DrapeTable(Table):
     friction: Share = Field(default=0.0, description="Coulomb's coefficient between falling rods and target")
     drag: Share = Field(default=0.0, description="rate in 1/s at which falling rods lose velocity to the air")
     frames: str | None = Field(default=None, description="folder for the frames of a fall; default: none are kept")
+
+    @model_validator(mode="after")
+    def _uses_all(self) -> Self:
+        for name in IDLE[self.method]:
+            methods = " or ".join(f'"{method}"' for method in IDLE if name not in IDLE[method])
+            self._refuse(name, f'method "{self.method}" has no {name}: leave it out, or set drape.method to {methods}')
+        if self.coupling == "shared":
+            for name in ("C1", "C2"):
+                springs = 'leave it out, or set drape.coupling to "implicit" or "explicit"'
+                self._refuse(name, f'coupling "shared" has no springs: {springs}')
+        return self
+
+    def _refuse(self, name: str, why: str) -> None:
+        """ValueError where a key that does nothing is set."""
+        if getattr(self, name) != type(self).model_fields[name].default:
+            raise ValueError(f"drape.{name} = {shown(getattr(self, name))}: {why}")
 
     def fall(self) -> "Fall":
         """How the paper's method falls."""
@@ -145,6 +166,14 @@ class SeamsTable(Table):
         except InputError as reason:
             raise InputError(f"seams.file = {shown(given['file'])}: {reason}") from None
         return {**rest, "lines": [*polylines(given.get("lines", ())), *(line[:, :2].tolist() for line in drawn)]}
+
+    @model_validator(mode="after")
+    def _uses_all(self) -> Self:
+        if self.unit != 1.0:  # with a file there is none left
+            raise ValueError("seams.unit is the unit of seams.file, which is missing: leave it out, or give the file")
+        if self.patches and not self.lines:
+            raise ValueError("seams.patches needs seams: give seams.lines or seams.file, or leave it out")
+        return self
 
     def own(self) -> "dict[str, PatchLayout]":
         """What patches have of their own, by name.
@@ -240,8 +269,8 @@ class Case(Table):
         return "auto" in (self.drape.anchor, self.layout.rotate)
 
     def decided(self, anchor: tuple[float, float], rotate: float) -> "Case":
-        """The same case with its anchor [m] and heading [rad]."""
-        drape = self.drape.model_copy(update={"anchor": anchor})
+        """The same case with its anchor [m] and heading [rad]: nothing is left to an objective."""
+        drape = self.drape.model_copy(update={"anchor": anchor, "objective": "shear"})
         return self.headed(rotate).model_copy(update={"drape": drape})
 
     def headed(self, rotate: float) -> "Case":
@@ -257,12 +286,29 @@ class Case(Table):
         """
         ends = ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
         drape = self.drape
+        if drape.objective != "shear" and not self.undecided:
+            raise InputError(
+                f"drape.objective = {shown(drape.objective)}: nothing is searched for: set drape.anchor or "
+                'layout.rotate to "auto", or leave it out'
+            )
         anchor = None if drape.anchor == "auto" else drape.anchor
         options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "gravity": drape.gravity, "ends": ends}
         options["fall"] = drape.fall() if drape.method == "paper" else None
         options["joint"] = self.joint.build()
         target = self.target.build()
-        return Built(target, self.layout.build(target), self.rod.sized(target).build(), options)
+        layout = self.layout.build(target)
+        self._require_stock(layout)
+        return Built(target, layout, self.rod.sized(target).build(), options)
+
+    def _require_stock(self, layout: "GridLayout") -> None:
+        """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
+        own = [patch.spacing for patch in self.seams.patches if patch.spacing is not None]
+        shortest, stock = min(map(min, (layout.spacing, *own))), self.fabrication.stock_length
+        if stock is not None and stock < shortest:
+            raise InputError(
+                f"fabrication.stock_length = {shown(stock)}: shorter than the {length_text(shortest)} between joints, "
+                "of which no rod could be spliced: give longer stock"
+            )
 
     def build_sewn(self) -> Built:
         """The same of a case with seams; the options are those of `gridshell.sew`.
@@ -278,6 +324,7 @@ class Case(Table):
             ("layout.offset", self.layout.offset, (0.0, 0.0), f"{patches}: leave it out"),
             ("drape.method", self.drape.method, "bound", 'seams need the bound drape: use "bound", or no seams'),
             ("drape.anchor", self.drape.anchor, None, f"{patches}: leave it out, or give it in seams.patches"),
+            ("drape.objective", self.drape.objective, "shear", "with seams the fewest rods are left out: leave it out"),
         ):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from gridshell.case.keys import BY_KIND, CaseKey, case_keys, case_tables
+from gridshell.case.schema import PatchTable
 from gridshell.units import shown
 
 NOT_YET: dict[str, tuple[str, ...]] = {}
@@ -23,7 +24,7 @@ def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
         case "extra_forbidden":
             return unknown_key(path, value, raw)
         case "missing":
-            return f"{path} is missing: give the {case_keys()[path].help}"
+            return f"{path} is missing: give the {_help(path)}"
         case "literal_error":
             return _not_a_choice(case_keys()[path], value)
         case "union_tag_invalid":
@@ -32,7 +33,10 @@ def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
             reason = str(row["ctx"]["error"])
             return reason if path in case_tables() else f"{path} = {shown(value)}: {reason}"
         case "string_type":
-            return f"{path} = {shown(value)}: must be text, the {case_keys()[path].help}"
+            return f"{path} = {shown(value)}: must be text, the {_help(path)}"
+        case "tuple_type" | "model_type":
+            example = '[{ name = "B", rotate = "10 deg" }]'
+            return f"{path} = {shown(value)}: give tables in a case file, such as {example}"
     return f"{path} = {shown(value)}: {row['msg']}"
 
 
@@ -51,6 +55,13 @@ def unknown_key(path: str, value: object, raw: Mapping[str, Any]) -> str:
     if table in case_tables():
         return f"unknown key {path}: [{table}] has {', '.join(_inside(table))}"
     return f"unknown key {path}: the tables are {', '.join(_inside(''))}"
+
+
+def _help(path: str) -> str:
+    """The line of help of a key; of a key of one patch, without the patch's number."""
+    if path.startswith("seams.patches."):
+        return str(PatchTable.model_fields[path.rpartition(".")[2]].description)
+    return case_keys()[path].help
 
 
 def not_a_table(path: str, value: object) -> str:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import BeforeValidator
 
-from gridshell.units import Kind, read_quantity, wanted
+from gridshell.units import Kind, read_quantity, require_unit_of_all, wanted
 
 Auto = Literal["auto"]
 Reader = Callable[[object], float]
@@ -43,7 +43,7 @@ def pair(reader: Reader, *, one_for_both: bool = False) -> Callable[[object], tu
     """[a, b] or "a, b"; a single value may stand for both."""
 
     def read(value: object) -> tuple[float, float]:
-        items = value.split(",") if isinstance(value, str) else value
+        items = _parted(value)
         if not isinstance(items, list | tuple):
             items = [items]
         if len(items) == 1 and one_for_both:
@@ -54,6 +54,15 @@ def pair(reader: Reader, *, one_for_both: bool = False) -> Callable[[object], tu
         return _named("first", reader, items[0]), _named("second", reader, items[1])
 
     return read
+
+
+def _parted(value: object) -> object:
+    """The values of a text "a, b", which all have a unit or none has; anything else as it is."""
+    if not isinstance(value, str):
+        return value
+    items = value.split(",")
+    require_unit_of_all(items)
+    return items
 
 
 def _named(which: str, reader: Reader, item: object) -> float:
@@ -67,7 +76,7 @@ def triple(kind: Kind) -> Callable[[object], tuple[float, ...]]:
     """[a, b, c] or "a, b, c"."""
 
     def read(value: object) -> tuple[float, ...]:
-        items = value.split(",") if isinstance(value, str) else value
+        items = _parted(value)
         if not isinstance(items, list | tuple) or len(items) != 3:
             raise ValueError(f"needs three values, along or about x, y and z; each is {wanted(kind)}")
         return tuple(_named(which, quantity(kind), item) for which, item in zip(_ORDER, items, strict=True))
@@ -148,7 +157,10 @@ def poisson_ratio(value: object) -> float:
 
 def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
     """Rows of points of the plan: [[[x, y], [x, y]], ...], or "x, y; x, y | x, y; x, y"."""
-    rows = [row.split(";") for row in value.split("|")] if isinstance(value, str) else value
+    rows = value
+    if isinstance(value, str):
+        rows = [row.split(";") for row in value.split("|")]
+        require_unit_of_all(re.split("[|;,]", value))
     if not isinstance(rows, list | tuple) or not all(isinstance(row, list | tuple) and len(row) > 1 for row in rows):
         raise ValueError('give rows of two points or more, such as [[[-1, 0], [1, 0]]] or "-1, 0; 1, 0 | 0, -1; 0, 1"')
     return tuple(tuple(pair(quantity("length"))(point) for point in row) for row in rows)

@@ -52,7 +52,7 @@ class Checks:
             return way
         return (
             *way,
-            f"bending strains the rods by {100 * max(bends):.0f} %: they are too thick for their bends, the theory of "
+            f"bending strains the rods by {100 * max(bends):.2g} %: they are too thick for their bends, the theory of "
             f"thin rods holds up to {100 * THIN:.0f} % or so; use thinner rods or a larger target",
         )
 

@@ -1,6 +1,7 @@
 """Keys of the case file as options of a command."""
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import click
 
@@ -40,6 +41,14 @@ class CaseOption(click.Option):
 
 class CaseCommand(click.Command):
     """A command with options for keys, shown table by table."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As click does, but no option takes the next option as its value."""
+        options = {name: option for option in self.params if isinstance(option, click.Option) for name in option.opts}
+        for name, value in pairwise(args):
+            if name in options and not options[name].is_flag and value in options:
+                raise click.UsageError(f"{name} needs a value, but {value} follows", ctx)
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         sections = dict[str, list[tuple[str, str]]]()

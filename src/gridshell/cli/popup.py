@@ -10,6 +10,7 @@ from gridshell.cli.options import CaseCommand, case_options, overrides_of
 from gridshell.cli.outcome import Kept, deliver, output_folder
 from gridshell.cli.progress import Progress, announce_compilation
 from gridshell.errors import InputError
+from gridshell.units import shown
 
 if TYPE_CHECKING:
     from gridshell.cli.rodends import RodEnds
@@ -66,6 +67,8 @@ def _rods_and_the_rest(
         if (path / "case.toml").is_file():
             case = load_case(path / "case.toml", given)
             return ends, case.rod.build(), case.takeaway()
+    elif not path.exists():
+        raise InputError(f"there is no file named {shown(str(path))}: give a table of rods, or the folder of a result")
     elif unit is None:
         raise InputError("--unit is missing: give the unit of the table's coordinates, such as --unit m")
     else:

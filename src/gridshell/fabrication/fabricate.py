@@ -1,6 +1,7 @@
 """All that the workshop needs of a grid, in one call."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,11 @@ from gridshell.fabrication.splices import splices
 from gridshell.layout import GridMesh
 from gridshell.layout.layers import layers
 from gridshell.rods.section import Rod
+from gridshell.units import length_text
 
 Floats = NDArray[np.float64]
+
+SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
 
 
 @dataclass(frozen=True)
@@ -54,14 +58,16 @@ def fabricate(
     lengths = np.array([rod_line.length for rod_line in rods])
     cut = lengths + 2 * options.end_allowance
     made, warnings = _splices(mesh, options, curvature)
-    pieces = tuple(
-        (k, number, piece)
-        for k, at in enumerate(made)
-        for number, piece in enumerate(_pieces(float(lengths[k]), at, options), start=1)
-    )
+    pieces = _pieces_of(lengths, made, options)
     nesting = None
     if options.stock_length is not None and not warnings:
-        nesting = nest([piece for _, _, piece in pieces], options.stock_length, kerf=options.kerf)
+        bars = partial(nest, stock=options.stock_length, kerf=options.kerf)
+        nesting = bars([piece for _, _, piece in pieces])
+        longer, _ = _splices(mesh, options, curvature, short=SHORT)
+        others = _pieces_of(lengths, longer, options)
+        tried = bars([piece for _, _, piece in others])
+        if len(tried.bars) <= len(nesting.bars):
+            made, pieces, nesting = longer, others, tried
     bracing: tuple[Diagonal, ...] = ()
     if final is not None:
         places = (mesh.flat[mesh.joint_nodes], final[mesh.joint_nodes])
@@ -73,9 +79,12 @@ def fabricate(
 
 
 def _splices(
-    mesh: GridMesh, options: Fabrication, curvature: Floats | None
+    mesh: GridMesh, options: Fabrication, curvature: Floats | None, *, short: float = 0.0
 ) -> tuple[tuple[tuple[float, ...], ...], tuple[str, ...]]:
-    """Splices of each rod [m from its start], and a sentence about rods that cannot be spliced."""
+    """Splices of each rod [m from its start], and a sentence about rods that cannot be spliced.
+
+    short : pieces of so many joint distances are avoided.
+    """
     rods, stock = mesh.grid.rods, options.stock_length
     if stock is None:
         return ((),) * len(rods), ()
@@ -86,14 +95,30 @@ def _splices(
         shift = options.end_allowance - rod.start  # from material coordinates to the cut rod
         joints = crossings.at[crossings.rods == k] + shift
         cut = rod.length + 2 * options.end_allowance
-        found = splices(cut, joints, stock, places=mesh.stations[here] + shift, curvature=bend[here])
+        apart = float(np.median(np.diff(np.sort(joints)))) if len(joints) > 1 else 0.0
+        found = splices(
+            cut, joints, stock, places=mesh.stations[here] + shift, curvature=bend[here], short=short * apart
+        )
         if found is None:
             hopeless.append(rod.name)
         made.append(tuple(at - options.end_allowance for at in found or ()))
     if not hopeless:
         return tuple(made), ()
     who = f"rod {hopeless[0]}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {hopeless[0]})"
-    return tuple(made), (f"{who} cannot be spliced between joints from stock of {stock:g} m: give longer stock",)
+    return tuple(made), (
+        f"{who} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock",
+    )
+
+
+def _pieces_of(
+    lengths: Floats, made: tuple[tuple[float, ...], ...], options: Fabrication
+) -> tuple[tuple[int, int, float], ...]:
+    """(rod, number along the rod, length [m]) of every piece."""
+    return tuple(
+        (k, number, piece)
+        for k, at in enumerate(made)
+        for number, piece in enumerate(_pieces(float(lengths[k]), at, options), start=1)
+    )
 
 
 def _pieces(length: float, at: tuple[float, ...], options: Fabrication) -> list[float]:

@@ -22,7 +22,8 @@ class Nesting:
     Parameters
     ----------
     waste : share of the stock that is not in a piece, saw cuts included.
-    fewest : no cutting plan needs fewer bars than this (the pieces' total length over the stock's).
+    fewest : no cutting plan needs fewer bars than this (the pieces' total length over the stock's); a bound, which
+        there need be no plan to reach.
     """
 
     bars: tuple[Bar, ...]

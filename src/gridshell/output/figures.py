@@ -52,7 +52,7 @@ _BENDING: tuple[Entry, ...] = (
     ("Largest strain, bending and axial", "max_strain", wording.percent),
     ("Largest stress, bending and axial", "max_stress", wording.stress),
     ("Utilisation of the strength", "utilisation", wording.percent),
-    ("Sharpest at this share of the way", "share", wording.percent),
+    ("Sharpest at this share of the way", "share", wording.stage),
 )
 _REACTIONS: tuple[Entry, ...] = (
     ("Largest support force", "largest_force", wording.newtons),
@@ -93,7 +93,7 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
         values = [(held.get(column) or {}).get(key) for column in columns]
         if any(value is not None for value in values):
             rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
-    way = f"on the way up above {wording.percent(unknown)}" if unknown else "on the way up"
+    way = f"on the way up above {wording.stage(unknown)}" if unknown else "on the way up"
     heads = [way if column == "pop_up" else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None
 
@@ -134,10 +134,11 @@ def _with_depth(drape: Mapping[str, Any]) -> dict[str, Any]:
 
 def _cut_list(plan: FlatPlan) -> list[Row]:
     lengths = [rod.length for rod in plan.rods]
+    bare = ", without allowances" if plan.allowances else ""
     return [
         ("rods", str(len(plan.rods))),
         ("joints", str(len(plan.joints))),
-        ("all rods together", f"{sum(lengths):.2f} m"),
-        ("longest rod", wording.millimetres(max(lengths, default=None), 5)),
-        ("shortest rod", wording.millimetres(min(lengths, default=None), 5)),
+        (f"all rods together{bare}", f"{sum(lengths):.2f} m"),
+        (f"longest rod{bare}", wording.millimetres(max(lengths, default=None), 5)),
+        (f"shortest rod{bare}", wording.millimetres(min(lengths, default=None), 5)),
     ]

@@ -1,6 +1,6 @@
 """Labels that never cover each other."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,9 @@ Floats = NDArray[np.float64]
 Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
-NEAR, FAR = 14, 150  # places that are tried at an end: where no rod is covered either; at all
+CLOSE = 5  # places that are tried on a label's own line
+STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # beside it
+THIN = 0.1  # what a line takes, over the size of its text
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,13 @@ class Label:
     def box(self, size: float) -> Floats:
         """Corners (4, 2) of the text's box for this text size."""
         return self.written(size).box()
+
+    def leader(self, size: float) -> Floats:
+        """Line (2, 2) from the end to the nearest place of the text's box."""
+        along = np.array([np.cos(self.angle), np.sin(self.angle)])
+        axes = np.array([along, [-along[1], along[0]]])
+        half = 0.5 * size * np.array([LETTER * len(self.text) + 0.2, LINE])
+        return np.array([self.end, self.centre + np.clip(axes @ (self.end - self.centre), -half, half) @ axes])
 
 
 class Room:
@@ -99,36 +108,80 @@ def _extent(box: Floats) -> Extent:
 
 
 def place(texts: Sequence[str], rods: Floats, size: float, *, at: NDArray[np.bool_] | None = None) -> list[Label]:
-    """Labels at both ends of the rods (m, 2, 2); a second end that is too crowded goes without.
+    """Labels at both ends of the rods (m, 2, 2), each on its rod's own line.
+
+    A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
 
     size : of the text, in the unit of `rods`.
     at : (m, 2) whether an end is to have one; default: all.
     """
     placed: list[Label] = []
-    room = Room(4 * size)
+    room, labelled = Room(4 * size), np.zeros(len(rods), dtype=bool)
     wanted = np.ones((len(rods), 2), dtype=bool) if at is None else at
     for end in (0, 1):
         for k in np.flatnonzero(wanted[:, end]).tolist():
-            must = end == 0 or not wanted[k, 0]
-            label = _first_free(texts[k], rods[k, end], rods[k, 1 - end], size, room, rods, must=must)
+            places = _on_own_line(texts[k], rods[k, end], rods[k, 1 - end], size)
+            label = next((one for one in places if fits(one, size, room, rods)), None)
             if label is not None:
                 placed.append(label)
-                room.take(label.box(size))
+                take(label, size, room)
+                labelled[k] = True
+    for k in np.flatnonzero(wanted.any(axis=1) & ~labelled).tolist():
+        end = int(np.argmax(wanted[k]))
+        label = nearby(texts[k], rods[k, end], rods[k, end] - rods[k, 1 - end], size, room, rods)
+        if label is not None:
+            placed.append(label)
+            take(label, size, room)
     return placed
 
 
-def leaders(labels: Sequence[Label], size: float) -> Iterator[Floats]:
-    """Lines (2, 2) from the rods' ends to those labels that stand off, where no other label is in their way."""
-    boxes = [label.box(size) for label in labels]
-    for k, label in enumerate(labels):
-        away = label.centre - label.end
-        near = label.centre - away / np.linalg.norm(away) * size * (0.3 + 0.5 * LETTER * len(label.text))
-        line = np.array([label.end, near])
-        others = (
-            box for j, box in enumerate(boxes) if j != k and np.ptp([box[0], label.centre], axis=0).max() < 80 * size
-        )
-        if label.moved and not any(lines_meet(box, line[None]) for box in others):
-            yield line
+def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: Floats) -> Label | None:
+    """The nearest place to an end for a level text, and for a line to it, clear of all that is taken.
+
+    The text covers none of the lines (m, 2, 2) either, the line to it may cross them.
+
+    way : (2,) to the side that is tried first.
+    """
+    first = float(np.arctan2(way[1], way[0]))
+    half = 0.5 * size * np.array([LETTER * len(text), LINE])
+    for step, turn in ((step, turn) for step in range(STEPS) for turn in TURNS):
+        ray = np.array([np.cos(first + turn), np.sin(first + turn)])
+        to_side = float(np.min(half / np.maximum(np.abs(ray), 1e-12)))  # from the box's middle to its rim
+        label = Label(text, end + ((0.8 + 0.5 * step) * size + to_side) * ray, 0.0, end, moved=True)
+        if fits(label, size, room, lines):
+            return label
+    return None
+
+
+def take(label: Label, size: float, room: Room) -> None:
+    """Take the label's room, and that of the line to it."""
+    room.take(label.box(size))
+    if label.moved:
+        room.take(thin(label.leader(size), THIN * size))
+
+
+def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
+    """Whether a label, which is to cover none of the lines, and the line to it find room."""
+    return (
+        room.free(label.box(size))
+        and not lines_meet(label.box(size), lines)
+        and (not label.moved or room.free(off_its_mark(label.leader(size), size)))
+    )
+
+
+def off_its_mark(line: Floats, size: float) -> Floats:
+    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is."""
+    a, b = line
+    share = min(0.5 * size / max(float(np.linalg.norm(b - a)), 1e-12), 0.9)
+    return thin(np.array([a + share * (b - a), b]), THIN * size)
+
+
+def thin(line: Floats, width: float) -> Floats:
+    """(4, 2) corners of the room of a line (2, 2)."""
+    a, b = line
+    along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+    side = 0.5 * width * np.array([-along[1], along[0]])
+    return np.array([a - side, b - side, b + side, a + side])
 
 
 def spread(places: ArrayLike, gap: float) -> Floats:
@@ -153,25 +206,18 @@ def spread(places: ArrayLike, gap: float) -> Floats:
     return result
 
 
-def _first_free(
-    text: str, end: Floats, other: Floats, size: float, room: Room, rods: Floats, *, must: bool
-) -> Label | None:
-    for label, step in _places(text, end, other, size):
-        box = label.box(size)
-        if step >= NEAR and not must:
-            return None
-        if room.free(box) and (step >= NEAR or not lines_meet(box, rods)):
-            return label
-    return None
-
-
-def _places(text: str, end: Floats, other: Floats, size: float) -> Iterable[tuple[Label, int]]:
+def _on_own_line(text: str, end: Floats, other: Floats, size: float) -> Iterable[Label]:
     """Places on the rod's own line, from its end outwards."""
     outward = (end - other) / np.linalg.norm(end - other)
     angle = upright(float(np.arctan2(outward[1], outward[0])))
     first = (0.55 + 0.5 * LETTER * len(text)) * size
-    for step in range(FAR):
-        yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2), step
+    for step in range(CLOSE):
+        yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2)
+
+
+def closed_segments(outline: Floats) -> Floats:
+    """(k, 2, 2) the lines of a closed curve (k, 2)."""
+    return np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
 
 
 def upright(angle: float) -> float:

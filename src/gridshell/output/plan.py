@@ -53,17 +53,22 @@ class FlatPlan:
 
     @cached_property
     def text(self) -> float:
-        """Size of the rods' labels at 1:1 [mm]: labels of neighbouring rods stand clear of each other."""
-        return min(0.4 * self.spacing, 0.015 * self.extent)
+        """Size of the rods' labels at 1:1 [mm]: joint ids find room between the rods."""
+        return min(0.25 * self.spacing, 0.015 * self.extent)
 
     @cached_property
     def summary(self) -> str:
-        """The cut list in one line."""
+        """The cut list in one line; lengths as cut."""
         lengths = [1e3 * rod.cut_length for rod in self.rods]
         return (
             f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths) / 1e3:.2f} m in total, "
-            f"longest {max(lengths, default=0):.1f} mm"
+            f"longest {max(lengths, default=0):.1f} mm" + (", with allowances" if self.allowances else "")
         )
+
+    @property
+    def allowances(self) -> bool:
+        """Whether rods are cut longer than they are between their supports."""
+        return any(rod.allowance for rod in self.rods)
 
 
 def flat_plan(archive: Archive) -> FlatPlan:

@@ -16,7 +16,7 @@ from gridshell.output.shapes import CAPTIONS
 from gridshell.output.svg import drawing_svg, inline
 from gridshell.output.verdict import unknown_below, verdict
 from gridshell.output.viewer import viewer_json
-from gridshell.output.wording import percent
+from gridshell.output.wording import percent, stage
 
 IN_PAGE = ("supports", "elevations", "erection")
 FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
@@ -91,7 +91,7 @@ def _note(archive: Archive) -> str:
     unknown = unknown_below(archive.result)
     if "history" not in archive.states or unknown >= 1:
         return NOT_FOLLOWED
-    return PARTLY.format(share=percent(unknown)) if unknown else FOLLOWED
+    return PARTLY.format(share=stage(unknown)) if unknown else FOLLOWED
 
 
 def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
@@ -104,6 +104,14 @@ def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
         tables.append(("Supports", supports(archive, brief=True), "With reactions: schedule/supports.csv."))
     if archive.result.get("seams"):
         tables.append(("Seams", seams_table(archive), "Forces: what a seam carries there, both rods together."))
-    if (archive.result.get("fabrication") or {}).get("stock"):
-        tables.append(("Stock", stock_table(archive), "First fit decreasing."))
+    if stock := (archive.result.get("fabrication") or {}).get("stock"):
+        tables.append(("Stock", stock_table(archive), _plan_of(stock)))
     return tables
+
+
+def _plan_of(stock: Mapping[str, Any]) -> str:
+    """How good a cutting plan is."""
+    return (
+        f"First fit decreasing: {len(stock['bars'])} bars, {percent(stock['waste'])} waste. By the pieces' total "
+        f"length alone it takes {stock['fewest']} bars; that is a bound, which no plan need reach."
+    )

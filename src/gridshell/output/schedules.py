@@ -27,7 +27,10 @@ def table_csv(table: Table) -> str:
 
 
 def rods_table(archive: Archive, *, brief: bool = False) -> Table:
-    """One row a rod; `joints_at_mm` lists every joint at its distance from the rod's start (ends: 0, 1)."""
+    """One row a rod; `joints_at_mm` lists every joint at its distance from the rod's start (ends: 0, 1).
+
+    Bending is that of the final shape; where a column is named `pop_up`, the worst of all shapes, the way up included.
+    """
     final = archive.final
     columns: list[tuple[str, bool, Callable[[RodRecord], str]]] = [
         ("id", True, lambda rod: rod.id),
@@ -44,7 +47,7 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
         ("max_strain", True, lambda rod: _number(rod.more.get("max_strain"), 6)),
         ("max_stress_MPa", True, lambda rod: _mpa(rod.more.get("max_stress"))),
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
-        ("utilisation", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
+        ("utilisation_pop_up", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
         ("splices_at_mm", True, lambda rod: "; ".join(_mm(at) for at in rod.more.get("splices") or ())),
         *_ends("flat", 2, lambda rod: rod.flat),
         ("final_state", False, lambda rod: final or "" if len(rod.nodes) else ""),

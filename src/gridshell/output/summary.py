@@ -5,7 +5,7 @@ from math import degrees
 from typing import Any
 
 from gridshell.output.verdict import unknown_below, utilisation
-from gridshell.output.wording import case_rows, percent, rounded, stress
+from gridshell.output.wording import NAMES, case_rows, percent, rounded, stage, stress
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1], what a case has by default
 
@@ -54,8 +54,12 @@ def _rod(rod: dict[str, Any]) -> Iterator[str]:
     line = "  rod       " + ", ".join(" ".join(row) for row in case_rows(rod["section"])).removeprefix("kind ")
     if material := rod.get("material"):
         line += f"; E = {stress(material['youngs_modulus'])}, {rounded(material['density'], 4)} kg/m3"
-    if material == RUBBER:
-        line += " (the paper's rubber; for another: rod.material)"
+        rubber = [NAMES.get(key, key) for key, value in RUBBER.items() if material.get(key) == value]
+        if len(rubber) == len(RUBBER):
+            line += " (the paper's rubber; for another: rod.material)"
+        elif rubber:
+            verb = "are" if len(rubber) > 1 else "is"
+            line += f" ({' and '.join(rubber)} {verb} the paper's rubber's; for another: rod.material)"
     yield line
 
 
@@ -89,7 +93,7 @@ def _checked(result: dict[str, Any]) -> list[str]:
             if bent.get("utilisation") is not None:
                 line += f", {percent(bent['utilisation'])} of the strength"
             if place == "pop_up" and unknown:
-                line += f"; unknown below {percent(unknown)} of it"
+                line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from gridshell.output.archive import Archive
-from gridshell.output.wording import millimetres, percent
+from gridshell.output.wording import millimetres, percent, stage
 
 ENDS = ("clamped", "pinned")
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
@@ -124,7 +124,7 @@ def _known(result: Mapping[str, Any], unknown: float) -> str:
     if unknown >= 1:
         return "in the final shape; nothing is known of the way up, which could not be followed."
     if unknown:
-        return f"in the final shape and above {percent(unknown)} of the way up; below, nothing is known of it."
+        return f"in the final shape and above {stage(unknown)} of the way up; below, nothing is known of it."
     if _snaps(result):
         return "in the final shape and the stages of the way up; what a snap asks of them is not known."
     return "the way up included."

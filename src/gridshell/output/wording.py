@@ -54,6 +54,11 @@ def percent(share: float | None) -> str:
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
+def stage(share: float) -> str:
+    """A share of the way up from flat in whole percents, as warnings and drawings name stages."""
+    return f"{100 * share:.0f} %"
+
+
 def newtons(force: float) -> str:
     return f"{rounded(force)} N"
 

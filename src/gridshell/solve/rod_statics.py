@@ -128,9 +128,9 @@ def solve_rod(
         the twist angle, counted from frames carried from the last step's shape.
     gravity : acceleration (3,) [m/s2].
     steps : equal steps to begin with; they halve where the solver fails and grow back.
-        Where ends travel far in one step, the solver can land on another branch than the one that a rod would
-        follow (a lath of 1 m, clamped and shortened by 0.4 m at once, ends in a loop): an equilibrium, but another.
-        Give ten steps or more then, and see whether twice as many end in the same shape.
+        Where ends travel far in a step, the solver can land on another branch than the one that a rod would
+        follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
+        twice as many end with the same energy.
     stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path goes on
         over saddles, and the report counts the negative modes at its end.
 

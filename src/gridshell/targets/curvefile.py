@@ -49,9 +49,10 @@ def _strokes(path: Path, unit: float) -> list[Floats]:
         raise InputError(f"{path}: curves are read from {' or '.join(CURVE_FILES)}")
     try:
         strokes = _of_dxf(path) if path.suffix.lower() == ".dxf" else _of_obj(data)
-    except Exception as reason:  # a damaged file can break a reader anywhere
-        said = " ".join(str(reason).split())[:80]
-        raise InputError(f"{path} cannot be read as a drawing of curves ({said}): export it anew") from None
+    except Exception:  # a damaged file can break a reader anywhere
+        raise InputError(
+            f"{path} cannot be read as a drawing of curves: it is damaged or of another format; export it anew"
+        ) from None
     return [np.asarray(stroke, dtype=float) * unit for stroke in strokes if len(stroke) > 1]
 
 

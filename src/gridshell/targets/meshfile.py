@@ -53,7 +53,7 @@ def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = 
 def file_bytes(path: Path) -> bytes:
     """The content of a file that is there, is none of the largest, and is not empty."""
     if not path.is_file():
-        raise InputError(f"there is no file named {shown(str(path))}: give the path of a surface file")
+        raise InputError(f"there is no file named {shown(str(path))}: give the path of one that is there")
     size = path.stat().st_size
     if size == 0:
         raise InputError(f"{path} is empty: export it anew")
@@ -100,10 +100,9 @@ def _loaded(path: Path) -> dict[str, Any]:
             return found
     except MemoryError:
         raise InputError(f"{path} claims to be larger than the memory: it is damaged; export it anew") from None
-    except Exception as reason:  # a damaged file can break a reader anywhere
-        said = " ".join(str(reason).split())[:80]
+    except Exception:  # a damaged file can break a reader anywhere
         raise InputError(
-            f"{path} cannot be read as {path.suffix[1:].upper()} ({said or type(reason).__name__}): export it anew"
+            f"{path} cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export it anew"
         ) from None
 
 

@@ -1,5 +1,7 @@
 """Flat plan: both families as cut, their joints, labels, the footprint, and what it is set out by."""
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -7,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from gridshell.layout.outline import opens
 from gridshell.output.callouts import callouts, outward
-from gridshell.output.drawing import INK, LETTER, Drawing, Pen, Pencil
-from gridshell.output.labels import Room, leaders, place
+from gridshell.output.drawing import INK, LETTER, LINE, Drawing, Pen, Pencil
+from gridshell.output.labels import Label, Room, closed_segments, lines_meet, place, take
 from gridshell.output.plan import FlatPlan, nice_ticks
 from gridshell.output.rods import outlines_of
 
@@ -16,6 +18,10 @@ Floats = NDArray[np.float64]
 
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
 TITLE = "Flat plan"
+ROD = 0.18  # width of a rod's line, in text sizes
+LARGEST, SMALLEST = 0.6, 0.5  # of a joint's id, in text sizes: 1.2 and 1 mm on a sheet
+GAP = 0.06  # from an id to a rod, in text sizes
+CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
 def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
@@ -26,9 +32,10 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     for outline in plan.boundary:
         pencil.line(outline, "BOUNDARY-FINAL", closed=True)
     _rods(pencil, plan, text)
-    _labels(pencil, plan, text)
-    _joints(pencil, plan, text)
-    for a, b in diagonals(plan):
+    lines, across = np.concatenate([plan.cuts, *map(closed_segments, plan.footprint)]), diagonals(plan)
+    _labels(pencil, plan, text, lines)
+    _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
+    for a, b in across:
         _dimension(pencil, plan, a, b, text)
     _axes(pencil, plan, text)
     return pencil.done("plan", TITLE, text)
@@ -37,7 +44,7 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
 def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     """Each rod as cut; a dot at the end from which its joints are measured, a tick where it is held."""
     for rod, cut, line in zip(plan.rods, plan.cuts, plan.lines, strict=True):
-        pen = Pen(FAMILY.get(rod.family, INK), 0.18 * text)
+        pen = Pen(FAMILY.get(rod.family, INK), ROD * text)
         pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {1e3 * rod.cut_length:.3f} mm")
         pencil.mark(line[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))
         if rod.allowance > 0:
@@ -47,46 +54,45 @@ def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
                 pencil.line([end - across, end + across], "DIM")
 
 
-def _joints(pencil: Pencil, plan: FlatPlan, text: float) -> None:
-    """A mark and an id at each joint; an id that finds no room is left to the mark's note and the schedule."""
+def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: Floats) -> None:
+    """A mark at each joint, and its id in a corner of the mesh beside it, nearer to it than to the next joint.
+
+    It is clear of all `lines` (m, 2, 2), and of those `across` (d, 2, 2) if it can be.
+    An id that finds no room, or only in letters too small to read, is left to the mark's note and the schedule.
+    """
     radius = min(0.25 * text, 0.04 * plan.spacing, 1.0)
-    size = min(0.5 * text, 0.11 * plan.spacing)
-    room = Room(plan.spacing)
-    taken = [label.box() for label in pencil.texts]
-    for box in taken:
-        room.take(box)
+    clear = max(radius, 0.5 * ROD * text) + GAP * text
+    room, both = Room(plan.spacing), np.concatenate([lines, across])
+    for written in pencil.texts:
+        room.take(written.box())
     for joint, mark in zip(plan.joints, plan.marks, strict=True):
         a, b = (f"{plan.rods[k].id} at {1e3 * at:.2f} mm" for k, at in zip(joint.rods, joint.at, strict=True))
         pencil.mark(mark, radius, "MARK", note=f"{joint.id}: {a}, {b}")
-        width = LETTER * size * len(joint.id) + 2 * radius
-        for corner in (
-            (radius, 1.3 * radius),
-            (-width, 1.3 * radius),
-            (radius, -radius - size),
-            (-width, -radius - size),
-        ):
-            pencil.write(joint.id, mark + corner, size, "LABEL")
-            if room.claim(pencil.texts[-1].box()):
+        size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
+        for clear_of, corner in product((both, lines), CORNERS if size >= SMALLEST * text else ()):
+            off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
+            label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
+            if not lines_meet(label.box(size), clear_of) and room.claim(label.box(size)):
+                pencil.texts.append(label.written(size))
                 break
-            pencil.texts.pop()
 
 
-def _labels(pencil: Pencil, plan: FlatPlan, text: float) -> None:
+def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
     """Each rod's at its ends, on its own line; in an opening, around it."""
     names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
     inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
     outside = np.ones(2 * len(names), dtype=bool)
     outside[[end for loop in inside for end in loop]] = False
     labels, room = place(names, plan.cuts, text, at=outside.reshape(-1, 2)), Room(4 * text)
-    pencil.texts += [label.written(text) for label in labels]
-    for line in leaders(labels, text):
-        pencil.line(line, "DIM")
     for label in labels:
-        room.take(label.box(text))
+        pencil.texts.append(label.written(text))
+        take(label, text, room)
+        if label.moved:
+            pencil.line(label.leader(text), "DIM")
     for loop in inside:
         places = plan.cuts.reshape(-1, 2)[loop]
         away = outward(places)
-        for callout in callouts([names[end // 2] for end in loop], places, away, text, room, plan.cuts):
+        for callout in callouts([names[end // 2] for end in loop], places, away, text, room, lines):
             pencil.texts.append(callout.written)
             pencil.line(callout.line, "DIM")
 

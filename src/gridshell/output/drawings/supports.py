@@ -9,7 +9,7 @@ from gridshell.output.archive import Archive
 from gridshell.output.callouts import callouts, outward
 from gridshell.output.drawing import LAYERS, Drawing, Pen, Pencil
 from gridshell.output.drawings.final import axes, rod_curves, seen_from_above, thinned
-from gridshell.output.labels import Room
+from gridshell.output.labels import Room, closed_segments
 from gridshell.output.plan import FlatPlan
 from gridshell.output.rods import outlines_of
 from gridshell.output.schedules import seam_meetings
@@ -17,7 +17,10 @@ from gridshell.output.schedules import seam_meetings
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-LEGEND = "Red: where each rod ends and how it goes on. A thin line leads to its name: rod.0 its start, rod.1 its end."
+LEGEND = (
+    "Red: where each rod ends and how it goes on. A thin line leads to its name: rod.0 its start, rod.1 its end.",
+    "Blue: straight lines from rod end to rod end{seams}; the edge itself may run outside them.",
+)
 MARK, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
 
 
@@ -31,8 +34,6 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
     arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)
     arrives /= np.maximum(np.linalg.norm(arrives, axis=1), 1e-9)[:, None]
-    for outline in plan.boundary:
-        pencil.line(outline[:, :2], "BOUNDARY-FINAL", closed=True)
     names = [f"{rod.id}.{end}" for rod in drawn for end in (0, 1)]
     room, tick = Room(4 * text), Pen(LAYERS["MARK"].colour, 0.12 * text)
     for name, end, way in zip(names, ends, arrives, strict=True):
@@ -41,7 +42,14 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         room.take(end + MARK * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
     lines = np.concatenate([_segments(thinned(thinned(curve))) for curve in curves])
     alone = ~np.isin(names, list(_sewn(archive)))
-    for walk in _walks(outlines_of(drawn), ends, alone):
+    for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
+        pencil.line(ends[seam], "BOUNDARY-FINAL")
+    walks = list(_walks(outlines_of(drawn), ends, alone))
+    for walk in walks:
+        if len(walk) > 1:
+            pencil.line(ends[walk], "BOUNDARY-FINAL", closed=True)
+            lines = np.concatenate([lines, closed_segments(ends[walk])])
+    for walk in walks:
         away = outward(ends[walk])
         away = np.where(np.any(away, axis=1, keepdims=True), away, arrives[walk])
         for callout in callouts([names[end] for end in walk], ends[walk], away, text, room, lines):
@@ -50,7 +58,9 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     _meetings(pencil, archive, text, room)
     axes(pencil, text)
     low, _ = pencil.done("", "", text).box()
-    pencil.write(LEGEND, low - (0.0, 1.5 * text), text, "DIM")
+    for k, line in enumerate(LEGEND, start=1):
+        said = line.format(seams="" if alone.all() else ", and seams")
+        pencil.write(said, low - (0.0, 1.5 * k * text), text, "DIM")
     return pencil.done("supports", "Support plan", text)
 
 
@@ -74,7 +84,7 @@ def _walks(outlines: list[Ints], ends: Floats, alone: NDArray[np.bool_]) -> Iter
 
 
 def _runs(loop: Ints, alone: NDArray[np.bool_]) -> list[Ints]:
-    """What is between the ends of an outline that are sewn; all of it where none is."""
+    """The ends of an outline that are `alone`, run by run between the others; all of it where there are none."""
     turned = np.roll(loop, -int(np.argmin(alone[loop])))
     parts = [run[alone[run]] for run in np.split(turned, np.flatnonzero(~alone[turned]))]
     return [run for run in parts if len(run)]
