@@ -30,7 +30,8 @@ def require(name: str, value: object, kind: type, wanted: str = "") -> None:
     InputError : it says what the argument is, and what it must be: `wanted`, by default a `kind`.
     """
     if not isinstance(value, kind):
-        what = shown(value) if isinstance(value, str | int | float) else f"an object of type {type(value).__name__}"
+        made = type(value).__name__
+        what = shown(value) if isinstance(value, str | int | float) else f"a{'n' * (made[0] in 'AEIOU')} {made}"
         raise InputError(f"{name} must be {wanted or f'a gridshell {kind.__name__}'}, not {what}")
 
 
