@@ -394,7 +394,12 @@ def test_seams_have_no_objective() -> None:
 
 def test_a_patch_of_finer_spacing_may_have_shorter_stock() -> None:
     seams = {"seams.lines": "-1,0;1,0", "seams.patches": [{"name": "A", "spacing": "8 mm"}]}
-    load_case("hemisphere", {**seams, "layout.edge": "5 mm", "fabrication.stock_length": "10 mm"}).build_sewn()
+    short = {"layout.edge": "5 mm", "fabrication.stock_length": "10 mm"}
+    with pytest.raises(InputError, match="stock_length"):
+        load_case("hemisphere", short).build()
+    case = load_case("hemisphere", {**seams, **short})
+    assert case.build_sewn()
+    assert case.takeaway().fabrication.stock_length == 0.01
 
 
 def test_another_method_keeps_what_it_uses_alone(load: Any) -> None:
@@ -410,7 +415,10 @@ def test_another_method_keeps_what_it_uses_alone(load: Any) -> None:
 def test_a_found_anchor_leaves_a_case_that_can_be_run_again(load: Any) -> None:
     asked = load_case("hemisphere", {"drape.anchor": "auto", "drape.objective": "gap"})
     asked.build()
-    load(asked.decided((0.0, 0.0), 0.1).to_toml()).build()
+    again = load(asked.decided((0.0, 0.0), 0.1).to_toml())
+    again.build()
+    assert again.drape.anchor == (0.0, 0.0)
+    assert again.layout.rotate == 0.1
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,7 @@ def test_these_points_lie_on_target_and_seam(name: str) -> None:
     form = sewn(name)
     points = np.array([meeting.point for meeting in form.meetings])
     assert np.abs(form.target.gap(points).distance).max() < 1e-12
-    assert off_seams(form, points).max() < 4e-5  # the dense points lie 5e-5 apart
+    assert off_seams(form, points).max() < 3e-5  # the dense points lie 5e-5 apart
 
 
 @every_case
@@ -147,7 +147,7 @@ def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
         behind, at, ahead = laid.net.positions(rod, near)
         along = (ahead - behind) / np.linalg.norm(ahead - behind)
         across = np.cross(along, form.target.on_surface(meeting.point[None]).normal[0])
-        assert abs((at - meeting.point) @ across) < 2e-6 * form.target.size
+        assert abs((at - meeting.point) @ across) < 1.5e-6 * form.target.size
 
 
 def test_a_patch_alone_is_the_same_form() -> None:

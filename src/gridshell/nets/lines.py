@@ -130,9 +130,9 @@ def _coarser(target: Target) -> str:
 
 
 def _subdivided(offsets: Floats, edge: float) -> Floats:
-    """As many steps from line to line as edges, but six or more, and an even number."""
+    """Six steps or more from line to line, an even number: as many as edges, or twice as many where these are few."""
     edges, gaps = edge_counts(np.diff(offsets), edge), np.diff(offsets)
-    steps = 2 * np.maximum(FEWEST_STEPS // 2, (edges + 1) // 2)
+    steps = 2 * np.where(edges < FEWEST_STEPS, np.maximum(FEWEST_STEPS // 2, edges), (edges + 1) // 2)
     span = np.repeat(np.arange(len(edges)), steps)
     along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)
     return np.append(offsets[span] + gaps[span] * along / steps[span], offsets[-1])
