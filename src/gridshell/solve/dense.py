@@ -217,8 +217,8 @@ def forward(panel, values, aside):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, error_model="numpy")
 def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
-    """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x, with 0 for
-    padding. `aside` (2 own,) is scratch."""
+    """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the panel's own
+    padding is 0. `aside` (2 own,) is scratch."""
     own, stride = panel.shape
     begin = own // LANES * LANES
     for k in range(own):

@@ -202,6 +202,5 @@ def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside)
         values = local[: padded(size)]
         for i in range(size):
             values[i] = x[rows[row_start[s] + i]]
-        values[size:] = 0.0
         backward(panel, pivots[first[s] : first[s + 1]], values, aside)
         x[first[s] : first[s + 1]] = values[:own]

@@ -40,7 +40,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
         pencil.mark(end, MARK * text, "MARK", note=name)
         pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
         room.take(end + MARK * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
-    lines = np.concatenate([_segments(thinned(thinned(curve))) for curve in curves])
+    lines = np.concatenate([_segments(thinned(thinned(curve))) for curve in curves])  # what names keep clear of
     alone = ~np.isin(names, list(_sewn(archive)))
     for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
