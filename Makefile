@@ -1,5 +1,5 @@
 # The habits of the house. `make` alone shows them.
-.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints accept-paper paper pictures bench bench-quick bench-rods
+.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -33,6 +33,9 @@ accept-output: ## print the table of what people take away: drawings, checks, re
 
 accept-paper: ## print the table of the paper's own time stepping (some minutes)
 	python -m tests.acceptance.paper
+
+accept-verdict: ## print the table of harm and verdicts (some minutes)
+	python -m tests.acceptance.verdict
 
 paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (some minutes)
 	python docs/paper.py

@@ -17,12 +17,12 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import splu
 from threadpoolctl import threadpool_limits
 
-import gridshell as gs
+import rodshell as rs
 from benchmarks.rows import Row, Section, clock, ms
-from gridshell.solve.constraint import Supports
-from gridshell.solve.multifrontal import Multifrontal
-from gridshell.solve.newton_step import NewtonStep
-from gridshell.solve.problem import Problem
+from rodshell.solve.constraint import Supports
+from rodshell.solve.multifrontal import Multifrontal
+from rodshell.solve.newton_step import NewtonStep
+from rodshell.solve.problem import Problem
 
 PATIENCE = 20.0
 RADIUS = 0.2
@@ -32,10 +32,10 @@ def system(unknowns: int) -> tuple[csc_matrix, np.ndarray]:
     """Upper triangle of a pinned hemisphere's tangent stiffness, with twist, and where its unknowns lie."""
     rods = max(5, round(np.sqrt(unknowns / 31)))
     spacing = 3.14 * RADIUS / rods
-    rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-    layout = gs.GridLayout.orthogonal(rods="auto", spacing=spacing, length="auto", edge=spacing / 6)
-    trimmed = gs.trim(gs.drape(layout, rod, gs.Hemisphere(radius=RADIUS)))
-    shell = gs.Shell.of(trimmed.mesh, rod, joint=gs.Pin())
+    rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+    layout = rs.GridLayout.orthogonal(rods="auto", spacing=spacing, length="auto", edge=spacing / 6)
+    trimmed = rs.trim(rs.drape(layout, rod, rs.Hemisphere(radius=RADIUS)))
+    shell = rs.Shell.of(trimmed.mesh, rod, joint=rs.Pin())
     state, free = shell.state(trimmed.positions), shell.held_ends()
     step = NewtonStep(Problem(shell.elements, shell.stretch, Supports(free), RADIUS, places=shell.places), state)
     step.take(state, np.zeros(len(shell.stretch.blocks)), False)

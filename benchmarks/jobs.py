@@ -9,24 +9,24 @@ import numpy as np
 import qdldl
 from scipy.sparse import csc_matrix
 
-import gridshell as gs
+import rodshell as rs
 from benchmarks.rows import Row, Section, clock, ms, timed
-from gridshell.nets import chebyshev_net
-from gridshell.solve.newton_step import NewtonStep
+from rodshell.nets import chebyshev_net
+from rodshell.solve.newton_step import NewtonStep
 
 RADIUS = 0.2
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-DOME = gs.Hemisphere(radius=RADIUS)
-bound = importlib.import_module("gridshell.formfinding.bound")
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+DOME = rs.Hemisphere(radius=RADIUS)
+bound = importlib.import_module("rodshell.formfinding.bound")
 
 
-def auto(spacing: float = 0.03, edge: float = 0.005) -> gs.GridLayout:
-    return gs.GridLayout.orthogonal(spacing=spacing, edge=edge)
+def auto(spacing: float = 0.03, edge: float = 0.005) -> rs.GridLayout:
+    return rs.GridLayout.orthogonal(spacing=spacing, edge=edge)
 
 
-def square(spacing: float = 0.03) -> gs.GridLayout:
+def square(spacing: float = 0.03) -> rs.GridLayout:
     """17 x 17 rods, 5 mm edges."""
-    return gs.GridLayout.orthogonal(rods=(17, 17), spacing=spacing, length=1.4, edge=0.005)
+    return rs.GridLayout.orthogonal(rods=(17, 17), spacing=spacing, length=1.4, edge=0.005)
 
 
 def whole_job(runs: int) -> Section:
@@ -59,16 +59,16 @@ def _stages() -> dict[str, float]:
 
     chebyshev_net(DOME, auto())
     stage("net")
-    draped = gs.drape(auto(), ROD, DOME)
+    draped = rs.drape(auto(), ROD, DOME)
     stage("rest of the drape")
     told["rest of the drape"] -= told["net"]
-    trimmed = gs.trim(draped)
-    footprint = gs.map_back(trimmed)
+    trimmed = rs.trim(draped)
+    footprint = rs.map_back(trimmed)
     stage("trim and map back")
     for ends in ("pinned", "clamped"):
-        popped = gs.pop_up(footprint, trimmed.boundary, ROD, ends=ends)
+        popped = rs.pop_up(footprint, trimmed.boundary, ROD, ends=ends)
         stage(f"pop-up {ends}")
-        gs.agreement(popped, DOME)
+        rs.agreement(popped, DOME)
         stage("agreement, twice")
     return told
 
@@ -88,7 +88,7 @@ def _units() -> tuple[float, float, int]:
     return unit, timed(lambda: theirs.update(matrix, upper=True), runs=15), step.dofs
 
 
-def bound_system(layout: gs.GridLayout) -> tuple[NewtonStep, np.ndarray, np.ndarray]:
+def bound_system(layout: rs.GridLayout) -> tuple[NewtonStep, np.ndarray, np.ndarray]:
     """The bound drape's own system, and where its solve starts."""
     asked = list[tuple[object, ...]]()
     solve: Callable[..., object] = bound.find_equilibrium
@@ -99,7 +99,7 @@ def bound_system(layout: gs.GridLayout) -> tuple[NewtonStep, np.ndarray, np.ndar
 
     bound.find_equilibrium = listen
     try:
-        gs.drape(layout, ROD, DOME)
+        rs.drape(layout, ROD, DOME)
     finally:
         bound.find_equilibrium = solve
     problem, state, forces = asked[0][:3]
@@ -111,27 +111,27 @@ def slider(runs: int) -> Section:
     rows = []
     for name, at in SLIDERS.items():
         target, layout, anchor = at(0.0)
-        draped, times = gs.drape(layout, ROD, target, anchor=anchor), list[float]()
+        draped, times = rs.drape(layout, ROD, target, anchor=anchor), list[float]()
         for t in np.linspace(0.0, 1.0, runs + 2)[1:]:
             target, layout, anchor = at(float(t))
             begin = clock()
-            draped = gs.drape(layout, ROD, target, anchor=anchor, start=draped)
-            gs.map_back(gs.trim(draped))
+            draped = rs.drape(layout, ROD, target, anchor=anchor, start=draped)
+            rs.map_back(rs.trim(draped))
             times.append(clock() - begin)
         rows.append(Row(f"{name} changed", f"{1 / median(times[1:]):.1f} updates a second", "at least 10"))
     return Section("Slider: 17 x 17 rods, 5 mm edges", _first(slider), rows)
 
 
-SLIDERS: dict[str, Callable[[float], tuple[gs.Target, gs.GridLayout, tuple[float, float]]]] = {
+SLIDERS: dict[str, Callable[[float], tuple[rs.Target, rs.GridLayout, tuple[float, float]]]] = {
     "spacing": lambda t: (DOME, square(0.03 + 0.001 * t), (0.0, 0.0)),
     "heading": lambda t: (DOME, replace(square(), rotate=0.1 * t), (0.0, 0.0)),
     "anchor": lambda t: (DOME, square(), (0.01 * t, 0.0)),
-    "size": lambda t: (gs.Hemisphere(radius=RADIUS + 0.005 * t), square(), (0.0, 0.0)),
+    "size": lambda t: (rs.Hemisphere(radius=RADIUS + 0.005 * t), square(), (0.0, 0.0)),
 }
 
-BUMPS = gs.HeightField(
+BUMPS = rs.HeightField(
     formula="0.08*(exp(-((x-.09)^2/.06^2 + y^2/.07^2)/2) + exp(-((x+.09)^2/.06^2 + y^2/.07^2)/2))",
-    domain=gs.Disc(RADIUS),
+    domain=rs.Disc(RADIUS),
 )
 
 
@@ -144,14 +144,14 @@ def warm(runs: int) -> Section:
     """
     rows = []
     for name, target in (("hemisphere", DOME), ("two bumps with a dip", BUMPS)):
-        last = gs.find_form(target, auto(), ROD)
+        last = rs.find_form(target, auto(), ROD)
         for change in (0.02, 0.002):
             layout = auto(0.03 * (1 + change))
             cold, again = list[float](), list[float]()
             for _ in range(runs + 1):
                 for start, times in ((None, cold), (last, again)):
                     begin = clock()
-                    form = gs.find_form(target, layout, ROD, start=start)
+                    form = rs.find_form(target, layout, ROD, start=start)
                     times.append(clock() - begin)
                     solves = [popped.report.factorizations for popped in form.popped.values()]
                     counts = f"{form.draped.report.factorizations} + {' + '.join(map(str, solves))}"

@@ -14,10 +14,10 @@ import sys
 import numba as nb
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 from benchmarks.rows import Row, Section, clock, timed
-from gridshell.model import Assembly, Freedom
-from gridshell.rods.elements import Elements
+from rodshell.model import Assembly, Freedom
+from rodshell.rods.elements import Elements
 
 RODS, EDGES = 41, 6
 COUNT = "import json; from benchmarks import kernels; print(json.dumps(kernels.count_operations()))"
@@ -26,14 +26,14 @@ SAMPLED = 40  # elements whose operations are counted
 
 def shells(rods: int) -> dict[str, tuple[Elements, np.ndarray]]:
     """Element sets of square shells, and a bent state: bending without and with twist, stretch, joints."""
-    rod = gs.Rod(gs.Circle(radius=1e-3), gs.Material(youngs_modulus=1e6, density=1e3))
-    lath = gs.Rod(gs.RectangularSection(width=2e-3, height=1e-3), rod.material)
+    rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+    lath = rs.Rod(rs.RectangularSection(width=2e-3, height=1e-3), rod.material)
     spacing = 0.4 / rods
-    layout = gs.GridLayout.orthogonal(rods=(rods, rods), spacing=spacing, length=0.4, edge=spacing / EDGES)
-    mesh = gs.mesh_grid(layout.flat_grid((rods, rods), 0.4), layout.edge)
+    layout = rs.GridLayout.orthogonal(rods=(rods, rods), spacing=spacing, length=0.4, edge=spacing / EDGES)
+    mesh = rs.mesh_grid(layout.flat_grid((rods, rods), 0.4), layout.edge)
     bent = mesh.flat + [[0.0, 0.0, 1.0]] * np.sin(8 * mesh.flat[:, :1] + 5 * mesh.flat[:, 1:2]) * 0.05
-    plain = gs.Shell.of(mesh, rod)
-    turning = gs.Shell.of(mesh, lath, joint=gs.Spring(shear=1e-5, out_of_plane=1e-3, twist=1e-3))
+    plain = rs.Shell.of(mesh, rod)
+    turning = rs.Shell.of(mesh, lath, joint=rs.Spring(shear=1e-5, out_of_plane=1e-3, twist=1e-3))
     state, twisted = plain.state(bent), turning.state(bent)
     found: dict[str, tuple[Elements, np.ndarray]] = {
         "bending, round rods": (plain.elements[0], state),
@@ -170,7 +170,7 @@ def count_operations() -> dict[str, float]:
         })  # fmt: skip
         k = elements.blocks.shape[1]
         changed = [
-            module for key, module in sys.modules.items() if key.startswith(("gridshell.rods", "gridshell.joints"))
+            module for key, module in sys.modules.items() if key.startswith(("rodshell.rods", "rodshell.joints"))
         ]
         for module in changed:
             if getattr(module, "np", None) is np:

@@ -2,9 +2,9 @@
 
 import importlib.util
 
-from benchmarks.pyelastica_cantilever import by_gridshell, by_pyelastica, gridshell_tips, true_tips
+from benchmarks.pyelastica_cantilever import by_pyelastica, by_rodshell, rodshell_tips, true_tips
 from benchmarks.rows import Row, Section
-from gridshell.formfinding.progress import silent
+from rodshell.formfinding.progress import silent
 
 FALLS = {True: 0.2, False: 2.0}  # seconds that are simulated, by whether it must be quick
 
@@ -12,7 +12,7 @@ FALLS = {True: 0.2, False: 2.0}  # seconds that are simulated, by whether it mus
 def paper(quick: bool) -> Section:
     """The paper's explicit scheme at 15 mm edges, time steps of 10 ms, against net, bound drape, trim and map back at
     5 mm edges; no pop-up on either side. Its fall takes about 2 s."""
-    from gridshell.paper import fig8
+    from rodshell.paper import fig8
 
     falling = FALLS[quick]
     made = fig8.make(silent, cases=fig8.CASES[:1], falling=falling)
@@ -40,13 +40,13 @@ def pyelastica(quick: bool) -> Section:
     said = pyelastica.__doc__.replace("\n    ", " ")
     if not importlib.util.find_spec("elastica"):
         return Section("PyElastica", said, [Row("not installed", 'pip install -e ".[bench]"')])
-    gridshell_tips(10, 1e6, 0.02)  # compiles
+    rodshell_tips(10, 1e6, 0.02)  # compiles
     rows = list[Row]()
     for nodes in (100,) if quick else (100, 1000):
         truth = true_tips(1e6)
-        ours, theirs = by_gridshell(nodes, 1e6, truth), by_pyelastica(nodes, 1e6, truth, 10.0 if quick else 60.0)
+        ours, theirs = by_rodshell(nodes, 1e6, truth), by_pyelastica(nodes, 1e6, truth, 10.0 if quick else 60.0)
         rows.append(
-            Row(f"{nodes} nodes, 1 MPa: PyElastica over gridshell", f"{theirs.seconds / ours.seconds:.1f} times")
+            Row(f"{nodes} nodes, 1 MPa: PyElastica over rodshell", f"{theirs.seconds / ours.seconds:.1f} times")
         )
-        rows += [Row("   gridshell", str(ours)), Row("   PyElastica", str(theirs))]
+        rows += [Row("   rodshell", str(ours)), Row("   PyElastica", str(theirs))]
     return Section("PyElastica", said, rows)

@@ -1,11 +1,11 @@
-"""A cantilever let go under gravity, by gridshell and by PyElastica: seconds of work for one simulated second.
+"""A cantilever let go under gravity, by rodshell and by PyElastica: seconds of work for one simulated second.
 
 `python benchmarks/pyelastica_cantilever.py [--budget SECONDS]` (pip install -e ".[bench]"). A rod of 1 m, radius 10 mm,
 1000 kg/m3, damped at 5 1/s, at 100 and 1000 nodes, E = 1 MPa and 50 GPa. Equal accuracy: at ten times in the second
 the tip is within 2 % of its largest deflection from the truth. For 50 GPa that is the sum of the modes of Euler and
-Bernoulli's beam, which sags by 1 mm; for 1 MPa gridshell's own motion of a fine mesh, extrapolated to no step.
+Bernoulli's beam, which sags by 1 mm; for 1 MPa rodshell's own motion of a fine mesh, extrapolated to no step.
 PyElastica holds its first edge, half an edge inside the rod, and is therefore given a rod that is half an edge longer.
-Each code takes the largest step that reaches the accuracy, by halves: gridshell from 20 ms, PyElastica, which is
+Each code takes the largest step that reaches the accuracy, by halves: rodshell from 20 ms, PyElastica, which is
 explicit, from its stability limit. A run that would exceed the budget is stopped, and its time projected from the part
 done. Compilation is not counted.
 """
@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-import gridshell as gs
-from gridshell.model.elastic_rod import ElasticRod
+import rodshell as rs
+from rodshell.model.elastic_rod import ElasticRod
 
 Floats = NDArray[np.float64]
 
@@ -47,23 +47,23 @@ class Outcome:
         return f"{self.seconds:9.3g} s, step {self.step:.2g} s, {error}"
 
 
-def gridshell_tips(nodes: int, youngs_modulus: float, step: float) -> tuple[Floats, float]:
+def rodshell_tips(nodes: int, youngs_modulus: float, step: float) -> tuple[Floats, float]:
     """Tip (SAMPLES, 3) and seconds."""
-    kind = gs.Rod(gs.Circle(RADIUS), gs.Material(youngs_modulus, DENSITY, 0.5))
+    kind = rs.Rod(rs.Circle(RADIUS), rs.Material(youngs_modulus, DENSITY, 0.5))
     rest = np.column_stack([np.linspace(0, LENGTH, nodes), np.zeros(nodes), np.zeros(nodes)])
     rod = ElasticRod.of(rest, kind, clamped=("start",))
-    motion = gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes), gs.Damping(rate=DAMPING)))
+    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes), rs.Damping(rate=DAMPING)))
     per_sample = round(1 / (SAMPLES * step))
     begin = time.perf_counter()
-    series = gs.simulate(motion, rod.state(), until=1.0, step=step, every=per_sample)
+    series = rs.simulate(motion, rod.state(), until=1.0, step=step, every=per_sample)
     return series.states[1:, nodes - 1], time.perf_counter() - begin
 
 
-def by_gridshell(nodes: int, youngs_modulus: float, truth: Floats) -> Outcome:
+def by_rodshell(nodes: int, youngs_modulus: float, truth: Floats) -> Outcome:
     outcome = Outcome(np.inf, 0.0, None)
     for halvings in range(14):
         step = 0.02 / 2**halvings
-        tips, seconds = gridshell_tips(nodes, youngs_modulus, step)
+        tips, seconds = rodshell_tips(nodes, youngs_modulus, step)
         outcome = Outcome(seconds, step, _error(tips, truth))
         if outcome.error is not None and outcome.error <= TOLERANCE:
             break
@@ -138,11 +138,11 @@ def _error(tips: Floats, truth: Floats) -> float:
 
 
 def true_tips(youngs_modulus: float) -> Floats:
-    """(SAMPLES, 3) of the stiff rod by linear theory, of the soft one by gridshell, 200 nodes, extrapolated."""
+    """(SAMPLES, 3) of the stiff rod by linear theory, of the soft one by rodshell, 200 nodes, extrapolated."""
     sag = DENSITY * G * LENGTH**4 / (2 * youngs_modulus * RADIUS**2)
     if sag < 1e-2 * LENGTH:
         return _modal_tips(youngs_modulus)
-    coarse, fine = (gridshell_tips(200, youngs_modulus, step)[0] for step in (5e-4, 2.5e-4))
+    coarse, fine = (rodshell_tips(200, youngs_modulus, step)[0] for step in (5e-4, 2.5e-4))
     return 2 * fine - coarse
 
 
@@ -164,12 +164,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--budget", type=float, default=60.0, help="seconds of work allowed to each run of PyElastica")
     budget = parser.parse_args().budget
-    gridshell_tips(10, 1e6, 0.02)  # compiles
+    rodshell_tips(10, 1e6, 0.02)  # compiles
     for nodes, youngs_modulus in CASES:
         truth = true_tips(youngs_modulus)
         deflection = np.linalg.norm(truth - [LENGTH, 0, 0], axis=1).max()
         print(f"{nodes} nodes, E {youngs_modulus:.0e} Pa, largest deflection {1e3 * deflection:.4g} mm")
-        print(f"    gridshell   {by_gridshell(nodes, youngs_modulus, truth)}", flush=True)
+        print(f"    rodshell   {by_rodshell(nodes, youngs_modulus, truth)}", flush=True)
         print(f"    PyElastica  {by_pyelastica(nodes, youngs_modulus, truth, budget)}", flush=True)
 
 

@@ -5,7 +5,7 @@
 A *step* is all that `simulate` does between two records for a heavy cantilever that swings down: one Newton iteration
 (one Hessian, one factorisation, two solutions, one more evaluation of the forces) and the refresh of the frames. A
 *banded solve* is one factorisation and one solution of a symmetric positive system of the same size and band, which
-is given as a band: by LAPACK (`scipy.linalg.solveh_banded`), and by `gridshell.solve.banded`. The three take turns in
+is given as a band: by LAPACK (`scipy.linalg.solveh_banded`), and by `rodshell.solve.banded`. The three take turns in
 one thread, and the least processor time of each is taken: other work on the machine can only add to it.
 """
 
@@ -19,20 +19,20 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from threadpoolctl import threadpool_limits
 
-import gridshell as gs
-from gridshell.model.elastic_rod import ElasticRod
-from gridshell.solve.banded import Banded
-from gridshell.solve.constraint import NO_CURVATURE
-from gridshell.solve.implicit_euler import Step
+import rodshell as rs
+from rodshell.model.elastic_rod import ElasticRod
+from rodshell.solve.banded import Banded
+from rodshell.solve.constraint import NO_CURVATURE
+from rodshell.solve.implicit_euler import Step
 
 NODES = (100, 316, 1000, 3162, 10_000, 31_623, 100_000)
 EDGE = 0.01
 STEP = 2e-4  # short enough that one Newton iteration does at every size, so that all sizes do the same work a step
-STEEL = gs.Material(youngs_modulus=1e9, density=1e3)
-KINDS: dict[str, tuple[gs.Rod, bool]] = {
-    "isotropic, without twist angles": (gs.Rod(gs.Circle(1e-3), STEEL), False),
-    "isotropic, with twist": (gs.Rod(gs.Circle(1e-3), STEEL), True),
-    "elliptic, with twist": (gs.Rod(gs.Ellipse(1e-3, 2e-3), STEEL), True),
+STEEL = rs.Material(youngs_modulus=1e9, density=1e3)
+KINDS: dict[str, tuple[rs.Rod, bool]] = {
+    "isotropic, without twist angles": (rs.Rod(rs.Circle(1e-3), STEEL), False),
+    "isotropic, with twist": (rs.Rod(rs.Circle(1e-3), STEEL), True),
+    "elliptic, with twist": (rs.Rod(rs.Ellipse(1e-3, 2e-3), STEEL), True),
 }
 
 
@@ -72,12 +72,12 @@ class Scaling:
 
 
 @threadpool_limits.wrap(limits=1)  # so that LAPACK has one thread too
-def measure(kind: gs.Rod, *, twist: bool, nodes: tuple[int, ...] = NODES) -> Scaling:
+def measure(kind: rs.Rod, *, twist: bool, nodes: tuple[int, ...] = NODES) -> Scaling:
     columns = list(zip(*(_of_size(n, kind, twist) for n in nodes), strict=True))
     return Scaling(nodes, *columns)  # type: ignore[arg-type]
 
 
-def _of_size(n: int, kind: gs.Rod, twist: bool) -> tuple[float, float, float, int, float]:
+def _of_size(n: int, kind: rs.Rod, twist: bool) -> tuple[float, float, float, int, float]:
     repeats = max(30, min(300, 1_000_000 // n))
     rest = np.column_stack([EDGE * np.arange(n), np.zeros(n), np.zeros(n)])
     rod = ElasticRod.of(rest, kind, clamped=("start",), twist=twist)
@@ -97,8 +97,8 @@ class _Swing:
     """A heavy cantilever let go, step by step."""
 
     def __init__(self, rod: ElasticRod) -> None:
-        self._motion = gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes),)).in_parts()
-        self._stepper = gs.ImplicitEuler()
+        self._motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),)).in_parts()
+        self._stepper = rs.ImplicitEuler()
         self._state, self._velocity = rod.state(), np.zeros_like(rod.mass)
         self.taken, self.factorizations = 0, 0
 

@@ -13,10 +13,10 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 RADIUS = 0.2
 JOB = """
 import json, sys
-import gridshell as gs
-rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-layout = gs.GridLayout.orthogonal(spacing=float(sys.argv[1]), edge=float(sys.argv[1]) / 6)
-form = gs.find_form(gs.Hemisphere(radius=0.2), layout, rod)
+import rodshell as rs
+rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+layout = rs.GridLayout.orthogonal(spacing=float(sys.argv[1]), edge=float(sys.argv[1]) / 6)
+form = rs.find_form(rs.Hemisphere(radius=0.2), layout, rod)
 states = [form.draped.positions, *(popped.positions for popped in form.popped.values())]
 print(json.dumps([[value.hex() for value in state.ravel().tolist()] for state in states]))
 """

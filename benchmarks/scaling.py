@@ -17,13 +17,13 @@ EDGES = {True: (3, 6, 12), False: (3, 6, 12, 24, 48)}  # 17 rods
 JOB = """
 import json, re, sys, time
 from pathlib import Path
-import gridshell as gs
+import rodshell as rs
 rods, edges = int(sys.argv[1]), int(sys.argv[2])
-target = gs.Hemisphere(radius=0.2)
-rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+target = rs.Hemisphere(radius=0.2)
+rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 def form(rods, edges):
     spacing = 3.14159 * 0.2 / (rods + 0.5)
-    return gs.find_form(target, gs.GridLayout.orthogonal(spacing=spacing, edge=spacing / edges), rod)
+    return rs.find_form(target, rs.GridLayout.orthogonal(spacing=spacing, edge=spacing / edges), rod)
 form(9, 3)
 begin = time.process_time()
 found = form(rods, edges)

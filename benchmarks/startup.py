@@ -6,7 +6,7 @@
 included, instead of time on the clock: for machines that do other work.
 
 The solve is the form finding alone, in a process that has imported nothing yet (so with kernels read from disk); the
-checks are the way up from flat, solves too, which the command does and `gs.find_form` does not.
+checks are the way up from flat, solves too, which the command does and `rs.find_form` does not.
 """
 
 import json
@@ -40,19 +40,19 @@ def told(name):
     last = now
 import numpy, scipy.sparse, numba
 told("bare imports")
-from gridshell.cli import RARELY
+from rodshell.cli import RARELY
 gc.set_threshold(RARELY)  # as the command does
-from gridshell.case import load_case
-import gridshell.cli.form
+from rodshell.case import load_case
+import rodshell.cli.form
 case = load_case("hemisphere")
 target, layout, rod, options = case.build()
-from gridshell.form import find_form
+from rodshell.form import find_form
 told("other imports")
 form = find_form(target, layout, rod, **options)
 told("solve")
 archive = form.archive(case.to_toml(), takeaway=case.takeaway())
 told("checks")
-from gridshell.output.files import DEFAULT, KINDS, Content
+from rodshell.output.files import DEFAULT, KINDS, Content
 content = Content(archive)
 content.drawings
 told("drawings")
@@ -112,11 +112,11 @@ def startup(*, fresh: bool = False, cpu: bool = False, runs: int = RUNS) -> Star
             venv.create(Path(folder) / "venv", with_pip=True)
             scripts = Path(folder) / "venv" / "bin"
             subprocess.run([scripts / "pip", "install", "--quiet", str(ROOT)], check=True)
-        form = [str(scripts / "gridshell"), "form", "hemisphere", "--quiet", "--out", f"{folder}/out"]
+        form = [str(scripts / "rodshell"), "form", "hemisphere", "--quiet", "--out", f"{folder}/out"]
         python = [str(scripts / "python"), "-c"]
         commands = {
             "whole": form, "quick": [*form, *QUICK], "bare": [*python, BARE],
-            "help": [str(scripts / "gridshell"), "--help"], "front": [*python, f"import {FRONT}"],
+            "help": [str(scripts / "rodshell"), "--help"], "front": [*python, f"import {FRONT}"],
         }  # fmt: skip
         for command in commands.values():  # compiles the kernels, once
             _seconds(command, folder, cpu)
@@ -156,11 +156,11 @@ def _output(command: Sequence[str], folder: str) -> str:
 
 
 def section(runs: int) -> Section:
-    """Whole processes on the clock, `gridshell form hemisphere` with every default file; the solve is `gs.find_form` in
+    """Whole processes on the clock, `rodshell form hemisphere` with every default file; the solve is `rs.find_form` in
     a process that loads its kernels from disk; the checks are the way up from flat, solves too."""
     found = startup(runs=runs)
     rows = [
-        Row(f"`gridshell --help` over `python -c 'import {FRONT}'`", f"{found.help / found.front:.2f}", "at most 3"),
+        Row(f"`rodshell --help` over `python -c 'import {FRONT}'`", f"{found.help / found.front:.2f}", "at most 3"),
         Row("whole process over the bare imports of numpy, scipy.sparse and numba and the solve", f"{found.share:.2f}",
             "at most 3"),
         Row("read strictly: (whole process - solve) over the bare imports", f"{found.ratio:.2f}", "at most 3"),
@@ -181,7 +181,7 @@ def main(*, fresh: bool, cpu: bool) -> None:
     print(f"whole / (bare imports + solve) = {found.share:.2f}")
     print(f"(whole - solve) / bare imports = {found.ratio:.2f}, with the way up counted as a solve ", end="")
     print(f"{found.ratio_without_checks:.2f}, with few files {found.quick_ratio:.2f}")
-    print(f"gridshell --help / python -c 'import {FRONT}' = {found.help / found.front:.2f}")
+    print(f"rodshell --help / python -c 'import {FRONT}' = {found.help / found.front:.2f}")
 
 
 if __name__ == "__main__":

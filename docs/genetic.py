@@ -7,11 +7,11 @@ of one processor. `make paper` then writes the table and the pictures.
 import sys
 from pathlib import Path
 
-from gridshell.cli.progress import Progress
-from gridshell.paper.fig6 import CASES
-from gridshell.paper.genetic import KEPT, SEED, find
+from rodshell.cli.progress import Progress
+from rodshell.paper.fig6 import CASES
+from rodshell.paper.genetic import KEPT, SEED, find
 
-DATA = Path(__file__).parents[1] / "src" / "gridshell" / "paper" / "data"
+DATA = Path(__file__).parents[1] / "src" / "rodshell" / "paper" / "data"
 
 
 def main() -> None:

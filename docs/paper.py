@@ -7,14 +7,14 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from gridshell.cli.progress import Progress
-from gridshell.paper import FIGURES
+from rodshell.cli.progress import Progress
+from rodshell.paper import FIGURES
 
 HERE = Path(__file__).parent
 HEAD = """# The paper's figures
 
 HQK = W. Huang, L. Qin, M. Khalid Jawed, J. Appl. Mech. 88 (2021). Made by `make paper`; a single one by
-`gridshell paper FIGURE`, all of them by `gridshell paper all`. What differs from the paper, and why, is in
+`rodshell paper FIGURE`, all of them by `rodshell paper all`. What differs from the paper, and why, is in
 [equations.md](equations.md), E1 to E23. Times are of one thread and of the machine at hand: only their ratios mean
 something.
 """
@@ -48,7 +48,7 @@ def section(name: str, folder: Path) -> str:
 def main() -> None:
     with Progress(quiet=False) as progress:
         for name in sys.argv[1:] or FIGURES:
-            import_module(f"gridshell.paper.{name}").make(progress).save(HERE / "paper" / name)
+            import_module(f"rodshell.paper.{name}").make(progress).save(HERE / "paper" / name)
     made = [name for name in FIGURES if (HERE / "paper" / name / "table.txt").exists()]
     page = "\n".join([HEAD, *(section(name, HERE / "paper" / name) for name in made)])
     (HERE / "paper.md").write_text(page, encoding="utf-8")

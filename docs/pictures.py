@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from gridshell.case import load_case
-from gridshell.form import find_form
-from gridshell.output import picture_svg
+from rodshell.case import load_case
+from rodshell.form import find_form
+from rodshell.output import picture_svg
 
 FOLDER = Path(__file__).parent / "pictures"
 

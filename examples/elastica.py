@@ -9,11 +9,11 @@ from math import asin, pi, radians, sin, sqrt
 import numpy as np
 from scipy.special import ellipeinc, ellipkinc
 
-import gridshell as gs
+import rodshell as rs
 
 LENGTH = 0.5  # m
-wire = gs.Rod(
-    section=gs.Circle(radius=0.2e-3), material=gs.Material(youngs_modulus=200e9, density=7850, poisson_ratio=0.3)
+wire = rs.Rod(
+    section=rs.Circle(radius=0.2e-3), material=rs.Material(youngs_modulus=200e9, density=7850, poisson_ratio=0.3)
 )
 
 # exact: the load that turns the tip by 80 degrees, and where the tip then is
@@ -30,8 +30,8 @@ print(f"load {load:.4f} N turns the tip by 80 degrees and brings it to x = {exac
 errors = []
 for edges in (40, 80, 160):
     nodes = np.linspace((0, 0, 0), (LENGTH, 0, 0), edges + 1)
-    rod = gs.ElasticRod.of(nodes, wire, clamped={"start": (1, 0, 0)})
-    shape = gs.solve_rod(rod, forces={-1: (0, 0, -load)})
+    rod = rs.ElasticRod.of(nodes, wire, clamped={"start": (1, 0, 0)})
+    shape = rs.solve_rod(rod, forces={-1: (0, 0, -load)})
     errors.append(np.linalg.norm(shape.positions[-1] - exact))
     print(f"{edges:4d} edges: tip off by {1e3 * errors[-1]:.4f} mm, {shape.report.iterations} iterations")
 

@@ -9,55 +9,55 @@ from dataclasses import dataclass
 from math import degrees, pi
 from pathlib import Path
 
-import gridshell as gs
+import rodshell as rs
 
 DATA = Path(__file__).parent / "data"
 MM = 1e-3  # m
-LATH = gs.Rod(gs.Circle(radius=0.01), gs.Material(youngs_modulus=30e9, density=1900.0, poisson_ratio=0.3))
+LATH = rs.Rod(rs.Circle(radius=0.01), rs.Material(youngs_modulus=30e9, density=1900.0, poisson_ratio=0.3))
 
 
 @dataclass(frozen=True)
 class Piece:
     """A target and how it is gridded; the largest gaps, rms over the size, that its pop-ups may leave."""
 
-    target: gs.Target
+    target: rs.Target
     spacing: float
     pinned: float
     clamped: float
     anchor: tuple[float, float] | None = None
     rotate: float = 0.0
 
-    def layout(self) -> gs.GridLayout:
-        return gs.GridLayout.orthogonal(spacing=self.spacing, edge=self.spacing / 4, rotate=self.rotate)
+    def layout(self) -> rs.GridLayout:
+        return rs.GridLayout.orthogonal(spacing=self.spacing, edge=self.spacing / 4, rotate=self.rotate)
 
-    def form(self) -> gs.Form:
-        return gs.find_form(self.target, self.layout(), LATH, anchor=self.anchor)
+    def form(self) -> rs.Form:
+        return rs.find_form(self.target, self.layout(), LATH, anchor=self.anchor)
 
 
 def gallery() -> dict[str, Piece]:
     """The ten by name, one of them in two formats. On bumps, ridges and cusps the free grid springs off."""
-    disc = gs.Disc(5.0)
-    vault = gs.HeightField(formula="4*cos(0.28*x)", domain=gs.Rectangle((9.0, 12.0)))
+    disc = rs.Disc(5.0)
+    vault = rs.HeightField(formula="4*cos(0.28*x)", domain=rs.Rectangle((9.0, 12.0)))
     bumps = "2.2*exp(-((x - 2.2)^2 + y^2)/4.5) + 1.8*exp(-((x + 2.2)^2 + y^2)/4.5)"
     ridge = "2 - 0.03*x^2 - 0.04*y^2 + 0.02*x*y + 0.9*exp(-(0.88*x + 0.48*y)^2/16 - (0.88*y - 0.48*x)^2/2.5)"
     return {
-        "dome": Piece(gs.Hemisphere(radius=5.0), 0.8, 0.0105, 0.0001),
+        "dome": Piece(rs.Hemisphere(radius=5.0), 0.8, 0.0105, 0.0001),
         "barrel vault": Piece(vault, 0.9, 0.007, 0.003, rotate=pi / 4),
-        "saddle": Piece(gs.HeightField(formula="(x^2 - y^2)/16", domain=disc), 0.8, 0.0004, 0.0001),
-        "monkey saddle": Piece(gs.HeightField(formula="(x^3 - 3*x*y^2)/90", domain=disc), 0.8, 0.0025, 0.0005),
-        "two bumps": Piece(gs.HeightField(formula=bumps, domain=disc), 0.8, 0.032, 0.031),
-        "freeform, OBJ": Piece(gs.surface_from(DATA / "freeform.obj", unit=MM), 0.9, 0.0012, 0.0009),
-        "freeform, 3dm": Piece(gs.surface_from(DATA / "freeform.3dm"), 0.9, 0.0012, 0.0009),
-        "ball below its equator": Piece(gs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), 0.6, 0.0145, 0.0003),
-        "torus": Piece(gs.surface_from(DATA / "torus.obj", unit=MM), 0.7, 0.002, 0.0002),
+        "saddle": Piece(rs.HeightField(formula="(x^2 - y^2)/16", domain=disc), 0.8, 0.0004, 0.0001),
+        "monkey saddle": Piece(rs.HeightField(formula="(x^3 - 3*x*y^2)/90", domain=disc), 0.8, 0.0025, 0.0005),
+        "two bumps": Piece(rs.HeightField(formula=bumps, domain=disc), 0.8, 0.032, 0.031),
+        "freeform, OBJ": Piece(rs.surface_from(DATA / "freeform.obj", unit=MM), 0.9, 0.0012, 0.0009),
+        "freeform, 3dm": Piece(rs.surface_from(DATA / "freeform.3dm"), 0.9, 0.0012, 0.0009),
+        "ball below its equator": Piece(rs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), 0.6, 0.0145, 0.0003),
+        "torus": Piece(rs.surface_from(DATA / "torus.obj", unit=MM), 0.7, 0.002, 0.0002),
         "tent with an oculus": Piece(
-            gs.surface_from(DATA / "tent.obj", unit=MM), 0.6, 0.002, 0.0015, anchor=(0.0, 0.0)
+            rs.surface_from(DATA / "tent.obj", unit=MM), 0.6, 0.002, 0.0015, anchor=(0.0, 0.0)
         ),
-        "ridge": Piece(gs.HeightField(formula=ridge, domain=gs.Rectangle((10.0, 10.0))), 0.9, 0.021, 0.013),
+        "ridge": Piece(rs.HeightField(formula=ridge, domain=rs.Rectangle((10.0, 10.0))), 0.9, 0.021, 0.013),
     }
 
 
-def check(name: str, piece: Piece) -> gs.Form:
+def check(name: str, piece: Piece) -> rs.Form:
     """Form a piece and hold it to its figures."""
     form = piece.form()
     assert form.status == "converged", f"{name}: {form.status}"

@@ -8,17 +8,17 @@ from math import pi
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 
 EDGES, LENGTH, KAPPA, TAU = 160, 0.6, 40.0, 15.0  # m, 1/m, rad/m
-strip = gs.Rod(
-    section=gs.RectangularSection(width=0.2e-3, height=1e-3),
-    material=gs.Material(youngs_modulus=200e9, density=7850, poisson_ratio=0.3),
+strip = rs.Rod(
+    section=rs.RectangularSection(width=0.2e-3, height=1e-3),
+    material=rs.Material(youngs_modulus=200e9, density=7850, poisson_ratio=0.3),
 )
 nodes = np.linspace((0, 0, 0), (0, 0, LENGTH), EDGES + 1)
-rod = gs.ElasticRod.of(nodes, strip, natural=(KAPPA, 0), natural_twist=TAU, clamped={"start": (0, 0, 1)})
+rod = rs.ElasticRod.of(nodes, strip, natural=(KAPPA, 0), natural_twist=TAU, clamped={"start": (0, 0, 1)})
 
-coiled = gs.solve_rod(rod, steps=20)
+coiled = rs.solve_rod(rod, steps=20)
 edges = np.diff(coiled.positions, axis=0)
 turning = np.cross(edges[1] - edges[0], edges[2] - edges[1])
 axis = turning / np.linalg.norm(turning)
@@ -31,7 +31,7 @@ print(f"pitch  {1e3 * pitch:.3f} mm (exact {1e3 * 2 * pi * TAU / (KAPPA**2 + TAU
 print(f"energy left {coiled.energy / rod.energy(rod.state()):.1e} of the straight strip's")
 
 reach = (coiled.positions[-1] - coiled.positions[0]) @ axis
-drawn = gs.solve_rod(coiled.rod, start=coiled, forces={-1: 0.05 * axis}, steps=4)
+drawn = rs.solve_rod(coiled.rod, start=coiled, forces={-1: 0.05 * axis}, steps=4)
 longer = (drawn.positions[-1] - drawn.positions[0]) @ axis
 print(f"a pull of 50 mN draws it from {1e3 * reach:.1f} to {1e3 * longer:.1f} mm")
 

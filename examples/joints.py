@@ -1,6 +1,6 @@
 """What the joints do to the popped-up shape: from free scissors to welded, on two targets.
 
-The paper leaves open how the mechanics of the joints shape a gridshell (section 3.4). The rods of a net scissor as
+The paper leaves open how the mechanics of the joints shape a rodshell (section 3.4). The rods of a net scissor as
 they pop up, by 50 degrees at the hemisphere's rim, and a joint that resists this draws the shell away from its
 target. Joints here are rigid out of plane and in twist, with a shear stiffness k about their normal from 0 to rigid;
 what counts is k over EI / spacing, the stiffness of a rod between two joints.
@@ -10,11 +10,11 @@ from math import inf
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 
 SPACING = 0.04
-rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-layout = gs.GridLayout.orthogonal(rods="auto", spacing=SPACING, length="auto", edge=0.01)
+rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+layout = rs.GridLayout.orthogonal(rods="auto", spacing=SPACING, length="auto", edge=0.01)
 span = rod.bend_stiffness / SPACING  # N m/rad
 RATIOS = (0.0, *10.0 ** np.arange(-3.0, 3.5, 1.0), inf)
 
@@ -24,14 +24,14 @@ print(f"{'ends':>14}" + f"{'pinned':>11}{'clamped':>11}" * 2)
 gaps = {}
 for ratio in RATIOS:
     row = f"{ratio:14g}"
-    for name, target in (("hemisphere", gs.Hemisphere(radius=0.2)), ("ellipsoid", gs.Ellipsoid(a=0.2, b=0.15, c=0.12))):
-        trimmed = gs.trim(gs.drape(layout, rod, target))
-        footprint = gs.map_back(trimmed)
+    for name, target in (("hemisphere", rs.Hemisphere(radius=0.2)), ("ellipsoid", rs.Ellipsoid(a=0.2, b=0.15, c=0.12))):
+        trimmed = rs.trim(rs.drape(layout, rod, target))
+        footprint = rs.map_back(trimmed)
         for ends in ("pinned", "clamped"):
-            joint = gs.Spring(shear=ratio * span if ratio < inf else inf, out_of_plane=inf, twist=inf)
-            popped = gs.pop_up(footprint, trimmed.boundary, rod, ends=ends, joint=joint)
+            joint = rs.Spring(shear=ratio * span if ratio < inf else inf, out_of_plane=inf, twist=inf)
+            popped = rs.pop_up(footprint, trimmed.boundary, rod, ends=ends, joint=joint)
             assert popped.report.converged
-            gaps[name, ends, ratio] = gs.agreement(popped, target).rms_relative
+            gaps[name, ends, ratio] = rs.agreement(popped, target).rms_relative
             row += f"{100 * gaps[name, ends, ratio]:10.4f}{' ' if popped.report.stable else '*'}"
     print(row, flush=True)
 

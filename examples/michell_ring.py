@@ -9,11 +9,11 @@ from math import pi, sqrt
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 
 EDGES, LENGTH = 80, 1.0  # m
-rubber = gs.Rod(
-    section=gs.Circle(radius=2e-3), material=gs.Material(youngs_modulus=2e6, density=1100, poisson_ratio=0.5)
+rubber = rs.Rod(
+    section=rs.Circle(radius=2e-3), material=rs.Material(youngs_modulus=2e6, density=1100, poisson_ratio=0.5)
 )
 critical = 2 * pi * sqrt(3) * rubber.bend_stiffness / rubber.twist_stiffness
 print(f"EI/GJ = {rubber.bend_stiffness / rubber.twist_stiffness:.2f}: critical twist {critical / (2 * pi):.3f} turns")
@@ -24,8 +24,8 @@ nudged = circle + 1e-3 * LENGTH * np.column_stack([0 * angle, 0 * angle, np.sin(
 
 lost = {}
 for share in (0.9, 0.98, 1.02, 1.1):
-    ring = gs.ElasticRod.of(circle, rubber, closed=True, natural_twist=share * critical / LENGTH)
-    shape = gs.solve_rod(
+    ring = rs.ElasticRod.of(circle, rubber, closed=True, natural_twist=share * critical / LENGTH)
+    shape = rs.solve_rod(
         ring,
         start=ring.state(nudged),
         positions={0: None},  # with two more supports, as many as hold a rigid body and no more

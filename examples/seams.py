@@ -9,23 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 
-LATH = gs.Rod(gs.Circle(radius=0.01), gs.Material(youngs_modulus=30e9, density=1900.0, poisson_ratio=0.3))
-LAYOUT = gs.GridLayout.orthogonal(spacing=0.8, edge=0.2)
+LATH = rs.Rod(rs.Circle(radius=0.01), rs.Material(youngs_modulus=30e9, density=1900.0, poisson_ratio=0.3))
+LAYOUT = rs.GridLayout.orthogonal(spacing=0.8, edge=0.2)
 
 
-def bumps() -> gs.Target:
+def bumps() -> rs.Target:
     formula = "2.2*exp(-((x - 2.2)^2 + y^2)/4.5) + 1.8*exp(-((x + 2.2)^2 + y^2)/4.5)"
-    return gs.HeightField(formula=formula, domain=gs.Disc(5.0))
+    return rs.HeightField(formula=formula, domain=rs.Disc(5.0))
 
 
-def ball() -> gs.Target:
+def ball() -> rs.Target:
     """A sphere to four fifths of its height."""
-    return gs.Cap(radius=5.0, base=-3.0)
+    return rs.Cap(radius=5.0, base=-3.0)
 
 
-def check(form: gs.Sewn) -> None:
+def check(form: rs.Sewn) -> None:
     """Both patches end at the very same points, converged and stable."""
     assert form.status == "converged"
     for ends in form.popped:
@@ -41,21 +41,21 @@ def check(form: gs.Sewn) -> None:
         assert form.popped[ends][1].stable
 
 
-def roof() -> gs.Sewn:
+def roof() -> rs.Sewn:
     """In a valley a free grid springs off its target; a seam there holds it down."""
-    whole = gs.find_form(bumps(), LAYOUT, LATH, ends=("clamped",))
-    form = gs.sew(bumps(), [[(0.0, -6.0), (0.0, 6.0)]], LAYOUT, LATH)
+    whole = rs.find_form(bumps(), LAYOUT, LATH, ends=("clamped",))
+    form = rs.sew(bumps(), [[(0.0, -6.0), (0.0, 6.0)]], LAYOUT, LATH)
     assert form.agreement["clamped"].rms < 0.2 * whole.agreement["clamped"].rms
     return form
 
 
-def sphere() -> gs.Sewn:
+def sphere() -> rs.Sewn:
     """Rods of both families become parallel on the whole; on its halves they meet at 30 degrees and more."""
     try:
-        gs.find_form(ball(), LAYOUT, LATH)
-    except gs.NetLimitError as reason:
+        rs.find_form(ball(), LAYOUT, LATH)
+    except rs.NetLimitError as reason:
         print(reason)
-    form = gs.sew(ball(), [[(-6.0, 0.0), (6.0, 0.0)]], LAYOUT, LATH)
+    form = rs.sew(ball(), [[(-6.0, 0.0), (6.0, 0.0)]], LAYOUT, LATH)
     assert min(degrees(laid.net.min_angle) for laid in form.laid.values()) > 30.0
     assert form.agreement["clamped"].rms_relative < 5e-4
     return form

@@ -9,20 +9,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 
 STEPS = 8
-rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 
-Design = tuple[gs.Target, gs.GridLayout, tuple[float, float]]
+Design = tuple[rs.Target, rs.GridLayout, tuple[float, float]]
 
 
 def design(
     *, spacing: float = 0.03, heading: float = 0.0, anchor: float = 0.0, radius: float = 0.2
 ) -> Design:  # m, rad, m, m
     """17 x 17 rods on a hemisphere, 5 mm edges."""
-    layout = gs.GridLayout.orthogonal(rods=(17, 17), spacing=spacing, length=1.4, edge=0.005, rotate=heading)
-    return gs.Hemisphere(radius=radius), layout, (anchor, 0.0)
+    layout = rs.GridLayout.orthogonal(rods=(17, 17), spacing=spacing, length=1.4, edge=0.005, rotate=heading)
+    return rs.Hemisphere(radius=radius), layout, (anchor, 0.0)
 
 
 sliders: dict[str, Callable[[float], Design]] = {
@@ -33,28 +33,28 @@ sliders: dict[str, Callable[[float], Design]] = {
 }
 
 target, layout, anchor = design()
-first = gs.drape(layout, rod, target, anchor=anchor)
-gs.map_back(gs.trim(first))
+first = rs.drape(layout, rod, target, anchor=anchor)
+rs.map_back(rs.trim(first))
 print("net, drape, trim and map back, 17 x 17 rods, 5 mm edges")
 for name, at in sliders.items():
     draped, times = first, []
     for t in np.linspace(1 / STEPS, 1.0, STEPS):
         target, layout, anchor = at(float(t))
         begin = time.perf_counter()
-        draped = gs.drape(layout, rod, target, anchor=anchor, start=draped)
-        footprint = gs.map_back(gs.trim(draped))
+        draped = rs.drape(layout, rod, target, anchor=anchor, start=draped)
+        footprint = rs.map_back(rs.trim(draped))
         times.append(time.perf_counter() - begin)
-    afresh = gs.map_back(gs.trim(gs.drape(layout, rod, target, anchor=anchor)))
+    afresh = rs.map_back(rs.trim(rs.drape(layout, rod, target, anchor=anchor)))
     assert [one.name for one in footprint.rods] == [one.name for one in afresh.rods]
     apart = float(np.abs(footprint.points - afresh.points).max())
     assert apart < 1e-9 * target.size  # the net's equations are solved to 1e-12
     print(f"{name:>8}: {1 / np.median(times):5.1f} updates a second, {apart:.0e} m from the answer found from nothing")
 
 target, layout, anchor = design()
-form = gs.find_form(target, layout, rod, anchor=anchor)
+form = rs.find_form(target, layout, rod, anchor=anchor)
 target, layout, anchor = design(spacing=0.0306)
-again = gs.find_form(target, layout, rod, anchor=anchor, start=form)
-afresh = gs.find_form(target, layout, rod, anchor=anchor)
+again = rs.find_form(target, layout, rod, anchor=anchor, start=form)
+afresh = rs.find_form(target, layout, rod, anchor=anchor)
 for ends, popped in again.popped.items():
     assert popped.report.stable
     assert np.abs(popped.positions - afresh.popped[ends].positions).max() < 1e-9 * target.size

@@ -9,22 +9,22 @@ from pathlib import Path
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 
-ROD = gs.Rod(section=gs.Circle(radius=2e-3), material=gs.Material(youngs_modulus=1e9, density=1e3))
+ROD = rs.Rod(section=rs.Circle(radius=2e-3), material=rs.Material(youngs_modulus=1e9, density=1e3))
 NODES = 41
 UNTIL = 0.6  # s
 
 
-def swing(step: float, until: float = UNTIL, stream: Path | None = None) -> gs.TimeSeries:
+def swing(step: float, until: float = UNTIL, stream: Path | None = None) -> rs.TimeSeries:
     """A straight cantilever of 1 m, let go under its own weight."""
     rest = np.column_stack([np.linspace(0, 1, NODES), np.zeros(NODES), np.zeros(NODES)])
-    rod = gs.ElasticRod.of(rest, ROD, clamped=("start",))
-    motion = gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes),))
-    return gs.simulate(motion, rod.state(), until=until, step=step, stream=stream)
+    rod = rs.ElasticRod.of(rest, ROD, clamped=("start",))
+    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),))
+    return rs.simulate(motion, rod.state(), until=until, step=step, stream=stream)
 
 
-def energy(series: gs.TimeSeries) -> np.ndarray:
+def energy(series: rs.TimeSeries) -> np.ndarray:
     """Elastic, kinetic and of the height [J] at each time."""
     assert series.last is not None
     weight = 9.81 * series.last.motion.mass[:NODES, 2]
@@ -47,11 +47,11 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         first = swing(1e-3, until=UNTIL / 2, stream=Path(folder))
-        on_disk = gs.TimeSeries.load(folder)
+        on_disk = rs.TimeSeries.load(folder)
         assert np.array_equal(on_disk.states, first.states)
     last = first.last
     assert last is not None
-    rest = gs.simulate(last.motion, last.state, last.velocity, start=UNTIL / 2, until=UNTIL, step=1e-3)
+    rest = rs.simulate(last.motion, last.state, last.velocity, start=UNTIL / 2, until=UNTIL, step=1e-3)
     apart = np.abs(rest.states[-1] - swing(1e-3).states[-1]).max()
     print(f"stopped half way and gone on: {apart:.1e} from the swing in one go")
     assert apart < 1e-9

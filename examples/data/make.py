@@ -20,7 +20,7 @@ def lattice(x, y, z):
 def write_obj(name, points, faces):
     lines = [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in points.tolist()]
     lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
-    (HERE / name).write_text("\n".join([f"# gridshell gallery, {name}, mm", *lines, ""]))
+    (HERE / name).write_text("\n".join([f"# rodshell gallery, {name}, mm", *lines, ""]))
 
 
 # control heights of a free surface over 12 m x 9 m, mm: high towards one corner, pulled in on one side

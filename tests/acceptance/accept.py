@@ -16,4 +16,4 @@ def rows() -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(print_table(rows()))
+    sys.exit(print_table("accept", rows()))

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 from math import cos, pi, sin
 from typing import Any
 
-import gridshell as gs
+import rodshell as rs
 
 R = 0.2
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))  # HQK section 3.2
-DISC = gs.Disc(R)
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))  # HQK section 3.2
+DISC = rs.Disc(R)
 
 
 @dataclass(frozen=True)
@@ -16,13 +16,13 @@ class AcceptanceCase:
     """A target and a layout; `convex` where nearly all of the pinned gap is the missing end moment."""
 
     name: str
-    target: gs.Target
+    target: rs.Target
     layout: dict[str, Any] = field(default_factory=dict)
     anchor: tuple[float, float] | None = None
     clamped_rms: float | None = None
 
-    def grid(self, **changes: Any) -> gs.GridLayout:
-        return gs.GridLayout.orthogonal(**{"spacing": 0.03, "edge": 0.005, **self.layout, **changes})
+    def grid(self, **changes: Any) -> rs.GridLayout:
+        return rs.GridLayout.orthogonal(**{"spacing": 0.03, "edge": 0.005, **self.layout, **changes})
 
 
 def ridge_formula() -> str:
@@ -34,10 +34,10 @@ def ridge_formula() -> str:
 BUMP = "exp(-((x {sign} .09)^2/.06^2 + y^2/.07^2)/2)"
 TWO_BUMPS = f"0.08*({BUMP.format(sign='-')} + {BUMP.format(sign='+')})"
 
-HEMISPHERE = gs.Hemisphere(R)
-CAP = gs.Cap(radius=0.25, base=0.1)
-PARABOLOID = gs.Paraboloid(radius=R, height=0.12)
-ELLIPSOID = gs.Ellipsoid(a=0.2, b=0.15, c=0.12)
+HEMISPHERE = rs.Hemisphere(R)
+CAP = rs.Cap(radius=0.25, base=0.1)
+PARABOLOID = rs.Paraboloid(radius=R, height=0.12)
+ELLIPSOID = rs.Ellipsoid(a=0.2, b=0.15, c=0.12)
 
 # the paper's counts (HQK section 3.2); the number is the largest clamped gap, rms over the size
 PAPER = (
@@ -61,10 +61,10 @@ AUTO = (
 FURTHER = (
     AcceptanceCase("hemisphere, anchor (0.1, 0)", HEMISPHERE, anchor=(0.1, 0.0)),
     AcceptanceCase("ellipsoid turned by 45 deg", ELLIPSOID, {"rotate": pi / 4}, clamped_rms=0.002),
-    AcceptanceCase("paraboloid H = 2R", gs.Paraboloid(radius=R, height=2 * R)),
-    AcceptanceCase("hypar", gs.HeightField(formula="(x^2 - y^2)/0.8", domain=DISC)),
-    AcceptanceCase("two bumps", gs.HeightField(formula=TWO_BUMPS, domain=DISC)),
-    AcceptanceCase("ridge", gs.HeightField(formula=ridge_formula(), domain=DISC)),
+    AcceptanceCase("paraboloid H = 2R", rs.Paraboloid(radius=R, height=2 * R)),
+    AcceptanceCase("hypar", rs.HeightField(formula="(x^2 - y^2)/0.8", domain=DISC)),
+    AcceptanceCase("two bumps", rs.HeightField(formula=TWO_BUMPS, domain=DISC)),
+    AcceptanceCase("ridge", rs.HeightField(formula=ridge_formula(), domain=DISC)),
 )
-BEYOND = AcceptanceCase("cap with base -0.18", gs.Cap(radius=R, base=-0.18))
-SHARP = AcceptanceCase("gaussian", gs.HeightField(formula=".3*exp(-(x^2 + y^2)/(2*.05^2))", domain=DISC))
+BEYOND = AcceptanceCase("cap with base -0.18", rs.Cap(radius=R, base=-0.18))
+SHARP = AcceptanceCase("gaussian", rs.HeightField(formula=".3*exp(-(x^2 + y^2)/(2*.05^2))", domain=DISC))

@@ -6,16 +6,16 @@ from math import radians
 
 import numpy as np
 
-import gridshell as gs
-from gridshell.paper.two_rods import Demonstration, run, run_statics
-from gridshell.solve.step_limit import step_limit
+import rodshell as rs
+from rodshell.paper.two_rods import Demonstration, run, run_statics
+from rodshell.solve.step_limit import step_limit
 from tests.acceptance.rows import Row, print_table
 from tests.analytic import coupling_problems as couplings
 from tests.analytic import joint_problems as joints
 from tests.analytic.rod_problems import order
 
 STEPS = np.array([200, 400, 800, 1600])
-SOME = {"pin": gs.Pin(), "rigid": gs.Rigid(), "spring": gs.Spring(0.002, 0.01, 0.01)}
+SOME = {"pin": rs.Pin(), "rigid": rs.Rigid(), "spring": rs.Spring(0.002, 0.01, 0.01)}
 
 
 def converging(case: str, what: str, errors: list[float], bound: float = 0.5) -> Iterator[Row]:
@@ -25,14 +25,14 @@ def converging(case: str, what: str, errors: list[float], bound: float = 0.5) ->
 
 
 def structure_rows() -> Iterator[Row]:
-    for name, joint in (("rigid", gs.Rigid()), ("spring 5 N m", gs.Spring(5.0)), ("spring 0.3 N m", gs.Spring(0.3))):
+    for name, joint in (("rigid", rs.Rigid()), ("spring 5 N m", rs.Spring(5.0)), ("spring 0.3 N m", rs.Spring(0.3))):
         errors = [joints.portal_sway(edge, joint) - 1 for edge in joints.MESHES]
         yield from converging(f"portal frame, {name}", "sway", errors)
     for star, rods in joints.STARS.items():
         for name, joint in joints.JOINTS.items():
             errors = [joints.Star(rods, joint).error(edge) for edge in joints.MESHES]
             yield from converging(f"{star}, {name}", "compliance", errors)
-    for name, joint in (("pin", gs.Pin()), ("rigid, rest angle given", gs.Rigid(rest_angle=np.pi / 2))):
+    for name, joint in (("pin", rs.Pin()), ("rigid, rest angle given", rs.Rigid(rest_angle=np.pi / 2))):
         star = joints.Star(joints.STARS["two crossing rods"], joint)
         apart = star.compliance(0.1, turned=radians(50)) / star.compliance(0.1) - 1
         yield Row(f"grid sheared by 50 degrees, {name}", "off one built so", abs(apart), 1e-6)
@@ -43,28 +43,28 @@ def structure_rows() -> Iterator[Row]:
 
 def lattice_rows() -> Iterator[Row]:
     for angle in (60, -60):
-        free, force = joints.folding_energy(gs.Pin(), radians(angle))
-        stiff, _ = joints.folding_energy(gs.Rigid(), radians(angle))
+        free, force = joints.folding_energy(rs.Pin(), radians(angle))
+        stiff, _ = joints.folding_energy(rs.Rigid(), radians(angle))
         case = f"lattice folded by {angle} degrees"
         yield Row(case, "energy, pins over rigid joints", free / stiff, 1e-6, "", f"force {force:.0e} N")
-    pinned, rigid = (joints.bending_stiffness(joint) for joint in (gs.Pin(), gs.Rigid()))
+    pinned, rigid = (joints.bending_stiffness(joint) for joint in (rs.Pin(), rs.Rigid()))
     yield Row("lattice bent along its rods", "pins and rigid joints apart", abs(pinned / rigid - 1), 1e-9)
     exact = 3 * joints.EI / 1.1
     yield Row("lattice bent along its rods", "off three rods alone", abs(pinned / exact - 1), 1e-8)
 
 
 def symmetry_rows() -> Iterator[Row]:
-    for name, joint in (("ball", gs.Ball()), *SOME.items(), ("four linkers", gs.Linker(corners=4))):
+    for name, joint in (("ball", rs.Ball()), *SOME.items(), ("four linkers", rs.Linker(corners=4))):
         planes, diagonal = joints.asymmetry(joint)
         yield Row(f"symmetric shell, {name}", "off its mirror images, over R", max(planes, diagonal), 1e-9)
-    planes, _ = joints.asymmetry(gs.Linker())
+    planes, _ = joints.asymmetry(rs.Linker())
     note = f"it is there: {planes:.1e} R"
     yield Row("symmetric shell, the paper's linkers", "chirality not seen", float(planes < 1e-6), 0, "", note)
     for angle, known in ((37.6, 2.7e-4), (142.4, 2.4e-3)):
         energy = joints.linker_energy(radians(angle), 2)
         note = f"{energy:.3e} J"
         yield Row(f"two linkers at {angle} degrees", "energy off numerics.md", abs(energy / known - 1), 0.02, "", note)
-    stiffer = 100 * (joints.bending_stiffness(gs.Linker()) / joints.bending_stiffness(gs.Pin()) - 1)
+    stiffer = 100 * (joints.bending_stiffness(rs.Linker()) / joints.bending_stiffness(rs.Pin()) - 1)
     note = f"{stiffer:.1f} % at 3 edges a spacing"
     yield Row("the paper's linkers", "do not stiffen the rods along themselves", float(stiffer < 1), 0, "", note)
 
@@ -82,18 +82,18 @@ def coupling_rows() -> Iterator[Row]:
         slope = order(1 / STEPS, errors)
         note = f"slope {slope:.3f}"
         yield Row(f"explicit ties, {name}", "to implicit: slope in h off 1", abs(slope - 1), 0.1, "", note)
-        whole = couplings.masses(couplings.bent(joint, gs.SharedDofs()))
-        for coupling in (gs.ImplicitPenalty(), gs.ExplicitPenalty()):
+        whole = couplings.masses(couplings.bent(joint, rs.SharedDofs()))
+        for coupling in (rs.ImplicitPenalty(), rs.ExplicitPenalty()):
             mass = couplings.masses(couplings.bent(joint, coupling))
             off = max(abs(a / b - 1) for a, b in zip(mass, whole, strict=True))
             yield Row(f"{coupling.name} ties, {name}", "total mass and inertia off", off, 1e-14)
         below, above = couplings.growth(joint, 0.95, 10_000), couplings.growth(joint, 1.05, 10_000)
         shell = couplings.element(joint)
-        limit = step_limit(gs.Motion.of(shell), joints.flat_state(shell))
+        limit = step_limit(rs.Motion.of(shell), joints.flat_state(shell))
         case = f"explicit ties, {name}"
         yield Row(case, "growth in 1e4 steps, 5 % below", below, 3, "", f"limit {1e3 * limit:.3f} ms")
         yield Row(case, "does not blow up 5 % above", float(np.isfinite(above)), 0)
-        width, count = couplings.systems(couplings.bent(joint, gs.ExplicitPenalty()))
+        width, count = couplings.systems(couplings.bent(joint, rs.ExplicitPenalty()))
         note = f"{count} systems of their own"
         yield Row(case, "half bandwidth off one rod's, 10", abs((width or np.inf) - 10), 0, "", note)
     for name, ratio in couplings.closed_form_limits().items():
@@ -101,9 +101,9 @@ def coupling_rows() -> Iterator[Row]:
 
 
 def demonstration_rows() -> Iterator[Row]:
-    cases: list[tuple[Demonstration, gs.Linker | gs.Pin]] = [("twisting", gs.Linker()), ("bending", gs.Linker())]
-    for demonstration, joint in (*cases, ("twisting", gs.Pin())):
-        for coupling in (gs.SharedDofs(), gs.ImplicitPenalty(), gs.ExplicitPenalty()):
+    cases: list[tuple[Demonstration, rs.Linker | rs.Pin]] = [("twisting", rs.Linker()), ("bending", rs.Linker())]
+    for demonstration, joint in (*cases, ("twisting", rs.Pin())):
+        for coupling in (rs.SharedDofs(), rs.ImplicitPenalty(), rs.ExplicitPenalty()):
             one = run(demonstration, joint, coupling, until=3.0)
             case = f"Fig 4 {demonstration}, {joint.name}, {coupling.name}"
             lag = float(np.degrees(one.start_up_lag))
@@ -113,11 +113,11 @@ def demonstration_rows() -> Iterator[Row]:
             if coupling.name != "explicit":
                 yield Row(case, "start-up lag", lag, 0.25, "deg")
     for demonstration, joint in cases:
-        for coupling in (gs.SharedDofs(), gs.ImplicitPenalty()):
+        for coupling in (rs.SharedDofs(), rs.ImplicitPenalty()):
             still = run_statics(demonstration, joint, coupling)
             case = f"Fig 4 {demonstration}, {joint.name}, {coupling.name}, statics"
             yield Row(case, "lag", float(np.degrees(still.start_up_lag)), 1e-4, "deg")
-    behind = run("bending", gs.Pin(), gs.SharedDofs(), until=3.0)
+    behind = run("bending", rs.Pin(), rs.SharedDofs(), until=3.0)
     note = f"rod 2 turned by {np.degrees(np.ptp(behind.angles)):.1g} of 180 degrees"
     yield Row("Fig 4 bending, pin, shared", "passes, though it must not", float(behind.follows), 0, "", note)
 
@@ -131,4 +131,4 @@ def all_rows() -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(print_table(all_rows()))
+    sys.exit(print_table("joints", all_rows()))

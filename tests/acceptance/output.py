@@ -15,12 +15,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-import gridshell as gs
-from gridshell.checks import bending
-from gridshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
-from gridshell.output import Archive
-from gridshell.output.archive import export
-from gridshell.output.files import DEFAULT
+import rodshell as rs
+from rodshell.checks import bending
+from rodshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
+from rodshell.output import Archive
+from rodshell.output.archive import export
+from rodshell.output.files import DEFAULT
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
 from tests.acceptance.rows import Row, print_table
 
@@ -31,14 +31,14 @@ from sample_archive import sample_archive, with_way_up
 TARGETS = {
     "hemisphere": (HEMISPHERE, {"rods": (17, 17)}),
     "ellipsoid at 45 deg": (ELLIPSOID, {"rotate": np.pi / 4}),
-    "ridge": (gs.HeightField(formula=ridge_formula(), domain=gs.Disc(R)), {}),
+    "ridge": (rs.HeightField(formula=ridge_formula(), domain=rs.Disc(R)), {}),
 }
 
 
 @cache
-def form_of(name: str) -> gs.Form:
+def form_of(name: str) -> rs.Form:
     target, layout = TARGETS[name]
-    return gs.find_form(target, gs.GridLayout.orthogonal(**{"spacing": 0.03, "edge": 0.005, **layout}), ROD)
+    return rs.find_form(target, rs.GridLayout.orthogonal(**{"spacing": 0.03, "edge": 0.005, **layout}), ROD)
 
 
 @cache
@@ -52,7 +52,7 @@ def rebuilt_rows(name: str) -> Iterator[Row]:
         export(archive_of(name), folder, ["dxf"])
         flat, final = rods_of_dxf(Path(folder) / "drawings/plan.dxf")
     grid = straight_rods(1e-3 * flat, names=[rod["id"] for rod in archive_of(name).result["rods"]])
-    again = gs.pop_up_table(grid, 1e-3 * final, ROD, edge=0.005)
+    again = rs.pop_up_table(grid, 1e-3 * final, ROD, edge=0.005)
     shape = again.popped["pinned"]
     mesh, first = again.footprint.mesh, form_of(name).footprint.mesh
     names = [[rod.name for rod in one.grid.rods] for one in (mesh, first)]
@@ -65,7 +65,7 @@ def rebuilt_rows(name: str) -> Iterator[Row]:
     yield Row(name, "joints that only one of both has", len(here.keys() ^ there.keys()), 0)
 
 
-def _joints(mesh: gs.GridMesh, names: list[str], positions: np.ndarray) -> dict[frozenset[str], np.ndarray]:
+def _joints(mesh: rs.GridMesh, names: list[str], positions: np.ndarray) -> dict[frozenset[str], np.ndarray]:
     pairs = mesh.grid.crossings.rods.tolist()
     return {frozenset((names[a], names[b])): positions[n] for (a, b), n in zip(pairs, mesh.joint_nodes, strict=True)}
 
@@ -171,7 +171,7 @@ def vault(across: int) -> Archive:
          "length": rod.length, "joints": met}
         for rod, met in zip(rods, joints, strict=True)
     ]  # fmt: skip
-    result = {"format": "gridshell-result", "version": 1, "status": "converged", "name": "vault", "rods": entries,
+    result = {"format": "rodshell-result", "version": 1, "status": "converged", "name": "vault", "rods": entries,
               "footprint": mesh.flat[ends, :2].tolist(), "boundary": bent[ends].tolist()}  # fmt: skip
     states = {"flat": mesh.flat, "popped_pinned": bent, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
     return with_way_up(Archive(result, states), 9)
@@ -208,4 +208,4 @@ def all_rows() -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(print_table(all_rows()))
+    sys.exit(print_table("output", all_rows()))

@@ -12,49 +12,49 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-import gridshell as gs
-from gridshell.errors import StabilityError
-from gridshell.formfinding.draped import Draped
-from gridshell.formfinding.fall import Fall
-from gridshell.formfinding.progress import silent
-from gridshell.formfinding.rising import Rise, pop_up_in_time
-from gridshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
-from gridshell.paper import fig8, genetic
+import rodshell as rs
+from rodshell.errors import StabilityError
+from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.progress import silent
+from rodshell.formfinding.rising import Rise, pop_up_in_time
+from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
+from rodshell.paper import fig8, genetic
 from tests.acceptance.rows import Row, print_table
 from tests.paper.falls import TARGETS, Particles
 
-ROD = gs.Rod(gs.Circle(radius=1e-3), gs.Material(1e6, 1e3))
+ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(1e6, 1e3))
 COUNTS = {"hemisphere": (17, 17), "paraboloid": (15, 15), "ellipsoid": (11, 15)}
 EDGE = 0.015  # [m]: with 17x17 rods 8k unknowns, as the paper says of its own grids
 C1 = 1e6 * ROD.bend_stiffness  # the paper's number, taken as N/m
 DRAG = 3.0  # [1/s]: tails stop swinging; an equilibrium does not depend on it
 
 
-def layout(name: str) -> gs.GridLayout:
-    return gs.GridLayout.orthogonal(rods=COUNTS[name], spacing=0.03, edge=EDGE, length=1.2)
+def layout(name: str) -> rs.GridLayout:
+    return rs.GridLayout.orthogonal(rods=COUNTS[name], spacing=0.03, edge=EDGE, length=1.2)
 
 
 @cache
 def fallen(name: str, fall: Fall, stretch: float = 1.0) -> Draped:
-    return gs.drape(layout(name), stretched(stretch), TARGETS[name], method="paper", fall=fall)
+    return rs.drape(layout(name), stretched(stretch), TARGETS[name], method="paper", fall=fall)
 
 
 @cache
 def hanging(name: str) -> Draped:
-    return gs.drape(layout(name), ROD, TARGETS[name], method="gravity")
+    return rs.drape(layout(name), ROD, TARGETS[name], method="gravity")
 
 
-def stretched(factor: float) -> gs.Rod:
+def stretched(factor: float) -> rs.Rod:
     """The paper's rod with EA times `factor`; EI and mass as they are."""
-    section = gs.Circle(radius=1e-3 / np.sqrt(factor))
-    return gs.Rod(section, gs.Material(youngs_modulus=1e6 * factor**2, density=1e3 * factor))
+    section = rs.Circle(radius=1e-3 / np.sqrt(factor))
+    return rs.Rod(section, rs.Material(youngs_modulus=1e6 * factor**2, density=1e3 * factor))
 
 
 def net_errors(draped: Draped) -> np.ndarray:
     """How far G0's rod ends lie beyond those of the hemisphere's exact net [mm]."""
-    rods = gs.trim(draped).mesh.grid.rods
+    rods = rs.trim(draped).mesh.grid.rods
     return 1e3 * np.array(
-        [end - gs.sphere_net_end(0.2, abs(rod.offset)) for rod in rods for end in (rod.end, -rod.start)]
+        [end - rs.sphere_net_end(0.2, abs(rod.offset)) for rod in rods for end in (rod.end, -rod.start)]
     )
 
 
@@ -90,7 +90,7 @@ def refused(name: str, step: float) -> str:
     """What the paper's scheme says against a time step [s], or nothing."""
     fall = Fall(coupling=ExplicitPenalty(C1=C1), time_step=step, duration=2.0)
     try:
-        gs.drape(layout(name), ROD, TARGETS[name], method="paper", fall=fall)
+        rs.drape(layout(name), ROD, TARGETS[name], method="paper", fall=fall)
     except StabilityError as error:
         return str(error)
     return ""
@@ -136,7 +136,7 @@ def linker_rows() -> Iterator[Row]:
     off, gap = apart(whole[explicit], whole[corners]), 1e3 * rest.joint_gap
     note = f"{off:.1f} mm after 1 s"
     yield Row("linkers, explicit and corner elements", "apart, in joint gaps", off / gap, 5.0, "", note)
-    coarse, until = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=EDGE, length=0.9), 0.5
+    coarse, until = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=EDGE, length=0.9), 0.5
     step = until / np.ceil(until * rest.steps)
     ends = {one: with_linkers(coarse, one, until, step) for one in (explicit, corners, same, stiff)}
     case, note = "linkers, what they differ by", f"7x7 rods, steps of {1e3 * step:.2f} ms, after {until} s"
@@ -148,9 +148,9 @@ def linker_rows() -> Iterator[Row]:
     yield Row(case, "steps of 10 ms", apart(slow, ends[corners]), 20.0, "mm", note)
 
 
-def with_linkers(grid: gs.GridLayout, coupling: Coupling, until: float, step: float | None = None) -> Draped:
+def with_linkers(grid: rs.GridLayout, coupling: Coupling, until: float, step: float | None = None) -> Draped:
     fall = Fall(coupling=coupling, drag=5.0, duration=until, time_step=step, settle=False)
-    return gs.drape(grid, ROD, TARGETS["hemisphere"], method="paper", fall=fall, joint=Linker())
+    return rs.drape(grid, ROD, TARGETS["hemisphere"], method="paper", fall=fall, joint=Linker())
 
 
 def tail_rows() -> Iterator[Row]:
@@ -167,12 +167,12 @@ def tail_rows() -> Iterator[Row]:
 
 def friction_rows() -> Iterator[Row]:
     """The paper's grid, with edges of 30 mm, from 1 mm off the middle: how far it has gone 10 s after its fall."""
-    coarse = gs.GridLayout.orthogonal(rods=(17, 17), spacing=0.03, edge=0.03, length=1.2)
+    coarse = rs.GridLayout.orthogonal(rods=(17, 17), spacing=0.03, edge=0.03, length=1.2)
     for friction in (0.2, 0.0):
         offsets = []
         for duration in (2.0, 12.0):
             fall = Fall(friction=friction, drag=5.0, stopped="along the normal", duration=duration, settle=False)
-            draped = gs.drape(coarse, ROD, TARGETS["hemisphere"], method="paper", anchor=(1e-3, 0.0), fall=fall)
+            draped = rs.drape(coarse, ROD, TARGETS["hemisphere"], method="paper", anchor=(1e-3, 0.0), fall=fall)
             middle = draped.positions[np.argmin(np.linalg.norm(draped.mesh.flat, axis=1))]
             offsets.append(1e3 * float(np.linalg.norm(middle[:2])))
         note = f"offset {offsets[0]:.3f} mm after 2 s, {offsets[1]:.3f} mm after 12 s"
@@ -183,8 +183,8 @@ def friction_rows() -> Iterator[Row]:
 
 
 def pop_up_rows() -> Iterator[Row]:
-    coarse = gs.GridLayout.orthogonal(rods=(9, 9), spacing=0.04, edge=0.02, length=0.9)
-    form = gs.find_form(TARGETS["hemisphere"], coarse, ROD, ends=("pinned",))
+    coarse = rs.GridLayout.orthogonal(rods=(9, 9), spacing=0.04, edge=0.02, length=0.9)
+    form = rs.find_form(TARGETS["hemisphere"], coarse, ROD, ends=("pinned",))
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     for coupling in couplings:
         risen = pop_up_in_time(form.footprint, form.trimmed.boundary, ROD, rise=Rise(coupling=coupling))
@@ -239,7 +239,7 @@ ROWS: tuple[Callable[[], Iterator[Row]], ...] = (
 def main() -> int:
     """All groups of rows, or those that are named: `python -m tests.acceptance.paper tail explicit`."""
     chosen = [rows for rows in ROWS if not sys.argv[1:] or rows.__name__.removesuffix("_rows") in sys.argv[1:]]
-    return print_table(row for rows in chosen for row in rows())
+    return print_table("paper", (row for rows in chosen for row in rows()))
 
 
 if __name__ == "__main__":

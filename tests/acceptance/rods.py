@@ -7,7 +7,7 @@ from math import radians
 
 import numpy as np
 
-from gridshell.rods.bend_twist import BendTwist
+from rodshell.rods.bend_twist import BendTwist
 from tests.acceptance.rows import Row, print_table
 from tests.analytic import rod_problems as exact
 from tests.derivatives import test_elements as elements
@@ -104,4 +104,4 @@ def all_rows() -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(print_table(all_rows()))
+    sys.exit(print_table("rods", all_rows()))

@@ -63,4 +63,4 @@ def dynamics_rows() -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(print_table(chain(dynamics_rows(), scaling_rows())))
+    sys.exit(print_table("rods-dynamics", chain(dynamics_rows(), scaling_rows())))

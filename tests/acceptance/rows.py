@@ -1,13 +1,17 @@
 """The acceptance table, row by row: what was measured, and the figure that it must reach."""
 
+import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 from tests.acceptance.cases import AUTO, BEYOND, FURTHER, PAPER, ROD, SHARP, AcceptanceCase
 from tests.analytic.goursat import goursat_ends
+
+FOLDER = Path(__file__).parents[2] / "accept"
 
 
 @dataclass(frozen=True)
@@ -31,32 +35,40 @@ class Row:
         return f"{verdict} {self.case:<36} {self.what:<38} {figure} {self.note}"
 
 
-def print_table(rows: Iterable[Row]) -> int:
-    """Print rows as they come; 1 where a figure is missed, for `sys.exit`."""
-    missed = 0
+def print_table(name: str, rows: Iterable[Row]) -> int:
+    """Print rows as they come and write them to accept/`name`.json; 1 where a figure is missed, for `sys.exit`.
+
+    A row of that file holds case, what, value, bound, unit and reached; it is written when the table is complete.
+    """
+    entries = []
     for row in rows:
         print(row, flush=True)
-        missed += not row.reached
+        entry = {"case": row.case, "what": row.what, "value": float(row.measured), "bound": float(row.bound)}
+        entries.append({**entry, "unit": row.unit, "reached": bool(row.reached)})
+    FOLDER.mkdir(exist_ok=True)
+    lines = ",\n".join(f" {json.dumps(entry)}" for entry in entries)
+    (FOLDER / f"{name}.json").write_text(f"[\n{lines}\n]\n")
+    missed = sum(not entry["reached"] for entry in entries)
     print(f"{missed} figures missed" if missed else "every figure reached")
     return 1 if missed else 0
 
 
-_FORMS: dict[str, gs.Form] = {}
+_FORMS: dict[str, rs.Form] = {}
 
 
-def form_of(case: AcceptanceCase) -> gs.Form:
+def form_of(case: AcceptanceCase) -> rs.Form:
     """The case's form; found once."""
     if case.name not in _FORMS:
-        _FORMS[case.name] = gs.find_form(case.target, case.grid(), ROD, anchor=case.anchor)
+        _FORMS[case.name] = rs.find_form(case.target, case.grid(), ROD, anchor=case.anchor)
     return _FORMS[case.name]
 
 
 def net_rows(case: AcceptanceCase) -> Iterator[Row]:
     """Every rod end of G0 against the net found without the compass rule, on the sphere by its similarity equation."""
     rods = form_of(case).footprint.rods
-    if isinstance(case.target, gs.Hemisphere):
+    if isinstance(case.target, rs.Hemisphere):
         exact = [
-            [sign * gs.sphere_net_end(case.target.radius, rod.offset, case.target.base or 0.0) for sign in (-1, 1)]
+            [sign * rs.sphere_net_end(case.target.radius, rod.offset, case.target.base or 0.0) for sign in (-1, 1)]
             for rod in rods
         ]
         how = "similarity equation"
@@ -110,7 +122,7 @@ def flat_rows() -> Iterator[Row]:
     """The hemisphere from flat and from draped."""
     form = form_of(PAPER[0])
     for ends, shell in form.popped.items():
-        risen = gs.pop_up(form.footprint, form.trimmed.boundary, ROD, ends=ends, start="flat")
+        risen = rs.pop_up(form.footprint, form.trimmed.boundary, ROD, ends=ends, start="flat")
         apart = float(np.abs(risen.positions - shell.positions).max()) / form.target.size
         note = f"{risen.report.factorizations} factorisations from flat"
         yield Row(PAPER[0].name, f"from flat and draped apart, {ends}", apart, 1e-5, note=note)
@@ -121,7 +133,7 @@ def refused_rows() -> Iterator[Row]:
     try:
         form_of(BEYOND)
         refused = "NOT REFUSED"
-    except gs.NetLimitError as error:
+    except rs.NetLimitError as error:
         refused = str(error)
     yield Row(BEYOND.name, "not refused with the place of the limit", float("near (" not in refused), 0, note=refused)
     form = form_of(SHARP)
@@ -130,7 +142,7 @@ def refused_rows() -> Iterator[Row]:
     yield Row(SHARP.name, "stopped without a reason", silent, 0, note=said)
 
 
-class _Inextensible(gs.Rod):
+class _Inextensible(rs.Rod):
     """The paper's rod with EA x100 and the same EI."""
 
     @property
@@ -145,10 +157,10 @@ def gravity_rows() -> Iterator[Row]:
         ("paper's rod", ROD, 2.8, 3.0),
         ("EA x100", _Inextensible(ROD.section, ROD.material), 0.0, 0.3),
     ):
-        draped = gs.drape(case.grid(length=1.2), rod, case.target, method="gravity")
-        rods = gs.trim(draped).mesh.grid.rods
+        draped = rs.drape(case.grid(length=1.2), rod, case.target, method="gravity")
+        rods = rs.trim(draped).mesh.grid.rods
         short = [
-            gs.sphere_net_end(case.target.size, abs(rod.offset)) - end for rod in rods for end in (rod.end, -rod.start)
+            rs.sphere_net_end(case.target.size, abs(rod.offset)) - end for rod in rods for end in (rod.end, -rod.start)
         ]
         rms = 1e3 * float(np.sqrt(np.mean(np.square(short))))
         kind = "stable" if draped.report.stable else f"saddle: {draped.report.negative_modes} negative modes, said so"
@@ -164,11 +176,11 @@ def scale_rows() -> Iterator[Row]:
     """The same case a hundred times as large, and with tubes of 25 GPa: the same shape."""
     case = PAPER[0]
     small = form_of(case)
-    layout = gs.GridLayout.orthogonal(rods=(17, 17), spacing=3.0, edge=0.5, length=120.0)
-    tube = gs.Rod(gs.Tube(radius=0.07, thickness=0.005), gs.Material(25e9, 1900.0, 0.3))
-    scaled = gs.Rod(gs.Circle(radius=0.1), gs.Material(1e6, 1e3))
+    layout = rs.GridLayout.orthogonal(rods=(17, 17), spacing=3.0, edge=0.5, length=120.0)
+    tube = rs.Rod(rs.Tube(radius=0.07, thickness=0.005), rs.Material(25e9, 1900.0, 0.3))
+    scaled = rs.Rod(rs.Circle(radius=0.1), rs.Material(1e6, 1e3))
     for name, rod in (("x100", scaled), ("x100, 25 GPa tubes", tube)):
-        large = gs.find_form(gs.Hemisphere(20.0), layout, rod)
+        large = rs.find_form(rs.Hemisphere(20.0), layout, rod)
         assert small.draped.own_ends is not None
         assert large.draped.own_ends is not None
         own = np.abs(large.draped.own_ends / 20 - small.draped.own_ends / 0.2).max()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-import gridshell as gs
+import rodshell as rs
 from examples.gallery import LATH, gallery
 from tests.acceptance.cases import ROD
 from tests.acceptance.rows import Row, print_table
@@ -19,13 +19,13 @@ from tests.targets.meshes import Mesh, capped_sphere, disc, sheet, strewn
 from tests.targets.stepfile import StepFile
 
 SIZE = 0.2  # m
-GRID = gs.GridLayout.orthogonal(spacing=0.03, edge=0.005)
+GRID = rs.GridLayout.orthogonal(spacing=0.03, edge=0.005)
 ROWS = {"2k": 18, "20k": 58, "200k": 182}  # rings of a round mesh of so many triangles
-SURFACES: dict[str, tuple[gs.Target, Callable[[int], Mesh]]] = {
-    "hemisphere": (gs.Hemisphere(SIZE), lambda rows: _scaled(rows, (0.2, 0.2, 0.2))),
-    "ellipsoid": (gs.Ellipsoid(a=0.2, b=0.15, c=0.12), lambda rows: _scaled(rows, (0.2, 0.15, 0.12))),
+SURFACES: dict[str, tuple[rs.Target, Callable[[int], Mesh]]] = {
+    "hemisphere": (rs.Hemisphere(SIZE), lambda rows: _scaled(rows, (0.2, 0.2, 0.2))),
+    "ellipsoid": (rs.Ellipsoid(a=0.2, b=0.15, c=0.12), lambda rows: _scaled(rows, (0.2, 0.15, 0.12))),
     "saddle": (
-        gs.HeightField(formula="(x^2 - y^2)/0.8", domain=gs.Disc(SIZE)),
+        rs.HeightField(formula="(x^2 - y^2)/0.8", domain=rs.Disc(SIZE)),
         lambda rows: disc(lambda x, y: (x**2 - y**2) / 0.8, SIZE, rows),
     ),
 }
@@ -38,11 +38,11 @@ def _scaled(rows: int, axes: tuple[float, float, float]) -> Mesh:
 
 
 @cache
-def analytic_form(name: str) -> gs.Form:
-    return gs.find_form(SURFACES[name][0], GRID, ROD, anchor=(0.0, 0.0))
+def analytic_form(name: str) -> rs.Form:
+    return rs.find_form(SURFACES[name][0], GRID, ROD, anchor=(0.0, 0.0))
 
 
-def ends_of(form: gs.Form, scale: float = 1.0) -> Ends:
+def ends_of(form: rs.Form, scale: float = 1.0) -> Ends:
     """Start and end of every rod of G0 over the scale, by family and offset."""
     return {
         (rod.family, round(rod.offset / scale, 6)): (rod.start / scale, rod.end / scale) for rod in form.footprint.rods
@@ -56,7 +56,7 @@ def apart(one: Ends, other: Ends) -> float:
     return max(float(np.abs(np.subtract(one[key], other[key])).max()) for key in one) / SIZE
 
 
-def iterations(form: gs.Form) -> int:
+def iterations(form: rs.Form) -> int:
     return sum(level.iterations for level in form.draped.levels) + sum(
         p.report.iterations for p in form.popped.values()
     )
@@ -67,7 +67,7 @@ def mesh_rows(name: str, meshes: tuple[str, ...]) -> Iterator[Row]:
     exact, mesh = analytic_form(name), SURFACES[name][1]
     before = np.inf
     for size in meshes:
-        form = gs.find_form(gs.Freeform.of(*mesh(ROWS[size])), GRID, ROD, anchor=(0.0, 0.0))
+        form = rs.find_form(rs.Freeform.of(*mesh(ROWS[size])), GRID, ROD, anchor=(0.0, 0.0))
         off, case = apart(ends_of(form), ends_of(exact)), f"{name}, {size} triangles"
         bound = {"2k": 0.2, "20k": 0.2, "200k": 0.05}[size]
         yield Row(case, "rod ends of G0 off the analytic ones", 100 * off, bound, "%size")
@@ -79,14 +79,14 @@ def mesh_rows(name: str, meshes: tuple[str, ...]) -> Iterator[Row]:
 
 def nurbs_rows() -> Iterator[Row]:
     """A saddle that is a NURBS of degree two exactly, and half a sphere, in Rhino's files and in STEP."""
-    square = gs.HeightField(formula="(x^2 - y^2)/0.8", domain=gs.Rectangle((2 * SIZE, 2 * SIZE)))
+    square = rs.HeightField(formula="(x^2 - y^2)/0.8", domain=rs.Rectangle((2 * SIZE, 2 * SIZE)))
     exact = {
-        "saddle": gs.find_form(square, GRID, ROD, anchor=(0.0, 0.0)),
+        "saddle": rs.find_form(square, GRID, ROD, anchor=(0.0, 0.0)),
         "hemisphere": analytic_form("hemisphere"),
     }
     with tempfile.TemporaryDirectory() as folder:
         for name, path, base in (*_rhino_files(Path(folder)), *_step_files(Path(folder))):
-            form = gs.find_form(gs.surface_from(path, base=base), GRID, ROD, anchor=(0.0, 0.0))
+            form = rs.find_form(rs.surface_from(path, base=base), GRID, ROD, anchor=(0.0, 0.0))
             off = 100 * apart(ends_of(form), ends_of(exact[name]))
             yield Row(f"{name} as {path.suffix[1:]}", "rod ends off the analytic ones", off, 0.02, "%size")
 
@@ -136,8 +136,8 @@ def same_rows() -> Iterator[Row]:
 
     anchor, angle = (0.02, 0.01), 0.6
     x, faces = sheet(height, SIZE, 60)
-    plain = ends_of(gs.find_form(gs.Freeform.of(x, faces), GRID, ROD, anchor=anchor))
-    place = gs.Placement(scale=1e3, turn=(0.0, 0.0, angle), move=(250.0, -90.0, 30.0))
+    plain = ends_of(rs.find_form(rs.Freeform.of(x, faces), GRID, ROD, anchor=anchor))
+    place = rs.Placement(scale=1e3, turn=(0.0, 0.0, angle), move=(250.0, -90.0, 30.0))
     order = np.random.default_rng(0).permutation(len(x))
     other = {
         "turned, moved, scaled by 1000": (place(x), faces),
@@ -150,9 +150,9 @@ def same_rows() -> Iterator[Row]:
     for name, mesh in other.items():
         moved = name.startswith("turned")
         where = place(np.array([[*anchor, 0.0]]))[0] if moved else np.array(anchor)
-        grid = gs.GridLayout.orthogonal(spacing=30.0, edge=5.0, rotate=angle) if moved else GRID
-        rod = gs.Rod(gs.Circle(radius=1.0), ROD.material) if moved else ROD
-        form = gs.find_form(gs.Freeform.of(*mesh), grid, rod, anchor=(float(where[0]), float(where[1])))
+        grid = rs.GridLayout.orthogonal(spacing=30.0, edge=5.0, rotate=angle) if moved else GRID
+        rod = rs.Rod(rs.Circle(radius=1.0), ROD.material) if moved else ROD
+        form = rs.find_form(rs.Freeform.of(*mesh), grid, rod, anchor=(float(where[0]), float(where[1])))
         off = 100 * apart(plain, ends_of(form, 1e3 if moved else 1.0))
         yield Row(name, "rod ends off those of the plain mesh", off, 0.2, "%size", form.status)
 
@@ -179,31 +179,31 @@ def gallery_rows() -> Iterator[Row]:
 def _whole_job(name: str) -> tuple[float, tuple[int, int], str]:
     """Seconds of CPU from the file to the pop-ups with about 30 rods each way; the number of rods; the status."""
     piece = gallery()[name]
-    coarse = gs.chebyshev_net(piece.target, piece.layout(), anchor=piece.anchor)
+    coarse = rs.chebyshev_net(piece.target, piece.layout(), anchor=piece.anchor)
     lines = {family: len({rod.offset for rod in coarse.rods if rod.family == family}) for family in "uv"}
     spacing = tuple(piece.spacing * lines[family] / 30 for family in "uv")
     edge = min(float(np.sqrt(spacing[0] * spacing[1])) / 4, min(spacing))
-    layout = gs.GridLayout.orthogonal(spacing=(spacing[0], spacing[1]), edge=edge, rotate=piece.rotate)
+    layout = rs.GridLayout.orthogonal(spacing=(spacing[0], spacing[1]), edge=edge, rotate=piece.rotate)
     started = time.process_time()
     target = gallery_target(name)
-    form = gs.find_form(target, layout, LATH, anchor=piece.anchor)
+    form = rs.find_form(target, layout, LATH, anchor=piece.anchor)
     seconds = time.process_time() - started
     families = [rod.family for rod in form.footprint.rods]
     return seconds, (families.count("u"), families.count("v")), form.status
 
 
-def gallery_target(name: str) -> gs.Target:
+def gallery_target(name: str) -> rs.Target:
     """A gallery target made anew, so that the time of making it counts."""
     target = gallery_source(name)
     file = target.parameters().get("file")
     if not isinstance(file, str):
         return target
     unit, base = target.parameters().get("unit"), target.base
-    return gs.surface_from(file, unit=unit, base=base)  # type: ignore[arg-type]
+    return rs.surface_from(file, unit=unit, base=base)  # type: ignore[arg-type]
 
 
 @cache
-def gallery_source(name: str) -> gs.Target:
+def gallery_source(name: str) -> rs.Target:
     return gallery()[name].target
 
 
@@ -238,10 +238,10 @@ def random_rows(seeds: range) -> Iterator[Row]:
 
 def broken_rows(every: int = 1) -> Iterator[Row]:
     """Broken inputs: one sentence, exit 2, in time and in memory."""
-    import gridshell.form
-    import gridshell.targets
+    import rodshell.form
+    import rodshell.targets
 
-    assert gridshell.form, gridshell.targets  # loaded before the processes fork
+    assert rodshell.form, rodshell.targets  # loaded before the processes fork
     wrong, slow, large, count = list[str](), 0.0, 0.0, 0
     with tempfile.TemporaryDirectory() as folder:
         for k, (what, arguments) in enumerate(broken_files(Path(folder))):
@@ -267,4 +267,4 @@ def all_rows() -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(print_table(all_rows()))
+    sys.exit(print_table("targets", all_rows()))

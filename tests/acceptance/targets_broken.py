@@ -85,7 +85,7 @@ WRITERS: dict[str, Callable[[Floats, Ints], bytes]] = {"obj": as_obj, "off": as_
 
 
 def broken_files(folder: Path) -> Iterator[tuple[str, list[str]]]:
-    """What is wrong, and the arguments of `gridshell form`."""
+    """What is wrong, and the arguments of `rodshell form`."""
     rng = np.random.default_rng(7)
     x, faces = dome()
 
@@ -243,7 +243,7 @@ def _sheet(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Ints]:
 
 
 def called(what: str, arguments: list[str], out: Path) -> Broken:
-    """Call `gridshell form` in a forked process."""
+    """Call `rodshell form` in a forked process."""
     context = multiprocessing.get_context("fork")
     answer = context.Queue()
     started = time.perf_counter()
@@ -261,7 +261,7 @@ def called(what: str, arguments: list[str], out: Path) -> Broken:
 def _call(arguments: list[str], out: Path, answer: "multiprocessing.Queue[tuple[int, str, float]]") -> None:
     import traceback
 
-    from gridshell.cli import main
+    from rodshell.cli import main
 
     said, printed = StringIO(), StringIO()
     with redirect_stderr(said), redirect_stdout(printed):

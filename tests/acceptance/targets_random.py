@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import gridshell as gs
-from gridshell.formfinding.popup import Popped
-from gridshell.formfinding.trim import Boundary
-from gridshell.model import Shell
-from gridshell.targets import Freeform
+import rodshell as rs
+from rodshell.formfinding.popup import Popped
+from rodshell.formfinding.trim import Boundary
+from rodshell.model import Shell
+from rodshell.targets import Freeform
 
-REASONS = (gs.InputError, gs.NetLimitError)  # what may stop a form, with its sentence
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+REASONS = (rs.InputError, rs.NetLimitError)  # what may stop a form, with its sentence
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 GAP, STRAIN = 2e-5, 2e-5  # of the size; as the acceptance table of the bound drape has them
 RESIDUAL = 1e-4  # of the largest force between two edges
 
@@ -26,7 +26,7 @@ class Outcome:
     wrong: str = ""
 
 
-def random_case(seed: int) -> tuple[str, gs.Target, gs.GridLayout, tuple[float, float]]:
+def random_case(seed: int) -> tuple[str, rs.Target, rs.GridLayout, tuple[float, float]]:
     """Convex, saddle-shaped or mixed; every other one as a mesh; any heading; the anchor off-centre."""
     rng = np.random.default_rng(seed)
     kind = ("convex", "saddle", "mixed")[seed % 3]
@@ -37,22 +37,22 @@ def random_case(seed: int) -> tuple[str, gs.Target, gs.GridLayout, tuple[float, 
         (x, y), width, height = rng.uniform(-0.12, 0.12, 2), rng.uniform(0.05, 0.12), rng.uniform(-0.08, 0.08)
         terms.append(f"{height:.6f}*exp(-((x - ({x:.6f}))^2 + (y - ({y:.6f}))^2)/{2 * width**2:.6f})")
     size = tuple(rng.uniform(0.3, 0.4, 2).tolist())
-    domain = gs.Disc(0.2) if seed % 2 else gs.Rectangle(size)  # type: ignore[arg-type]
-    target: gs.Target = gs.HeightField(formula=" + ".join(terms), domain=domain)
+    domain = rs.Disc(0.2) if seed % 2 else rs.Rectangle(size)  # type: ignore[arg-type]
+    target: rs.Target = rs.HeightField(formula=" + ".join(terms), domain=domain)
     if seed % 4 > 1:
         target = meshed(target, rng)
-    layout = gs.GridLayout.orthogonal(spacing=0.035, edge=0.035 / 4, rotate=float(rng.uniform(0, np.pi / 2)))
+    layout = rs.GridLayout.orthogonal(spacing=0.035, edge=0.035 / 4, rotate=float(rng.uniform(0, np.pi / 2)))
     anchor = rng.uniform(-0.05, 0.05, 2)
     return kind, target, layout, (float(anchor[0]), float(anchor[1]))
 
 
-def meshed(target: gs.HeightField, rng: np.random.Generator) -> Freeform:
+def meshed(target: rs.HeightField, rng: np.random.Generator) -> Freeform:
     """The same surface as a mesh with vertices strewn at random, its faces turned and in no order."""
     from scipy.spatial import Delaunay
 
     a, b = target.domain.half_extent
     inner = rng.uniform(-1, 1, (1500, 2)) * 0.97
-    if isinstance(target.domain, gs.Disc):
+    if isinstance(target.domain, rs.Disc):
         inner = inner[np.hypot(*inner.T) < 0.97]
         angle = np.arange(150) * 2 * np.pi / 150
         edge = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -75,7 +75,7 @@ def outcome(seed: int) -> Outcome:
     """Form one and judge what it says."""
     kind, target, layout, anchor = random_case(seed)
     try:
-        form = gs.find_form(target, layout, ROD, anchor=anchor)
+        form = rs.find_form(target, layout, ROD, anchor=anchor)
     except REASONS as reason:
         sentence = str(reason)
         return Outcome(seed, kind, sentence, "" if sentence and "\n" not in sentence else "no single sentence")
@@ -84,7 +84,7 @@ def outcome(seed: int) -> Outcome:
     return Outcome(seed, kind, "converged", _wrong(form))
 
 
-def _wrong(form: gs.Form) -> str:
+def _wrong(form: rs.Form) -> str:
     """What does not hold of a form that says it has converged."""
     x, mesh, target = form.trimmed.positions, form.trimmed.mesh, form.target
     if not np.isfinite(x).all():

@@ -7,14 +7,14 @@ import numpy as np
 from scipy.sparse import csc_matrix
 from scipy.sparse.csgraph import connected_components
 
-import gridshell as gs
-from gridshell.solve.banded import Banded
-from gridshell.solve.implicit_euler import ImplicitEuler, Refused, Step
-from gridshell.solve.step_limit import step_limit
+import rodshell as rs
+from rodshell.solve.banded import Banded
+from rodshell.solve.implicit_euler import ImplicitEuler, Refused, Step
+from rodshell.solve.step_limit import step_limit
 from tests.analytic.joint_problems import flat_state, lattice, response
 
-KINDS = {"ball": gs.Ball(), "pin": gs.Pin(), "rigid": gs.Rigid(), "two linkers": gs.Linker()}
-ROD = gs.Rod(gs.GivenSection(EA=300.0, EI1=1.0, EI2=1.0, GJ=0.7, mass=1.0, rotary_inertia=0.02))
+KINDS = {"ball": rs.Ball(), "pin": rs.Pin(), "rigid": rs.Rigid(), "two linkers": rs.Linker()}
+ROD = rs.Rod(rs.GivenSection(EA=300.0, EI1=1.0, EI2=1.0, GJ=0.7, mass=1.0, rotary_inertia=0.02))
 EDGE = 0.15
 DECADES = 10.0 ** np.arange(2, 7)  # of C over the stiffness of an edge in bending and in twist
 
@@ -22,11 +22,11 @@ DECADES = 10.0 ** np.arange(2, 7)  # of C over the stiffness of an edge in bendi
 def bent(joint, coupling, count=2):
     """A lattice of 2 by 2 rods."""
     grid = lattice(joint, edge=EDGE, rod=ROD, count=count)
-    return gs.Shell.of(grid.mesh, ROD, joint=joint, coupling=coupling, twist=True)
+    return rs.Shell.of(grid.mesh, ROD, joint=joint, coupling=coupling, twist=True)
 
 
 def firm(share):
-    return gs.ImplicitPenalty(C1=share * 1.0 / EDGE**3, C2=share * 0.7 / EDGE)
+    return rs.ImplicitPenalty(C1=share * 1.0 / EDGE**3, C2=share * 0.7 / EDGE)
 
 
 def _loaded(shell):
@@ -42,7 +42,7 @@ def _loaded(shell):
 
 def static_errors(joint):
     """Of the small response under a load with implicit ties, relative to shared DOFs, for each of DECADES."""
-    shared = bent(joint, gs.SharedDofs())
+    shared = bent(joint, rs.SharedDofs())
     exact = shared.positions(response(shared, *_loaded(shared)))
     errors = []
     for share in DECADES:
@@ -55,9 +55,9 @@ def static_errors(joint):
 def step_errors(joint, step=0.02):
     """Of the nodes' motion in one step of a lattice that is thrown, relative to shared DOFs, for each of DECADES."""
     moved = []
-    for coupling in (gs.SharedDofs(), *(firm(share) for share in DECADES)):
+    for coupling in (rs.SharedDofs(), *(firm(share) for share in DECADES)):
         shell = bent(joint, coupling)
-        taken = ImplicitEuler().take(gs.Motion.of(shell), flat_state(shell), thrown(shell, 0.05), time=0.0, step=step)
+        taken = ImplicitEuler().take(rs.Motion.of(shell), flat_state(shell), thrown(shell, 0.05), time=0.0, step=step)
         assert isinstance(taken, Step)
         moved.append(shell.positions(taken.state - flat_state(shell)))
     return np.array([np.linalg.norm(one - moved[0]) / np.linalg.norm(moved[0]) for one in moved[1:]])
@@ -76,10 +76,10 @@ def explicit_errors(joint, steps, until=0.02):
     errors = []
     for count in steps:
         ends = []
-        for coupling in (gs.ImplicitPenalty(**ties), gs.ExplicitPenalty(**ties)):
+        for coupling in (rs.ImplicitPenalty(**ties), rs.ExplicitPenalty(**ties)):
             shell = bent(joint, coupling)
-            series = gs.simulate(
-                gs.Motion.of(shell), flat_state(shell), thrown(shell, 0.1), until=until, step=until / count
+            series = rs.simulate(
+                rs.Motion.of(shell), flat_state(shell), thrown(shell, 0.1), until=until, step=until / count
             )
             ends.append(shell.positions(series.states[-1]))
         errors.append(float(np.abs(ends[1] - ends[0]).max()))
@@ -97,9 +97,9 @@ def masses(shell):
 
 def element(joint, coupling=None, rod=ROD, edge=0.1):
     """Two rods of two edges each that cross in their middles."""
-    grid = gs.straight_rods([[[-edge, 0], [edge, 0]], [[0, -edge], [0, edge]]])
-    ties = coupling or gs.ExplicitPenalty(C1=5.0 / edge**3, C2=0.7 / edge)
-    return gs.Shell.of(gs.mesh_grid(grid, edge), rod, joint=joint, coupling=ties, twist=True)
+    grid = rs.straight_rods([[[-edge, 0], [edge, 0]], [[0, -edge], [0, edge]]])
+    ties = coupling or rs.ExplicitPenalty(C1=5.0 / edge**3, C2=0.7 / edge)
+    return rs.Shell.of(rs.mesh_grid(grid, edge), rod, joint=joint, coupling=ties, twist=True)
 
 
 def growth(joint, share, steps):
@@ -108,7 +108,7 @@ def growth(joint, share, steps):
     The start is a hundred thousandth of an edge: the motion is that of the linearised element.
     """
     shell = element(joint)
-    motion, state = gs.Motion.of(shell), flat_state(shell)
+    motion, state = rs.Motion.of(shell), flat_state(shell)
     step = share * step_limit(motion, state)
     rng, unused = np.random.default_rng(1), np.zeros_like(state)
     free = motion.constraint_at(0.0).freedom(state)
@@ -132,17 +132,17 @@ def closed_form_limits():
 
     m and I are those of a single rod's node and edge; the rods are so soft that only ties count.
     """
-    soft = gs.Rod(gs.GivenSection(EA=1e-6, EI1=1e-9, EI2=1e-9, GJ=1e-9, mass=1.0, rotary_inertia=0.02))
+    soft = rs.Rod(rs.GivenSection(EA=1e-6, EI1=1e-9, EI2=1e-9, GJ=1e-9, mass=1.0, rotary_inertia=0.02))
     edge = 0.1
     m, inertia = edge * soft.mass_per_length, edge * soft.rotary_inertia
     found = {}
     for name, joint, c1, c2, exact in (
-        ("ball", gs.Ball(), 3.0, 1e-9, np.sqrt(2 * m / 3.0)),
-        ("two linkers", gs.Linker(), 3.0, 1e-9, np.sqrt(m / (2 * 3.0))),
-        ("twist", gs.Linker(), 1e-6, 3.0, np.sqrt(inertia / 3.0)),
+        ("ball", rs.Ball(), 3.0, 1e-9, np.sqrt(2 * m / 3.0)),
+        ("two linkers", rs.Linker(), 3.0, 1e-9, np.sqrt(m / (2 * 3.0))),
+        ("twist", rs.Linker(), 1e-6, 3.0, np.sqrt(inertia / 3.0)),
     ):
-        shell = element(joint, gs.ExplicitPenalty(C1=c1, C2=c2), soft, edge)
-        found[name] = step_limit(gs.Motion.of(shell), flat_state(shell)) / exact
+        shell = element(joint, rs.ExplicitPenalty(C1=c1, C2=c2), soft, edge)
+        found[name] = step_limit(rs.Motion.of(shell), flat_state(shell)) / exact
     return found
 
 
@@ -152,7 +152,7 @@ def closed_form_limits():
 def systems(shell):
     """Half bandwidth of the matrix of a step, and of how many systems that do not touch it consists."""
     stepper = ImplicitEuler()
-    motion = gs.Motion.of(shell)
+    motion = rs.Motion.of(shell)
     taken = stepper.take(motion, flat_state(shell), thrown(shell), time=0.0, step=1e-4)
     assert isinstance(taken, Step)
     pairs = [np.column_stack([one.blocks[:, :-1].ravel(), one.blocks[:, 1:].ravel()]) for one in motion.elements]

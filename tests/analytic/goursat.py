@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import BarycentricInterpolator
 from scipy.optimize import brentq
 
-from gridshell.targets import Target
+from rodshell.targets import Target
 
 Floats = NDArray[np.float64]
 

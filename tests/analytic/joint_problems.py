@@ -13,17 +13,17 @@ from scipy.sparse import csc_matrix, diags, triu
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
-import gridshell as gs
-from gridshell.model import Assembly
-from gridshell.solve.constraint import Supports
-from gridshell.solve.linear import Qdldl
-from gridshell.solve.mixed_newton import find_equilibrium
-from gridshell.solve.problem import Problem
+import rodshell as rs
+from rodshell.model import Assembly
+from rodshell.solve.constraint import Supports
+from rodshell.solve.linear import Qdldl
+from rodshell.solve.mixed_newton import find_equilibrium
+from rodshell.solve.problem import Problem
 from tests.analytic.rod_problems import threshold
 
 X, Y, Z = np.eye(3)
 EI, FLAT_EI, GJ = 2.0, 3.0, 1.3  # out of the grid's plane, in it, and in torsion [N m2]
-STRIP = gs.Rod(gs.GivenSection(EA=1e7, EI1=EI, EI2=FLAT_EI, GJ=GJ, mass=1.0, rotary_inertia=0.1))
+STRIP = rs.Rod(rs.GivenSection(EA=1e7, EI1=EI, EI2=FLAT_EI, GJ=GJ, mass=1.0, rotary_inertia=0.1))
 
 
 def tangent_stiffness(shell, state, free):
@@ -82,8 +82,8 @@ def without_clamps(shell, ends):
 def portal_sway(edge, joint, *, height=0.8, span=1.0):
     """Sway under a force at one corner, over that of beam theory."""
     force, k = 1.0, joint.shear
-    grid = gs.straight_rods([[[0, 0], [0, height]], [[0, height], [span, height]], [[span, height], [span, 0]]])
-    shell = gs.Shell.of(gs.mesh_grid(grid, edge), STRIP, joint=joint)
+    grid = rs.straight_rods([[[0, 0], [0, height]], [[0, height], [span, height]], [[span, height], [span, 0]]])
+    shell = rs.Shell.of(rs.mesh_grid(grid, edge), STRIP, joint=joint)
     free = shell.freedom().with_directions(np.arange(shell.node_count), X, Y)
     free = free.with_directions(np.arange(shell.first_angle, len(shell.like)))
     free = free.with_directions(shell.ends[[0, 5]])
@@ -110,7 +110,7 @@ class Star:
     """
 
     rods: Sequence[tuple[float, float, float]]
-    joint: gs.Spring | gs.Pin | gs.Rigid | gs.Ball
+    joint: rs.Spring | rs.Pin | rs.Rigid | rs.Ball
     force: tuple[float, float, float] = (0.3, 0.8, 1.0)
 
     def compliance(self, edge, *, turned=0.0):
@@ -120,7 +120,7 @@ class Star:
         """
         built = [*self.rods[:-1], (self.rods[-1][0] - turned, *self.rods[-1][1:])]
         ends = [[[-behind * cos(a), -behind * sin(a)], [ahead * cos(a), ahead * sin(a)]] for a, behind, ahead in built]
-        shell = gs.Shell.of(gs.mesh_grid(gs.straight_rods(ends), edge), STRIP, clamped=True, joint=self.joint)
+        shell = rs.Shell.of(rs.mesh_grid(rs.straight_rods(ends), edge), STRIP, clamped=True, joint=self.joint)
         at_joint = np.flatnonzero(np.array([[behind == 0, ahead == 0] for _, behind, ahead in self.rods]).ravel())
         shell = without_clamps(shell, at_joint)
         state = flat_state(shell)
@@ -187,10 +187,10 @@ STARS = {
     "two rods and the end of a third": ((0.0, 0.8, 1.2), (pi / 3, 1.0, 0.6), (2 * pi / 3, 0.6, 0.0)),
 }
 JOINTS = {
-    "rigid": gs.Rigid(),
-    "pin": gs.Pin(),
-    "ball": gs.Ball(),
-    "spring": gs.Spring(3.0, 4.0, 0.5),
+    "rigid": rs.Rigid(),
+    "pin": rs.Pin(),
+    "ball": rs.Ball(),
+    "spring": rs.Spring(3.0, 4.0, 0.5),
 }
 MESHES = (0.1, 0.05, 0.025)
 
@@ -204,12 +204,12 @@ def michell_twist(edges, rods, joint=None):
     The grid is a polygon; its joints, at rest where one rod goes straight on in the next, want it to be straight.
     """
     gj, side = 0.7, edges // rods
-    kind = gs.Rod(gs.GivenSection(EA=1e7, EI1=1.0, EI2=1.0, GJ=gj))
+    kind = rs.Rod(rs.GivenSection(EA=1e7, EI1=1.0, EI2=1.0, GJ=gj))
     corner = 2 * pi * np.arange(rods + 1) / rods
     polygon = np.column_stack([np.cos(corner), np.sin(corner)]) / (2 * rods * sin(pi / rods))
-    grid = gs.straight_rods(np.stack([polygon[:-1], polygon[1:]], axis=1))
-    mesh = gs.mesh_grid(grid, 1.0 / edges)
-    ring = gs.Shell.of(mesh, kind, joint=joint or gs.Rigid(rest_angle=0.0))
+    grid = rs.straight_rods(np.stack([polygon[:-1], polygon[1:]], axis=1))
+    mesh = rs.mesh_grid(grid, 1.0 / edges)
+    ring = rs.Shell.of(mesh, kind, joint=joint or rs.Rigid(rest_angle=0.0))
     around = np.zeros(mesh.node_count)
     around[mesh.rod_nodes] = 2 * pi * np.concatenate([(k * side + np.arange(side + 1)) / edges for k in range(rods)])
     circle = np.column_stack([np.cos(around), np.sin(around), 0 * around]) / (2 * edges * sin(pi / edges))
@@ -244,7 +244,7 @@ def lattice(joint, *, edge=0.1, rod=STRIP, count=3, pitch=PITCH):
     lines = pitch * (np.arange(count) - 0.5 * (count - 1))
     reach = lines[-1] + pitch
     ends = [[[-reach, y], [reach, y]] for y in lines] + [[[x, -reach], [x, reach]] for x in lines]
-    return gs.Shell.of(gs.mesh_grid(gs.straight_rods(ends), edge), rod, joint=joint)
+    return rs.Shell.of(rs.mesh_grid(rs.straight_rods(ends), edge), rod, joint=joint)
 
 
 def sheared(shell, angle):
@@ -286,10 +286,10 @@ def bending_stiffness(joint):
 
 def linker_energy(angle, corners, *, edge=5e-3, rod=None):
     """Energy [J] of a joint with linkers whose rods are turned from a right angle to `angle` [rad]."""
-    paper = gs.Rod(gs.Circle(1e-3), gs.Material(1e6, 1e3))
+    paper = rs.Rod(rs.Circle(1e-3), rs.Material(1e6, 1e3))
     half = 2 * edge
-    grid = gs.straight_rods([[[-half, 0], [half, 0]], [[0, -half], [0, half]]])
-    shell = gs.Shell.of(gs.mesh_grid(grid, edge), rod or paper, joint=gs.Linker(corners=corners))
+    grid = rs.straight_rods([[[-half, 0], [half, 0]], [[0, -half], [0, half]]])
+    shell = rs.Shell.of(rs.mesh_grid(grid, edge), rod or paper, joint=rs.Linker(corners=corners))
     state = sheared(shell, angle - pi / 2)
     return sum(part.evaluate(state, np.zeros_like(state)) for part in shell.elements)
 
@@ -299,7 +299,7 @@ def linker_energy(angle, corners, *, edge=5e-3, rod=None):
 
 def popped(joint, *, shorter=0.1):
     """A lattice, meshed alike on both sides, whose rod ends were moved towards its middle: shell and equilibrium."""
-    kind = gs.Rod(gs.Circle(2e-3), gs.Material(1e9, 1e3))
+    kind = rs.Rod(rs.Circle(2e-3), rs.Material(1e9, 1e3))
     shell = lattice(joint, edge=0.1, rod=kind)
     flat = shell.mesh.flat
     goals = (1 - shorter) * flat[shell.ends]

@@ -8,7 +8,7 @@ from math import pi, sqrt
 import numpy as np
 from scipy.linalg import eigh
 
-import gridshell as gs
+import rodshell as rs
 from tests.analytic.rod_problems import order
 
 CANTILEVER = (1.8751040687, 4.6940911330, 7.8547574382)  # roots of cos b cosh b = -1
@@ -16,13 +16,13 @@ G = (0.0, 0.0, -9.81)
 
 
 def kind(youngs_modulus=1e9, radius=1e-3):
-    return gs.Rod(section=gs.Circle(radius=radius), material=gs.Material(youngs_modulus=youngs_modulus, density=1e3))
+    return rs.Rod(section=rs.Circle(radius=radius), material=rs.Material(youngs_modulus=youngs_modulus, density=1e3))
 
 
 def straight(nodes, rod=None, **options):
     rest = np.zeros((nodes, 3))
     rest[:, 0] = np.linspace(0.0, 1.0, nodes)
-    return gs.ElasticRod.of(rest, rod or kind(), **options)
+    return rs.ElasticRod.of(rest, rod or kind(), **options)
 
 
 def thrown(rod, speed=1.0, seed=0):
@@ -54,7 +54,7 @@ def modes(rod, state=None):
 def measured_frequency(rod, shape, frequency, *, steps_per_period):
     """From the zeros of the motion in one mode, started with a small velocity: half a period apart [Hz]."""
     step = 1 / (frequency * steps_per_period)
-    series = gs.simulate(gs.Motion.of(rod), rod.state(), 1e-3 * shape, until=2.2 / frequency, step=step)
+    series = rs.simulate(rs.Motion.of(rod), rod.state(), 1e-3 * shape, until=2.2 / frequency, step=step)
     amount = np.einsum("tij,ij->t", series.states - rod.state(), rod.mass * shape)
     after = np.flatnonzero(amount[1:-1] * amount[2:] < 0) + 1
     zeros = series.times[after] + step * amount[after] / (amount[after] - amount[after + 1])
@@ -73,17 +73,17 @@ def frequency_limit(rod, shape, frequency):
 def swing_order(twist):
     """Order in the step of a heavy cantilever's tip, let go for 0.2 s, by the distances between successive halves."""
     rod = straight(21, kind(1e8), clamped=("start",), twist=twist)
-    motion = gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes, G),))
+    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes, G),))
     counts = np.array([160, 320, 640, 1280, 2560])
-    tips = [gs.simulate(motion, rod.state(), until=0.2, step=0.2 / n).states[-1][20] for n in counts]
+    tips = [rs.simulate(motion, rod.state(), until=0.2, step=0.2 / n).states[-1][20] for n in counts]
     return order(1 / counts[:-1], np.linalg.norm(np.diff(tips, axis=0), axis=1))
 
 
 def energy_growth(rod, start=None, *, speed, until=0.3, step=3e-3):
     """Largest growth of the energy in a step without load, and the loss of all, both over the energy at the start."""
     state = rod.state() if start is None else start
-    motion = gs.Motion.of(rod).refreshed(state)
-    energies = gs.simulate(motion, state, thrown(rod, speed), until=until, step=step).energies.sum(axis=1)
+    motion = rs.Motion.of(rod).refreshed(state)
+    energies = rs.simulate(motion, state, thrown(rod, speed), until=until, step=step).energies.sum(axis=1)
     return np.diff(energies).max() / energies[0], 1 - energies[-1] / energies[0]
 
 
@@ -93,7 +93,7 @@ def linear_momentum(rod, velocities):
 
 def linear_drift(rod):
     """Largest change of the linear momentum of a free rod in 0.5 s, over the momentum."""
-    series = gs.simulate(gs.Motion.of(rod), rod.state(), thrown(rod), until=0.5, step=2e-3)
+    series = rs.simulate(rs.Motion.of(rod), rod.state(), thrown(rod), until=0.5, step=2e-3)
     momentum = linear_momentum(rod, series.velocities)
     return np.abs(momentum - momentum[0]).max() / np.abs(momentum[0]).max()
 
@@ -106,7 +106,7 @@ def angular_losses(rod, counts, until=0.1):
     """Share of the angular momentum that a free rod loses by `until`, in so many steps."""
     lost = []
     for n in counts:
-        series = gs.simulate(gs.Motion.of(rod), rod.state(), thrown(rod), until=until, step=until / n)
+        series = rs.simulate(rs.Motion.of(rod), rod.state(), thrown(rod), until=until, step=until / n)
         momentum = angular_momentum(rod, series.states, series.velocities)
         lost.append(np.linalg.norm(momentum[-1] - momentum[0]) / np.linalg.norm(momentum[0]))
     return lost

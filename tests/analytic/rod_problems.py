@@ -14,13 +14,13 @@ from scipy.sparse import triu
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipeinc, ellipkinc
 
-import gridshell as gs
-from gridshell.geometry import directors_along
-from gridshell.geometry.frames import parallel_transport, signed_angle
-from gridshell.geometry.vectors import unit
-from gridshell.solve.linear import Qdldl
+import rodshell as rs
+from rodshell.geometry import directors_along
+from rodshell.geometry.frames import parallel_transport, signed_angle
+from rodshell.geometry.vectors import unit
+from rodshell.solve.linear import Qdldl
 
-THIN = gs.Rod(gs.Circle(1e-4), gs.Material(1e9, 1e3, 0.5))
+THIN = rs.Rod(rs.Circle(1e-4), rs.Material(1e9, 1e3, 0.5))
 EI, GJ = THIN.bend_stiffness, THIN.twist_stiffness
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
@@ -71,8 +71,8 @@ class EndLoaded:
 def elastica_errors(edges, tip, twist=True):
     """Tip position over the length, root moment over itself, and tip angle [rad]."""
     exact = EndLoaded(tip)
-    rod = gs.ElasticRod.of(straight(edges), THIN, clamped={"start": X}, twist=twist)
-    shape = gs.solve_rod(rod, forces={-1: (0, 0, -exact.force)}, steps=2)
+    rod = rs.ElasticRod.of(straight(edges), THIN, clamped={"start": X}, twist=twist)
+    shape = rs.solve_rod(rod, forces={-1: (0, 0, -exact.force)}, steps=2)
     place = np.linalg.norm(shape.positions[-1] - [exact.reach, 0, -exact.drop])
     moment = shape.support("start")[1][1] / -exact.root_moment - 1
     last = shape.positions[-1] - shape.positions[-2]
@@ -100,9 +100,9 @@ def heavy_tip(weight):
 
 def heavy_error(edges, weight):
     """Tip position over the length."""
-    rod = gs.ElasticRod.of(straight(edges), THIN, clamped={"start": X}, twist=False)
+    rod = rs.ElasticRod.of(straight(edges), THIN, clamped={"start": X}, twist=False)
     gravity = weight * EI / THIN.mass_per_length
-    shape = gs.solve_rod(rod, gravity=(0, 0, -gravity))
+    shape = rs.solve_rod(rod, gravity=(0, 0, -gravity))
     return float(np.linalg.norm(shape.positions[-1, ::2] - heavy_tip(weight)))
 
 
@@ -121,10 +121,10 @@ def helix_measures(points):
 
 def helix_errors(edges, curvature=7.0, torsion=4.0, anisotropic=True):
     """Relative errors of radius and pitch, and the energy over that at the start, after relaxing from straight."""
-    section = gs.Ellipse(1e-4, 2e-4) if anisotropic else gs.Circle(1e-4)
-    kind = gs.Rod(section, THIN.material)
-    rod = gs.ElasticRod.of(straight(edges), kind, natural=(curvature, 0.0), natural_twist=torsion, clamped={"start": X})
-    shape = gs.solve_rod(rod, steps=20)
+    section = rs.Ellipse(1e-4, 2e-4) if anisotropic else rs.Circle(1e-4)
+    kind = rs.Rod(section, THIN.material)
+    rod = rs.ElasticRod.of(straight(edges), kind, natural=(curvature, 0.0), natural_twist=torsion, clamped={"start": X})
+    shape = rs.solve_rod(rod, steps=20)
     total = curvature**2 + torsion**2
     radius, pitch = helix_measures(shape.positions)
     return (
@@ -182,13 +182,13 @@ def kirchhoff_errors(edges, exact, force):
 
     The rod is clamped at both exact ends, position, tangent and material frame, and starts bent like the exact one.
     """
-    section = gs.GivenSection(EA=1e8, EI1=exact.ei1, EI2=exact.ei2, GJ=exact.gj)
-    rod = gs.ElasticRod.of(straight(edges), gs.Rod(section), director=(0, 0, 1), clamped={"start": X, "end": X})
+    section = rs.GivenSection(EA=1e8, EI1=exact.ei1, EI2=exact.ei2, GJ=exact.gj)
+    rod = rs.ElasticRod.of(straight(edges), rs.Rod(section), director=(0, 0, 1), clamped={"start": X, "end": X})
     s = np.linspace(0, 1, edges + 1)
     end = exact.frame(1.0)
     start = rod.state(exact.positions(s), exact.twist((s[1:] + s[:-1]) / 2), {"start": X, "end": end[2]})
     start[rod.ghost_angles[1], 0] = exact.twist(np.linspace(0, 1, 200))[-1]
-    shape = gs.solve_rod(rod, start=start, tangents={"end": end[2]}, directors={"end": end[0]})
+    shape = rs.solve_rod(rod, start=start, tangents={"end": end[2]}, directors={"end": end[0]})
     off = np.linalg.norm(shape.positions - exact.positions(s), axis=1).max()
     pull, moment = shape.support("end")
     size = np.linalg.norm(exact.moment(1.0))
@@ -204,8 +204,8 @@ def kirchhoff_errors(edges, exact, force):
 
 def euler_load(edges):
     """Of a pinned column of length 1, over pi^2 EI; EA = 1e6 EI shortens it by 1e-5."""
-    section = gs.GivenSection(EA=1e6, EI1=1.0, EI2=1.0, GJ=1.0)
-    rod = gs.ElasticRod.of(straight(edges), gs.Rod(section), twist=False)
+    section = rs.GivenSection(EA=1e6, EI1=1.0, EI2=1.0, GJ=1.0)
+    rod = rs.ElasticRod.of(straight(edges), rs.Rod(section), twist=False)
     free = rod.freedom().with_directions(np.array([0])).with_directions(np.array([edges]), X)
 
     return threshold(lambda share: unstable(rod, rod.state(rod.rest * (1 - share * pi**2 / 1e6)), free))
@@ -217,14 +217,14 @@ def lateral_load(edges):
     Exact for EI1 >> EI2 [Timoshenko and Gere, section 6.3]: 4.0126 sqrt(EI2 GJ) / L^2. Here EI1 = 1e4 EI2.
     """
     gj = 0.6
-    section = gs.GivenSection(EA=1e7, EI1=1e4, EI2=1.0, GJ=gj)  # m1 = z, in the load's plane
-    rod = gs.ElasticRod.of(straight(edges), gs.Rod(section), director=(0, 0, 1), clamped={"start": X})
+    section = rs.GivenSection(EA=1e7, EI1=1e4, EI2=1.0, GJ=gj)  # m1 = z, in the load's plane
+    rod = rs.ElasticRod.of(straight(edges), rs.Rod(section), director=(0, 0, 1), clamped={"start": X})
     plane = dict.fromkeys(range(1, edges + 1), (X, (0.0, 0.0, 1.0)))
     upright = dict.fromkeys(range(edges), 0.0)
 
     def lost(share):
         load = {-1: (0, 0, -share * 4.0126 * sqrt(gj))}
-        shape = gs.solve_rod(rod, along=plane, angles=upright, forces=load)
+        shape = rs.solve_rod(rod, along=plane, angles=upright, forces=load)
         return unstable(shape.rod, shape.state, shape.rod.freedom())
 
     return threshold(lost)
@@ -237,13 +237,13 @@ def michell_twist(edges):
     hold a rigid body and no more, keep the ring in place, and one angle keeps the rod from spinning about itself.
     """
     gj, quarter = 0.7, edges // 4
-    kind = gs.Rod(gs.GivenSection(EA=1e7, EI1=1.0, EI2=1.0, GJ=gj))
+    kind = rs.Rod(rs.GivenSection(EA=1e7, EI1=1.0, EI2=1.0, GJ=gj))
     angle = 2 * pi * np.arange(edges) / edges
     circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) / (2 * edges * np.sin(pi / edges))
 
     def lost(share):
         turns = share * 2 * pi * sqrt(3) / gj
-        rod = gs.ElasticRod.of(circle, kind, closed=True, natural_twist=turns)
+        rod = rs.ElasticRod.of(circle, kind, closed=True, natural_twist=turns)
 
         def radial(size):
             return float(np.sum(rod.gradient(rod.state(size * circle))[rod.nodes] * circle))
@@ -307,14 +307,14 @@ class Localised:
 def localised_error(edges, exact=None):
     """Largest distance of Bergou's f from tanh^2, f being measured with the found rod's own phi0 and moment."""
     exact = exact or Localised()
-    kind = gs.Rod(gs.GivenSection(EA=1e6, EI1=exact.ei, EI2=exact.ei, GJ=exact.gj))
-    rod = gs.ElasticRod.of(straight(edges, exact.length), kind, clamped={"start": X, "end": X})
+    kind = rs.Rod(rs.GivenSection(EA=1e6, EI1=exact.ei, EI2=exact.ei, GJ=exact.gj))
+    rod = rs.ElasticRod.of(straight(edges, exact.length), kind, clamped={"start": X, "end": X})
     positions, angles = exact.start(edges)
     goal = (exact.length - exact.nearer, 0, 0)
     start = rod.state(positions, angles)
     start[rod.ghost_angles[1], 0] = exact.turn
     # the hump may stand anywhere along so long a rod: the sign of that mode is the mesh's
-    shape = gs.solve_rod(rod, start=start, positions={-1: goal}, stable=False)
+    shape = rs.solve_rod(rod, start=start, positions={-1: goal}, stable=False)
     z = np.diff(shape.positions, axis=0)[:, 0] / np.linalg.norm(np.diff(shape.positions, axis=0), axis=1)
     moment = exact.gj * shape.strains.twist.mean()
     s = (np.arange(edges) + 0.5) * exact.length / edges - exact.length / 2
@@ -336,7 +336,7 @@ def holonomy(steps, colatitude):
         [np.sin(colatitude) * np.cos(angle), np.sin(colatitude) * np.sin(angle), np.full(steps + 1, np.cos(colatitude))]
     )
     line = np.arange(3.0)[:, None]
-    rod = gs.ElasticRod.of(line * tangents[0], THIN)
+    rod = rs.ElasticRod.of(line * tangents[0], THIN)
     first = rod.reference_directors(rod.state())[0]
     for tangent in tangents[1:]:
         rod = rod.refreshed(rod.state(line * tangent))
@@ -369,9 +369,9 @@ def bent_and_twisted(**options):
     """An anisotropic rod with natural curvature and twist, and a random state of it."""
     rng = np.random.default_rng(3)
     s = np.linspace(0, 2, 12)
-    kind = gs.Rod(gs.Ellipse(2e-3, 1e-3), gs.Material(1e9, 1e3, 0.3))
+    kind = rs.Rod(rs.Ellipse(2e-3, 1e-3), rs.Material(1e9, 1e3, 0.3))
     curve = np.column_stack([np.cos(s), np.sin(s), 0.4 * s])
-    rod = gs.ElasticRod.of(curve, kind, natural=(0.5, -0.3), natural_twist=0.7, **options)
+    rod = rs.ElasticRod.of(curve, kind, natural=(0.5, -0.3), natural_twist=0.7, **options)
     free = rod.freedom()
     return rod, rod.state() + free.expand(0.05 * rng.normal(size=free.size))
 

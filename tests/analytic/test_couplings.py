@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-import gridshell as gs
-from gridshell.solve.step_limit import step_limit
+import rodshell as rs
+from rodshell.solve.step_limit import step_limit
 from tests.analytic.coupling_problems import (
     DECADES,
     KINDS,
@@ -46,7 +46,7 @@ def test_explicit_ties_tend_to_implicit_ones_as_the_step(kind):
 
 
 @every_kind
-@pytest.mark.parametrize("coupling", [gs.SharedDofs(), gs.ImplicitPenalty(), gs.ExplicitPenalty()])
+@pytest.mark.parametrize("coupling", [rs.SharedDofs(), rs.ImplicitPenalty(), rs.ExplicitPenalty()])
 def test_no_mass_is_counted_twice(kind, coupling):
     """Four rods of 0.9 m."""
     mass, inertia = masses(bent(KINDS[kind], coupling))
@@ -56,8 +56,8 @@ def test_no_mass_is_counted_twice(kind, coupling):
 
 def test_each_copy_has_its_share_of_the_mass():
     """A quarter each at a joint with two linkers, as the paper says, and half each at the four neighbours and edges."""
-    shell = element(gs.Linker())
-    shared = element(gs.Linker(), gs.SharedDofs())
+    shell = element(rs.Linker())
+    shared = element(rs.Linker(), rs.SharedDofs())
     shares = shell.mass[:, 0] / shared.mass[shell.like, 0]
     joint = shell.mesh.joint_nodes[0]
     assert np.allclose(shares[shell.like == joint], 1 / 4)
@@ -75,7 +75,7 @@ def test_limit_is_where_the_matrix_of_the_step_has_an_eigenvalue_on_the_unit_cir
     """A second method: all eigenvalues z of M (z - 2 + 1/z) + h2 Ki z + h2 Ke = 0, by its companion matrix."""
     shell = element(KINDS[kind])
     state = flat_state(shell)
-    motion = gs.Motion.of(shell)
+    motion = rs.Motion.of(shell)
     free = motion.constraint_at(0.0).freedom(state)
     ties = replace(shell, within=(), stretch=replace(shell.stretch, stiffness=0 * shell.stretch.stiffness))
     explicit = tangent_stiffness(ties, state, free).toarray()
@@ -101,25 +101,25 @@ def test_limits_of_ties_alone_have_closed_forms():
 
 
 def test_a_step_beyond_the_limit_is_refused_with_the_limit():
-    shell = element(gs.Ball())
-    motion, state = gs.Motion.of(shell), flat_state(shell)
+    shell = element(rs.Ball())
+    motion, state = rs.Motion.of(shell), flat_state(shell)
     limit = step_limit(motion, state)
-    with pytest.raises(gs.StabilityError, match=rf"time step of .* s \(limit {limit:.4g} s\): .*SharedDofs"):
-        gs.simulate(motion, state, until=2.1 * limit, step=1.05 * limit)
-    series = gs.simulate(motion, state, until=2.0 * limit, step=0.95 * limit)
+    with pytest.raises(rs.StabilityError, match=rf"time step of .* s \(limit {limit:.4g} s\): .*SharedDofs"):
+        rs.simulate(motion, state, until=2.1 * limit, step=1.05 * limit)
+    series = rs.simulate(motion, state, until=2.0 * limit, step=0.95 * limit)
     assert series.report.refused_steps == 0
 
 
 def clamped_strips(rod):
-    grid = gs.straight_rods([[[-0.4, 0], [0.4, 0]], [[0, -0.4], [0, 0.4]]])
-    mesh = gs.mesh_grid(grid, 0.1)
-    return gs.Shell.of(mesh, rod, clamped=True, joint=gs.Pin(), coupling=gs.ExplicitPenalty())
+    grid = rs.straight_rods([[[-0.4, 0], [0.4, 0]], [[0, -0.4], [0, 0.4]]])
+    mesh = rs.mesh_grid(grid, 0.1)
+    return rs.Shell.of(mesh, rod, clamped=True, joint=rs.Pin(), coupling=rs.ExplicitPenalty())
 
 
 def test_what_has_no_mass_follows_at_the_limit():
     """Clamps of strips have twist angles without inertia; the limit is that with next to none."""
     shell = clamped_strips(STRIP)
-    state, motion = flat_state(shell), gs.Motion.of(shell)
+    state, motion = flat_state(shell), rs.Motion.of(shell)
     free = motion.constraint_at(0.0).freedom(state)
     massless = (free.count > 0) & (shell.mass[:, 0] == 0)
     assert np.count_nonzero(massless) == 4
@@ -130,22 +130,22 @@ def test_what_has_no_mass_follows_at_the_limit():
 
 
 def test_explicit_ties_on_what_has_no_mass_are_refused():
-    shell = clamped_strips(gs.Rod(gs.GivenSection(EA=1e3, EI1=1, EI2=1, GJ=0.7, mass=1.0)))
-    with pytest.raises(gs.InputError, match="twist angles without mass: give the rods mass and rotary inertia"):
-        gs.simulate(gs.Motion.of(shell), flat_state(shell), until=1e-3, step=1e-4)
+    shell = clamped_strips(rs.Rod(rs.GivenSection(EA=1e3, EI1=1, EI2=1, GJ=0.7, mass=1.0)))
+    with pytest.raises(rs.InputError, match="twist angles without mass: give the rods mass and rotary inertia"):
+        rs.simulate(rs.Motion.of(shell), flat_state(shell), until=1e-3, step=1e-4)
 
 
 def test_shared_and_implicit_ties_have_no_step_limit():
-    for coupling in (gs.SharedDofs(), gs.ImplicitPenalty()):
-        shell = element(gs.Linker(), coupling)
-        assert step_limit(gs.Motion.of(shell), flat_state(shell)) == np.inf
+    for coupling in (rs.SharedDofs(), rs.ImplicitPenalty()):
+        shell = element(rs.Linker(), coupling)
+        assert step_limit(rs.Motion.of(shell), flat_state(shell)) == np.inf
 
 
 @every_kind
 def test_explicit_ties_leave_one_banded_system_for_every_rod_and_linker(kind):
-    shell = bent(KINDS[kind], gs.ExplicitPenalty())
+    shell = bent(KINDS[kind], rs.ExplicitPenalty())
     width, count = systems(shell)
     linkers = 2 * len(shell.mesh.grid.crossings) if kind == "two linkers" else 0
     assert width == 10  # x, theta, x, theta, x: a single rod's
     assert count == len(shell.mesh.grid.rods) + linkers
-    assert systems(bent(KINDS[kind], gs.SharedDofs()))[1] == 1
+    assert systems(bent(KINDS[kind], rs.SharedDofs()))[1] == 1

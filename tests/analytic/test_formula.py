@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gridshell.errors import InputError
-from gridshell.targets import Cap, Disc, EllipseDomain, HeightField, Jet, Paraboloid, Rectangle, parse_formula
-from gridshell.targets.heights import Heights
-from gridshell.targets.jet import differences
+from rodshell.errors import InputError
+from rodshell.targets import Cap, Disc, EllipseDomain, HeightField, Jet, Paraboloid, Rectangle, parse_formula
+from rodshell.targets.heights import Heights
+from rodshell.targets.jet import differences
 
 Floats = NDArray[np.float64]
 DISC = Disc(0.2)
@@ -401,8 +401,8 @@ def test_reading_neither_runs_code_nor_warns():
     """In a process of its own: the parser must survive whatever it is fed."""
     script = (
         "import builtins, warnings; warnings.simplefilter('error')\n"
-        "from gridshell.targets import parse_formula\n"
-        "from gridshell.errors import InputError\n"
+        "from rodshell.targets import parse_formula\n"
+        "from rodshell.errors import InputError\n"
         "def forbidden(*_): raise SystemExit('code was run')\n"
         "builtins.eval = builtins.exec = forbidden\n"
         "long = ('-'*4000, '('*4000, '(x)'*1000, '**'.join('x'*1300), 'x('*1000, '+x'*1999, 'not '*900)\n"

@@ -8,10 +8,10 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import find_equilibrium
-from gridshell.solve.problem import Problem
+import rodshell as rs
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import find_equilibrium
+from rodshell.solve.problem import Problem
 from tests.analytic.joint_problems import (
     EI,
     JOINTS,
@@ -41,7 +41,7 @@ SECOND = pytest.approx(2.0, abs=0.05)
 # Small displacements against beam theory
 
 
-@pytest.mark.parametrize("joint", [gs.Rigid(), gs.Spring(5.0), gs.Spring(0.3)], ids=["rigid", "firm", "soft"])
+@pytest.mark.parametrize("joint", [rs.Rigid(), rs.Spring(5.0), rs.Spring(0.3)], ids=["rigid", "firm", "soft"])
 def test_portal_frame_sways_as_beam_theory_says(joint):
     errors = [portal_sway(edge, joint) - 1 for edge in MESHES]
     assert order(MESHES, errors) == SECOND
@@ -74,7 +74,7 @@ def test_a_pin_that_scissored_is_as_stiff_as_one_built_so(star, joint, turned):
 
 
 @pytest.mark.parametrize("star", ["two crossing rods", "T", "L"])
-@pytest.mark.parametrize("kind", [gs.Rigid, lambda rest_angle: gs.Spring(3.0, 4.0, 0.5, rest_angle)])
+@pytest.mark.parametrize("kind", [rs.Rigid, lambda rest_angle: rs.Spring(3.0, 4.0, 0.5, rest_angle)])
 def test_a_joint_with_a_rest_angle_is_as_stiff_there_as_one_built_so(star, kind):
     (first, *_), (second, *_) = STARS[star]
     problem = Star(STARS[star], kind(rest_angle=second - first))
@@ -92,8 +92,8 @@ def test_the_order_of_the_rods_does_not_matter():
 
 def test_equilibrium_under_a_small_load_is_the_small_response():
     """Newton's method with large rotations finds the same as the tangent stiffness of the flat state."""
-    grid = gs.straight_rods([[[0, 0], [1, 0]], [[0.5, -0.4], [0.5, 0.6]]])
-    shell = gs.Shell.of(gs.mesh_grid(grid, 0.1), STRIP, joint=gs.Spring(2.0, 1.0, 1.0))
+    grid = rs.straight_rods([[[0, 0], [1, 0]], [[0.5, -0.4], [0.5, 0.6]]])
+    shell = rs.Shell.of(rs.mesh_grid(grid, 0.1), STRIP, joint=rs.Spring(2.0, 1.0, 1.0))
     free = shell.freedom().with_directions(shell.ends[:3]).with_directions(shell.ends[3:], X, Z)
     load = np.zeros((len(shell.like), 3))
     load[shell.ends[3]] = 1e-5 * (X + 2 * Z)
@@ -118,7 +118,7 @@ def test_ring_of_several_rods_leaves_its_plane_at_michells_twist(rods):
 def test_ring_with_ball_joints_needs_no_twist_to_leave_its_plane():
     """The ring's check has teeth: without the joints' moments the polygon is a mechanism."""
     with pytest.raises(AssertionError):
-        michell_twist(96, 4, gs.Spring(0.1, 0.1, 0.1, rest_angle=0.0))
+        michell_twist(96, 4, rs.Spring(0.1, 0.1, 0.1, rest_angle=0.0))
 
 
 # Lattices
@@ -126,8 +126,8 @@ def test_ring_with_ball_joints_needs_no_twist_to_leave_its_plane():
 
 @pytest.mark.parametrize("angle", [-60, -25, 60])
 def test_lattice_with_pins_folds_freely(angle):
-    energy, force = folding_energy(gs.Pin(), radians(angle))
-    stiff, _ = folding_energy(gs.Rigid(), radians(angle))
+    energy, force = folding_energy(rs.Pin(), radians(angle))
+    stiff, _ = folding_energy(rs.Rigid(), radians(angle))
     assert energy < 1e-6 * stiff
     assert force < 1e-6  # it is an equilibrium all the way
 
@@ -135,12 +135,12 @@ def test_lattice_with_pins_folds_freely(angle):
 def test_springs_alone_resist_the_folding_of_a_lattice():
     """By their energy: nine joints, each k s^2 / 2 in series with the half edges at it."""
     k, angle = 1e-3, radians(40)
-    energy, _ = folding_energy(gs.Spring(k), angle)
+    energy, _ = folding_energy(rs.Spring(k), angle)
     assert energy == pytest.approx(9 * 0.5 * k * angle**2, rel=1e-4)  # half edges: k l / 2 EI = 2e-5
 
 
 def test_bending_a_lattice_along_its_rods_takes_no_part_of_its_joints():
-    stiffness = {joint: bending_stiffness(joint) for joint in (gs.Pin(), gs.Rigid(), gs.Spring(1.0, 2.0, 0.3))}
+    stiffness = {joint: bending_stiffness(joint) for joint in (rs.Pin(), rs.Rigid(), rs.Spring(1.0, 2.0, 0.3))}
     # three rods of the length 1.2 between the middles of their end edges of 0.1
     assert list(stiffness.values()) == pytest.approx([3 * EI / 1.1] * 3, rel=1e-8)
 
@@ -150,7 +150,7 @@ def test_bending_a_lattice_along_its_rods_takes_no_part_of_its_joints():
 
 @pytest.mark.parametrize(
     "joint",
-    [gs.Ball(), gs.Pin(), gs.Rigid(), gs.Spring(0.002, 0.01, 0.01), gs.Linker(corners=4)],
+    [rs.Ball(), rs.Pin(), rs.Rigid(), rs.Spring(0.002, 0.01, 0.01), rs.Linker(corners=4)],
     ids=["ball", "pin", "rigid", "spring", "four linkers"],
 )
 def test_a_symmetric_shell_stays_symmetric(joint):
@@ -159,7 +159,7 @@ def test_a_symmetric_shell_stays_symmetric(joint):
 
 def test_the_papers_two_linkers_are_chiral():
     """ERRATA to HQK 2.2: one pair of opposite corners resists opening and closing differently."""
-    assert asymmetry(gs.Linker())[0] > 1e-3
+    assert asymmetry(rs.Linker())[0] > 1e-3
     closing, opening = (linker_energy(radians(angle), 2) for angle in (37.6, 142.4))
     assert (closing, opening) == pytest.approx((2.7e-4, 2.4e-3), rel=0.02)
     four = [linker_energy(radians(angle), 4) for angle in (37.6, 142.4)]
@@ -169,28 +169,28 @@ def test_the_papers_two_linkers_are_chiral():
 
 def test_linkers_stiffen_the_rods_along_themselves():
     """ERRATA to HQK 2.2: they bend where a rod bends through its joint, the more the coarser the mesh."""
-    added = [bending_stiffness(gs.Linker()) / bending_stiffness(gs.Pin()) - 1]
+    added = [bending_stiffness(rs.Linker()) / bending_stiffness(rs.Pin()) - 1]
     assert added[0] == pytest.approx(0.081, abs=0.001)
 
 
 def test_stiffness_of_linkers_about_the_normal_depends_on_the_mesh():
     """8 EI over the edge, of two linkers, near a right angle (numerics); a `Spring` does not change."""
-    rod, turn = gs.Rod(gs.Circle(1e-3), gs.Material(1e6, 1e3)), 1e-3
+    rod, turn = rs.Rod(rs.Circle(1e-3), rs.Material(1e6, 1e3)), 1e-3
     for edge in (2.5e-3, 5e-3):
         shear = 2 * linker_energy(pi / 2 + turn, 2, edge=edge) / turn**2
         assert shear == pytest.approx(8 * rod.bend_stiffness / edge, rel=1e-2)
 
 
 def test_three_rods_at_one_joint_are_tied_by_one_kind():
-    grid = gs.straight_rods([[[-cos(a), -sin(a)], [cos(a), sin(a)]] for a in (0.0, 1.0, 2.0)])
-    with pytest.raises(gs.InputError, match="some are tied by ball and some by rigid joints"):
-        gs.Shell.of(gs.mesh_grid(grid, 0.5), STRIP, joint=[gs.Ball(), gs.Rigid(), gs.Rigid()])
+    grid = rs.straight_rods([[[-cos(a), -sin(a)], [cos(a), sin(a)]] for a in (0.0, 1.0, 2.0)])
+    with pytest.raises(rs.InputError, match="some are tied by ball and some by rigid joints"):
+        rs.Shell.of(rs.mesh_grid(grid, 0.5), STRIP, joint=[rs.Ball(), rs.Rigid(), rs.Rigid()])
 
 
-@pytest.mark.parametrize("joint", [gs.Spring(1e-2), gs.Spring(1e-2, 1.0, 1.0), gs.Pin()])
+@pytest.mark.parametrize("joint", [rs.Spring(1e-2), rs.Spring(1e-2, 1.0, 1.0), rs.Pin()])
 def test_no_rod_spins_about_itself_for_nothing(joint):
     """A spring in shear alone holds no normal: one angle of each rod is held, as with ball joints."""
-    rod = gs.Rod(gs.GivenSection(EA=1e3, EI1=1, EI2=1, GJ=0.7))
+    rod = rs.Rod(rs.GivenSection(EA=1e3, EI1=1, EI2=1, GJ=0.7))
     shell = lattice(joint, rod=rod)
     free = shell.freedom().with_directions(shell.ends)
     for angle in (0.0, 0.5):

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from gridshell.errors import InputError, NetLimitError
-from gridshell.layout import GridLayout
-from gridshell.nets import ChebyshevNet, chebyshev_net, geodesics, march, sphere_net_end, sphere_net_rod
-from gridshell.nets.cuts import Cut, Lines, cut_lines, extrapolated, inside_nodes
-from gridshell.nets.sphere import LIMIT, crossing_angle
-from gridshell.targets import Cap, Disc, Ellipsoid, HeightField, Hemisphere, Paraboloid, Rectangle, Target
+from rodshell.errors import InputError, NetLimitError
+from rodshell.layout import GridLayout
+from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics, march, sphere_net_end, sphere_net_rod
+from rodshell.nets.cuts import Cut, Lines, cut_lines, extrapolated, inside_nodes
+from rodshell.nets.sphere import LIMIT, crossing_angle
+from rodshell.targets import Cap, Disc, Ellipsoid, HeightField, Hemisphere, Paraboloid, Rectangle, Target
 
 Floats = NDArray[np.float64]
 
@@ -775,7 +775,7 @@ ROOF = HeightField(formula="3*cos(pi*x/16)*cos(pi*y/12)", domain=Rectangle((12.0
 
 
 def test_too_many_nodes_are_refused_before_any_is_marched_and_the_remedy_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    from gridshell.nets import chebyshev
+    from rodshell.nets import chebyshev
 
     with monkeypatch.context() as patched:
         patched.setattr(chebyshev, "march_lines", None)

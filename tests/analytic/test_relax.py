@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-import gridshell as gs
-from gridshell.formfinding import popup as popup_module
-from gridshell.model import Freedom
-from gridshell.rods.isotropic_bend import IsotropicBend
-from gridshell.rods.stretch import Stretch
-from gridshell.solve import relax as relax_module
-from gridshell.solve.constraint import Supports
-from gridshell.solve.implicit_euler import ImplicitEuler
-from gridshell.solve.problem import Problem
-from gridshell.solve.relax import relax
+import rodshell as rs
+from rodshell.formfinding import popup as popup_module
+from rodshell.model import Freedom
+from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.stretch import Stretch
+from rodshell.solve import relax as relax_module
+from rodshell.solve.constraint import Supports
+from rodshell.solve.implicit_euler import ImplicitEuler
+from rodshell.solve.problem import Problem
+from rodshell.solve.relax import relax
 
 PINNED, SLIDING, PLANE = ((), ((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 
@@ -95,14 +95,14 @@ def test_energy_never_grows_and_every_step_is_counted(monkeypatch):
 def test_shell_that_newtons_method_loses_pops_up_by_sliding(monkeypatch):
     """A steep paraboloid: released at once it takes more than the iterations left to it, sliding down it arrives."""
     monkeypatch.setattr(popup_module, "MOST_AT_ONCE", 10)
-    rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-    layout = gs.GridLayout.orthogonal(rods="auto", spacing=0.03, length="auto", edge=0.01)
-    trimmed = gs.trim(gs.drape(layout, rod, gs.Paraboloid(radius=0.1, height=0.35)))
-    footprint = gs.map_back(trimmed)
-    popped = gs.pop_up(footprint, trimmed.boundary, rod, ends="pinned")
+    rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+    layout = rs.GridLayout.orthogonal(rods="auto", spacing=0.03, length="auto", edge=0.01)
+    trimmed = rs.trim(rs.drape(layout, rod, rs.Paraboloid(radius=0.1, height=0.35)))
+    footprint = rs.map_back(trimmed)
+    popped = rs.pop_up(footprint, trimmed.boundary, rod, ends="pinned")
     assert popped.report.stable
     monkeypatch.setattr(relax_module, "MOST_STEPS", 0)
-    assert not gs.pop_up(footprint, trimmed.boundary, rod, ends="pinned").report.stable
+    assert not rs.pop_up(footprint, trimmed.boundary, rod, ends="pinned").report.stable
     # the state is an equilibrium: without its ends' forces nothing is left of the gradient
     gradient = np.zeros_like(popped.state)
     shell = popped.shell

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-import gridshell as gs
-from gridshell.model import Freedom
-from gridshell.rods.elements import NO_HESSIANS
-from gridshell.rods.round_bend_twist import RoundBendTwist
-from gridshell.solve.banded import Banded
-from gridshell.solve.constraint import Supports
-from gridshell.solve.implicit_euler import ImplicitEuler, Refused
-from gridshell.solve.simulate import _Grid
-from gridshell.solve.time_series import End
+import rodshell as rs
+from rodshell.model import Freedom
+from rodshell.rods.elements import NO_HESSIANS
+from rodshell.rods.round_bend_twist import RoundBendTwist
+from rodshell.solve.banded import Banded
+from rodshell.solve.constraint import Supports
+from rodshell.solve.implicit_euler import ImplicitEuler, Refused
+from rodshell.solve.simulate import _Grid
+from rodshell.solve.time_series import End
 from tests.analytic.rod_motions import (
     G,
     angular_losses,
@@ -105,8 +105,8 @@ def test_angular_momentum_of_a_free_rod_is_conserved_to_first_order_in_the_step(
 def test_free_fall_is_exact():
     """As implicit Euler falls: v = g k h, and the sum of it; no strain, no spin."""
     rod = straight(21, kind(5e10))
-    series = gs.simulate(
-        gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes, (1.0, 2.0, -9.81)),)), rod.state(), until=1.0, step=0.01
+    series = rs.simulate(
+        rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes, (1.0, 2.0, -9.81)),)), rod.state(), until=1.0, step=0.01
     )
     k = np.arange(101)[:, None]
     g = np.array([1.0, 2.0, -9.81])
@@ -122,10 +122,10 @@ def test_free_fall_is_exact():
 
 def ring(nodes, radius=0.2):
     """A ring that is round at rest, and its rod: 4 mm thick."""
-    one = gs.Rod(gs.Circle(2e-3), gs.Material(1e7, 1e3, 0.3))
+    one = rs.Rod(rs.Circle(2e-3), rs.Material(1e7, 1e3, 0.3))
     angle = 2 * pi * np.arange(nodes) / nodes
     circle = radius * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    return gs.ElasticRod.of(circle, one, closed=True, natural="rest"), one
+    return rs.ElasticRod.of(circle, one, closed=True, natural="rest"), one
 
 
 def test_ring_vibrates_in_its_plane_and_out_of_it_as_love_says():
@@ -156,17 +156,17 @@ def test_ring_in_motion_has_its_frequency():
 
 def curved(closed=False, rotary_inertia=None):
     """A strip with natural curvature and twist, of 1 mm by 4 mm."""
-    strip = gs.Rod(gs.RectangularSection(width=1e-3, height=4e-3), gs.Material(1e7, 1e3, 0.3))
+    strip = rs.Rod(rs.RectangularSection(width=1e-3, height=4e-3), rs.Material(1e7, 1e3, 0.3))
     if rotary_inertia is not None:
         stiffness = strip.stretch_stiffness, *strip.bend_stiffnesses, strip.twist_stiffness
-        strip = gs.Rod(gs.GivenSection(*stiffness, mass=strip.mass_per_length, rotary_inertia=rotary_inertia))
+        strip = rs.Rod(rs.GivenSection(*stiffness, mass=strip.mass_per_length, rotary_inertia=rotary_inertia))
     if closed:
         angle = 2 * pi * np.arange(24) / 24
         knot = 0.1 * np.column_stack([np.cos(angle), np.sin(angle), 0.3 * np.sin(2 * angle)])
-        return gs.ElasticRod.of(knot, strip, closed=True, natural="rest")
+        return rs.ElasticRod.of(knot, strip, closed=True, natural="rest")
     s = np.linspace(0, 4, 20)
     helix = 0.1 * np.column_stack([np.cos(s), np.sin(s), 0.4 * s])
-    return gs.ElasticRod.of(helix, strip, natural="rest", natural_twist=5.0)
+    return rs.ElasticRod.of(helix, strip, natural="rest", natural_twist=5.0)
 
 
 @pytest.mark.parametrize("closed", [False, True])
@@ -195,12 +195,12 @@ def test_spinning_strip_loses_angular_momentum_by_its_rotary_inertia_only():
 
 def test_curved_strip_at_rest_stays_at_rest():
     body = curved(closed=True)
-    series = gs.simulate(gs.Motion.of(body), body.state(), until=0.1, step=1e-3)
+    series = rs.simulate(rs.Motion.of(body), body.state(), until=0.1, step=1e-3)
     assert np.abs(series.states[-1] - body.state()).max() < 1e-12
 
 
 def test_strip_swings_about_each_axis_at_its_own_frequency():
-    strip = gs.Rod(gs.RectangularSection(width=4e-3, height=2e-3), gs.Material(1e9, 1e3))
+    strip = rs.Rod(rs.RectangularSection(width=4e-3, height=2e-3), rs.Material(1e9, 1e3))
     frequencies, shapes = modes(straight(61, strip, clamped=("start",), director=(0, 0, 1)))
     exact = [np.square(1.8751040687) * sqrt(ei / strip.mass_per_length) / (2 * pi) for ei in strip.bend_stiffnesses]
     assert frequencies[0] == pytest.approx(exact[1], rel=1e-3)  # towards m2, along y
@@ -256,8 +256,8 @@ def test_rod_let_go_falls_as_a_whole():
     def support(time):
         return Supports(held if time < release + 1e-9 else body.freedom())
 
-    motion = gs.Motion.of(body, constraint=support, forces=(gs.Gravity(body.nodes, G),))
-    series = gs.simulate(motion, body.state(), until=0.3, step=1e-3)
+    motion = rs.Motion.of(body, constraint=support, forces=(rs.Gravity(body.nodes, G),))
+    series = rs.simulate(motion, body.state(), until=0.3, step=1e-3)
     assert np.abs(series.states[:101, [0, 20]] - body.state()[[0, 20]]).max() == 0
     momentum = linear_momentum(body, series.velocities) / body.mass[body.nodes, 0].sum()
     gained = momentum[101:] - momentum[100]
@@ -271,8 +271,8 @@ def test_rod_held_again_stays_where_it_is_caught():
         free = body.freedom()
         return Supports(free.with_directions(np.array([0])) if time > 0.05 + 1e-9 else free)
 
-    motion = gs.Motion.of(body, constraint=support, forces=(gs.Gravity(body.nodes, G),))
-    series = gs.simulate(motion, body.state(), until=0.15, step=1e-3)
+    motion = rs.Motion.of(body, constraint=support, forces=(rs.Gravity(body.nodes, G),))
+    series = rs.simulate(motion, body.state(), until=0.15, step=1e-3)
     assert series.states[50, 0, 2] < -0.01
     np.testing.assert_array_equal(series.states[50:, 0], np.tile(series.states[50, 0], (101, 1)))
     assert series.states[-1, 10, 2] < series.states[50, 10, 2]
@@ -314,13 +314,13 @@ def test_rod_on_a_sphere_slides_along_its_great_circle():
     """Started along the circle it goes on around it: w t, less what implicit Euler takes, and stays on the sphere."""
     angle = np.linspace(0, 1.0, 21)
     arc = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    body = gs.ElasticRod.of(arc, kind(1e8))
+    body = rs.ElasticRod.of(arc, kind(1e8))
     velocity = np.zeros_like(body.mass)
     velocity[body.nodes] = 0.5 * np.column_stack([-np.sin(angle), np.cos(angle), 0 * angle])
     turned = []
     for step in (2e-2, 1e-2, 5e-3):
-        motion = gs.Motion.of(body, constraint=OnSphere(body))
-        last = gs.simulate(motion, body.state(), velocity, until=1.0, step=step).states[-1]
+        motion = rs.Motion.of(body, constraint=OnSphere(body))
+        last = rs.simulate(motion, body.state(), velocity, until=1.0, step=step).states[-1]
         x = last[body.nodes]
         np.testing.assert_allclose(np.linalg.norm(x, axis=1), 1.0, rtol=1e-14)
         assert np.abs(x[:, 2]).max() < 1e-9
@@ -340,8 +340,8 @@ def test_damping_decays_at_the_stated_rate():
     velocity[rod.angles, 0] = 3.0
     left = []
     for step in (0.02, 0.01, 0.005):
-        motion = gs.Motion.of(rod, forces=(gs.Damping(rate=2.0),))
-        last = gs.simulate(motion, rod.state(), velocity, until=1.0, step=step).velocities[-1]
+        motion = rs.Motion.of(rod, forces=(rs.Damping(rate=2.0),))
+        last = rs.simulate(motion, rod.state(), velocity, until=1.0, step=step).velocities[-1]
         share = (1 + 2.0 * step) ** (-1.0 / step)
         np.testing.assert_allclose(last, share * velocity, atol=1e-9)
         left.append(share)
@@ -362,13 +362,13 @@ def test_damping_by_node_and_implicit_and_explicit_forces_agree():
         return -coefficients * velocity
 
     def last(force, step):
-        motion = gs.Motion.of(rod, forces=(force,))
-        return gs.simulate(motion, rod.state(), thrown(rod), until=0.1, step=step).states[-1]
+        motion = rs.Motion.of(rod, forces=(force,))
+        return rs.simulate(motion, rod.state(), thrown(rod), until=0.1, step=step).states[-1]
 
-    own = last(gs.Damping(coefficients=coefficients), 1e-3)
-    np.testing.assert_allclose(last(gs.ImplicitForce(implicit, blocks), 1e-3), own, atol=1e-8)
+    own = last(rs.Damping(coefficients=coefficients), 1e-3)
+    np.testing.assert_allclose(last(rs.ImplicitForce(implicit, blocks), 1e-3), own, atol=1e-8)
     apart = [
-        np.abs(last(gs.ExplicitForce(explicit), h) - last(gs.Damping(coefficients=coefficients), h)).max()
+        np.abs(last(rs.ExplicitForce(explicit), h) - last(rs.Damping(coefficients=coefficients), h)).max()
         for h in (1e-3, 5e-4)
     ]
     assert apart[0] > 1e-6  # held over a step they differ, and converge
@@ -390,9 +390,9 @@ def test_implicit_spring_has_its_frequency_where_an_explicit_one_blows_up():
     velocity[rod.nodes, 2] = 1.0
 
     def go(force):
-        return gs.simulate(gs.Motion.of(rod, forces=(force,)), home, velocity, until=0.4, step=step)
+        return rs.simulate(rs.Motion.of(rod, forces=(force,)), home, velocity, until=0.4, step=step)
 
-    series = go(gs.ImplicitForce(spring, np.arange(5)[:, None]))
+    series = go(rs.ImplicitForce(spring, np.arange(5)[:, None]))
     found = series.states[:, 2, 2]
     x, v, exact = 0.0, 1.0, [0.0]
     for _ in range(10):
@@ -401,14 +401,14 @@ def test_implicit_spring_has_its_frequency_where_an_explicit_one_blows_up():
         exact.append(x)
     np.testing.assert_allclose(found, exact, atol=1e-10)
     assert series.report.factorizations == series.report.steps == 10  # linear: its gradient is in the matrix
-    blown = go(gs.ExplicitForce(lambda *at: spring(*at)[0])).states[:, 2, 2]
+    blown = go(rs.ExplicitForce(lambda *at: spring(*at)[0])).states[:, 2, 2]
     assert np.abs(blown).max() > 1e3
 
 
 def test_point_loads_and_moments_move_a_free_rod_as_a_whole():
     rod = straight(11)
-    loads = gs.PointLoads.on(5, 0.0, 0.0, 0.02), gs.PointLoads.on(rod.angles.start + 4, 1e-7)
-    series = gs.simulate(gs.Motion.of(rod, forces=loads), rod.state(), until=0.2, step=1e-3)
+    loads = rs.PointLoads.on(5, 0.0, 0.0, 0.02), rs.PointLoads.on(rod.angles.start + 4, 1e-7)
+    series = rs.simulate(rs.Motion.of(rod, forces=loads), rod.state(), until=0.2, step=1e-3)
     assert linear_momentum(rod, series.velocities)[-1] == pytest.approx([0, 0, 0.02 * 0.2], abs=1e-12)
 
 
@@ -420,7 +420,7 @@ def test_prescribed_motion_is_followed_and_carries_the_rod():
     def support(time):
         return Supports(free, np.array([0]), (place + [0, 0, 0.1 * np.sin(5 * time)])[None])
 
-    series = gs.simulate(gs.Motion.of(rod, constraint=support), rod.state(), until=1.0, step=5e-3)
+    series = rs.simulate(rs.Motion.of(rod, constraint=support), rod.state(), until=1.0, step=5e-3)
     np.testing.assert_allclose(series.states[:, 0, 2], 0.1 * np.sin(5 * series.times), atol=1e-14)
     assert np.abs(series.states[-1, 10, 2]) > 1e-3
 
@@ -428,13 +428,13 @@ def test_prescribed_motion_is_followed_and_carries_the_rod():
 def test_supports_carry_the_weight_of_a_hanging_rod():
     rest = np.zeros((11, 3))
     rest[:, 2] = np.linspace(0, -1, 11)
-    rod = gs.ElasticRod.of(rest, kind())
-    motion = gs.Motion.of(
+    rod = rs.ElasticRod.of(rest, kind())
+    motion = rs.Motion.of(
         rod,
         constraint=rod.freedom().with_directions(np.array([0, rod.angles.start])),
-        forces=(gs.Gravity(rod.nodes), gs.Damping(rate=20.0)),
+        forces=(rs.Gravity(rod.nodes), rs.Damping(rate=20.0)),
     )
-    series = gs.simulate(motion, rod.state(), until=3.0, step=0.02)
+    series = rs.simulate(motion, rod.state(), until=3.0, step=0.02)
     taken = ImplicitEuler().take(series.last.motion, series.last.state, series.last.velocity, time=3.0, step=0.02)
     weight = 9.81 * rod.mass[rod.nodes, 0].sum()
     assert taken.reactions[0] == pytest.approx([0, 0, weight], rel=1e-6, abs=1e-9 * weight)
@@ -445,8 +445,8 @@ def test_supports_carry_the_weight_of_a_hanging_rod():
 
 def test_steps_halve_on_a_violent_start_and_grow_back():
     rod = straight(21, kind(1e8))
-    motion = gs.Motion.of(rod, forces=(gs.Damping(rate=30.0),))
-    series = gs.simulate(motion, rod.state(), thrown(rod, 30.0), until=1.0, step=0.02)
+    motion = rs.Motion.of(rod, forces=(rs.Damping(rate=30.0),))
+    series = rs.simulate(motion, rod.state(), thrown(rod, 30.0), until=1.0, step=0.02)
     report = series.report
     assert report.refused_steps > 0
     assert report.smallest_step < 0.02
@@ -472,7 +472,7 @@ def test_negative_pivots_are_refused_and_smaller_steps_pass():
     start = rod.state()
     start[rod.nodes, 0] *= 1 - 2 * pi**2 * rod.elements[0].stiffness[0] * 0.05 / rod.stretch.stiffness[0]
     ends = rod.freedom().with_directions(np.array([0, 20]))
-    motion = gs.Motion.of(rod, constraint=ends)
+    motion = rs.Motion.of(rod, constraint=ends)
     long = ImplicitEuler().take(motion, start, 0 * start, time=0.0, step=1.0)
     assert isinstance(long, Refused)
     assert "negative" in long.reason
@@ -486,23 +486,23 @@ def test_motion_that_cannot_go_on_raises_with_its_record():
         """The wrong sign of the gradient: no Newton iteration of any step converges, once it is pushed."""
         return np.where(rod.mass > 0, 1e3 * np.sin(1e12 * state + 1e6 * time), 0.0), None, None
 
-    motion = gs.Motion.of(rod, forces=(gs.ImplicitForce(push, np.arange(5)[:, None]),))
-    with pytest.raises(gs.ConvergenceError, match=r"smallest step.*stopped at t = 0 s") as caught:
-        gs.simulate(motion, rod.state(), until=1.0, step=0.1, halvings=3)
+    motion = rs.Motion.of(rod, forces=(rs.ImplicitForce(push, np.arange(5)[:, None]),))
+    with pytest.raises(rs.ConvergenceError, match=r"smallest step.*stopped at t = 0 s") as caught:
+        rs.simulate(motion, rod.state(), until=1.0, step=0.1, halvings=3)
     assert caught.value.report.report.end is End.STALLED
     assert len(caught.value.report.times) == 1
 
 
 def swing(**options):
     rod = straight(11, kind(1e8), clamped=("start",))
-    motion = gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes),))
-    return gs.simulate(motion, rod.state(), step=0.01, **{"until": 0.5, **options})
+    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),))
+    return rs.simulate(motion, rod.state(), step=0.01, **{"until": 0.5, **options})
 
 
 def test_streamed_series_is_the_one_in_memory(tmp_path):
     kept = swing(every=3)
     streamed = swing(every=3, stream=tmp_path / "swing")
-    loaded = gs.TimeSeries.load(tmp_path / "swing")
+    loaded = rs.TimeSeries.load(tmp_path / "swing")
     assert len(kept.times) == 17
     for series in (streamed, loaded):
         for name in ("times", "states", "velocities", "energies"):
@@ -523,13 +523,13 @@ def test_interrupted_motion_keeps_what_was_finished(tmp_path, streamed):
     assert series.times[-1] == pytest.approx(0.2)
     np.testing.assert_array_equal(series.states, whole.states[:21])
     if streamed:
-        np.testing.assert_array_equal(gs.TimeSeries.load(stream).states, whole.states[:21])
+        np.testing.assert_array_equal(rs.TimeSeries.load(stream).states, whole.states[:21])
 
 
 def test_motion_goes_on_from_its_last_moment():
     half, whole = swing(until=0.25), swing()
     last = half.last
-    rest = gs.simulate(last.motion, last.state, last.velocity, start=0.25, until=0.5, step=0.01)
+    rest = rs.simulate(last.motion, last.state, last.velocity, start=0.25, until=0.5, step=0.01)
     np.testing.assert_allclose(rest.states[-1], whole.states[-1], atol=1e-10)
 
 
@@ -537,18 +537,18 @@ def test_what_is_not_finite_is_refused_loudly():
     rod = straight(5)
     bad = rod.state()
     bad[2, 1] = np.nan
-    with pytest.raises(gs.InputError, match=r"state is nan at \[2, 1\]"):
-        gs.simulate(gs.Motion.of(rod), bad, until=1.0, step=0.1)
+    with pytest.raises(rs.InputError, match=r"state is nan at \[2, 1\]"):
+        rs.simulate(rs.Motion.of(rod), bad, until=1.0, step=0.1)
 
     def wind(time, state, velocity):
         return np.where(time > 0.45, np.nan, 0.0) * state
 
-    with pytest.raises(gs.InputError, match=r"wind gave nan .* at t = 0.5 s"):
-        gs.simulate(gs.Motion.of(rod, forces=(gs.ExplicitForce(wind),)), rod.state(), until=1.0, step=0.1)
+    with pytest.raises(rs.InputError, match=r"wind gave nan .* at t = 0.5 s"):
+        rs.simulate(rs.Motion.of(rod, forces=(rs.ExplicitForce(wind),)), rod.state(), until=1.0, step=0.1)
 
 
 def implicit_on(block):
-    return gs.ImplicitForce(lambda time, state, velocity: (0 * state, None, None), np.array([[block]]))
+    return rs.ImplicitForce(lambda time, state, velocity: (0 * state, None, None), np.array([[block]]))
 
 
 @pytest.mark.parametrize(
@@ -560,19 +560,19 @@ def implicit_on(block):
         ({"every": 0}, "not every 0"),
         ({"halvings": -1}, "halved"),
         ({"velocity": np.zeros((2, 3))}, "velocity has the shape"),
-        ({"forces": (gs.PointLoads.on(99, 1.0),)}, "block 99"),
+        ({"forces": (rs.PointLoads.on(99, 1.0),)}, "block 99"),
         ({"forces": (implicit_on(99),)}, "block 99"),
-        ({"forces": (gs.Damping(coefficients=np.ones((2, 2))),)}, "damping coefficients"),
-        ({"rod": gs.Rod(gs.GivenSection(1.0, 1.0, 1.0, 1.0))}, "mass per length"),
+        ({"forces": (rs.Damping(coefficients=np.ones((2, 2))),)}, "damping coefficients"),
+        ({"rod": rs.Rod(rs.GivenSection(1.0, 1.0, 1.0, 1.0))}, "mass per length"),
     ],
     ids=str,
 )
 def test_motion_that_makes_no_sense_is_refused_with_its_reason(options, said):
     given = dict(options)
     body = straight(5, given.pop("rod", None))
-    motion, velocity = gs.Motion.of(body, forces=given.pop("forces", ())), given.pop("velocity", None)
-    with pytest.raises(gs.InputError, match=said):
-        gs.simulate(motion, body.state(), velocity, **{"until": 1.0, "step": 0.1, **given})
+    motion, velocity = rs.Motion.of(body, forces=given.pop("forces", ())), given.pop("velocity", None)
+    with pytest.raises(rs.InputError, match=said):
+        rs.simulate(motion, body.state(), velocity, **{"until": 1.0, "step": 0.1, **given})
 
 
 @pytest.mark.parametrize("nodes", [50, 800])
@@ -598,8 +598,8 @@ def test_step_of_a_smooth_swing_costs_the_same_for_each_node(nodes, monkeypatch)
     monkeypatch.setattr(Banded, "factor", factored)
     monkeypatch.setattr(Banded, "solve", solved)
     rest = np.column_stack([0.01 * np.arange(nodes), np.zeros(nodes), np.zeros(nodes)])
-    rod = gs.ElasticRod.of(rest, kind(), clamped=("start",))
-    motion, stepper = gs.Motion.of(rod, forces=(gs.Gravity(rod.nodes),)), ImplicitEuler()
+    rod = rs.ElasticRod.of(rest, kind(), clamped=("start",))
+    motion, stepper = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),)), ImplicitEuler()
     state, velocity = rod.state(), np.zeros_like(rod.mass)
     for k in range(20):
         if k == 10:  # until then so little has moved that a share of it is hard to reach
@@ -617,7 +617,7 @@ def test_step_is_solved_as_far_as_it_says(step):
     bow[rod.nodes, 1] = 0.2 * bow[rod.nodes, 0] ** 2
     bow[rod.angles, 0] = np.linspace(0, 3, 20)
     rod = rod.refreshed(bow)
-    reached = ImplicitEuler().take(gs.Motion.of(rod), bow, 0 * bow, time=0.0, step=step).state
+    reached = ImplicitEuler().take(rs.Motion.of(rod), bow, 0 * bow, time=0.0, step=step).state
     free, moved = rod.freedom(), reached - bow
     mass = free.reduce_diagonal(rod.mass)
     matrix = rod.hessian(reached).toarray() + np.diag(mass / step**2)
@@ -627,7 +627,7 @@ def test_step_is_solved_as_far_as_it_says(step):
 
 def test_element_sets_in_parts_give_the_same_motion():
     rod = straight(21)
-    motion, velocity = gs.Motion.of(rod), thrown(rod)
+    motion, velocity = rs.Motion.of(rod), thrown(rod)
     whole, parts = (
         ImplicitEuler().take(one, rod.state(), velocity, time=0.0, step=1e-4) for one in (motion, motion.in_parts(4))
     )

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-import gridshell as gs
+import rodshell as rs
 from tests.analytic.rod_problems import (
     EI,
     GJ,
@@ -182,12 +182,12 @@ def test_gradient_and_hessian_of_a_rod_are_derivatives(options):
 def test_rod_without_angles_has_the_strains_of_the_one_with_them():
     shapes = []
     for twist in (False, True):
-        rod = gs.ElasticRod.of(straight(20), THIN, clamped={"end": X, "start": X}, twist=twist)
+        rod = rs.ElasticRod.of(straight(20), THIN, clamped={"end": X, "start": X}, twist=twist)
         bow = straight(20) * [0.9, 1, 1]
         bow[:, 2] = 0.15 * np.sin(pi * rod.rest[:, 0]) ** 2
         goal = {"positions": {-1: (0.8, 0.1, 0.1)}, "tangents": {"end": (1, 0.3, 0)}}
         spinning = ("start", "end") if twist else ()  # in space, frames that were held would twist the rod
-        shapes.append(gs.solve_rod(rod, start=rod.state(bow), spinning=spinning, **goal))
+        shapes.append(rs.solve_rod(rod, start=rod.state(bow), spinning=spinning, **goal))
     without, with_them = (np.linalg.norm(shape.strains.curvature, axis=1) for shape in shapes)
     assert without.shape == (21,)
     np.testing.assert_allclose(without, with_them, rtol=1e-6)
@@ -212,7 +212,7 @@ def test_rod_free_of_stress_at_rest_has_no_energy_there():
     s = np.linspace(0, 2, 12)
     curve = np.column_stack([np.cos(s), np.sin(s), 0.4 * s])
     rods = [
-        gs.ElasticRod.of(curve, THIN, natural="rest", clamped=clamps, closed=closed)
+        rs.ElasticRod.of(curve, THIN, natural="rest", clamped=clamps, closed=closed)
         for clamps, closed in (((), False), ((), True), (("start", "end"), False))
     ]
     assert max(rod.energy(rod.state()) for rod in rods) < 1e-26 * EI  # round-off, squared
@@ -221,8 +221,8 @@ def test_rod_free_of_stress_at_rest_has_no_energy_there():
 def test_mass_is_that_of_the_rod_half_of_each_edge_at_either_node():
     nodes = straight(4, 2.0)
     nodes[1, 0] = 0.2
-    kind = gs.Rod(gs.Circle(2e-3), gs.Material(1e9, 800.0))
-    rod = gs.ElasticRod.of(nodes, kind, clamped=("start",))
+    kind = rs.Rod(rs.Circle(2e-3), rs.Material(1e9, 800.0))
+    rod = rs.ElasticRod.of(nodes, kind, clamped=("start",))
     line, polar = kind.mass_per_length, 800.0 * 2 * pi * 2e-3**4 / 4
     half = np.array([0.2, 0.8, 0.5, 0.5]) / 2
     expected = line * (np.append(half, 0) + np.append(0, half))
@@ -235,18 +235,18 @@ def test_mass_is_that_of_the_rod_half_of_each_edge_at_either_node():
 
 def small_drop(rod):
     """Tip deflection over the force at the tip, force so small that the rod stays linear."""
-    return -gs.solve_rod(rod, forces={-1: (0, 0, -1e-4 * EI)}).positions[-1, 2] / (1e-4 * EI)
+    return -rs.solve_rod(rod, forces={-1: (0, 0, -1e-4 * EI)}).positions[-1, 2] / (1e-4 * EI)
 
 
 @pytest.mark.parametrize("given", ["each", "callable"])
 def test_rod_of_two_materials_bends_as_its_halves_do(given):
     """Beam theory: the sum of the integral of x^2 / EI over both halves."""
-    stiff = gs.Rod(gs.Circle(1e-4), gs.Material(4e9, 1e3, 0.5))
+    stiff = rs.Rod(rs.Circle(1e-4), rs.Material(4e9, 1e3, 0.5))
     exact = (1 - 0.5**3) / 3 / stiff.bend_stiffness + 0.5**3 / 3 / EI
     edges, drops = (10, 20, 40), []
     for n in edges:
         rods = [stiff] * (n // 2) + [THIN] * (n // 2) if given == "each" else lambda s: stiff if s < 0.5 else THIN
-        drops.append(small_drop(gs.ElasticRod.of(straight(n), rods, clamped={"start": X}, twist=False)))
+        drops.append(small_drop(rs.ElasticRod.of(straight(n), rods, clamped={"start": X}, twist=False)))
     assert orders(edges, np.array(drops)[:, None] / exact - 1) == [SECOND]
     assert drops[-1] == pytest.approx(exact, rel=1e-3)
 
@@ -257,41 +257,41 @@ def test_tapered_rod_bends_as_beam_theory_says():
     s, w = (s + 1) / 2, w / 2
     exact = float(w @ ((1 - s) ** 2 / (1 - s / 2) ** 4)) / EI
     edges = (20, 40, 80)
-    taper = [small_drop(gs.ElasticRod.of(straight(n), _tapered, clamped={"start": X})) for n in edges]
+    taper = [small_drop(rs.ElasticRod.of(straight(n), _tapered, clamped={"start": X})) for n in edges]
     assert orders(edges, np.array(taper)[:, None] / exact - 1) == [SECOND]
     assert taper[-1] == pytest.approx(exact, rel=1e-3)
 
 
 def _tapered(s):
-    return gs.Rod(gs.Circle(1e-4 * (1 - s / 2)), THIN.material)
+    return rs.Rod(rs.Circle(1e-4 * (1 - s / 2)), THIN.material)
 
 
 @pytest.mark.parametrize(("load", "stiffness"), [(Z, 0), (Y, 1)])
 def test_strip_bends_towards_each_director_with_its_own_stiffness(load, stiffness):
-    kind = gs.Rod(gs.RectangularSection(width=2e-4, height=1e-4), THIN.material)
-    rod = gs.ElasticRod.of(straight(80), kind, director=Z, clamped={"start": X})
+    kind = rs.Rod(rs.RectangularSection(width=2e-4, height=1e-4), THIN.material)
+    rod = rs.ElasticRod.of(straight(80), kind, director=Z, clamped={"start": X})
     force = 1e-4 * kind.bend_stiffnesses[1]
-    tip = gs.solve_rod(rod, forces={-1: force * np.array(load)}).positions[-1]
+    tip = rs.solve_rod(rod, forces={-1: force * np.array(load)}).positions[-1]
     exact = force / (3 * kind.bend_stiffnesses[stiffness])
     assert tip @ load == pytest.approx(exact, rel=1e-3)  # second order: 1/8 h^2
 
 
 def test_moment_at_a_spinning_clamp_twists_the_rod_evenly():
     """Exact on any mesh, ends included: the clamps act at the ends."""
-    rod = gs.ElasticRod.of(straight(7), THIN, clamped={"start": X, "end": X})
-    shape = gs.solve_rod(rod, spinning=("end",), moments={"end": 2.0 * GJ})
+    rod = rs.ElasticRod.of(straight(7), THIN, clamped={"start": X, "end": X})
+    shape = rs.solve_rod(rod, spinning=("end",), moments={"end": 2.0 * GJ})
     np.testing.assert_allclose(shape.strains.twist, 2.0, rtol=1e-9)
     assert shape.state[rod.ghost_angles[1], 0] == pytest.approx(2.0, rel=1e-9)
     assert shape.support("start")[1] == pytest.approx([-2.0 * GJ, 0, 0], rel=1e-9, abs=1e-12 * GJ)
 
 
 def test_clamp_holds_the_director_that_it_is_given():
-    rod = gs.ElasticRod.of(straight(30), THIN, director=Z, clamped={"start": X, "end": X})
-    quarter = gs.solve_rod(rod, directors={"end": (5.0, 1.0, 0.0)})  # its part across is y
+    rod = rs.ElasticRod.of(straight(30), THIN, director=Z, clamped={"start": X, "end": X})
+    quarter = rs.solve_rod(rod, directors={"end": (5.0, 1.0, 0.0)})  # its part across is y
     np.testing.assert_allclose(quarter.strains.twist, -pi / 2, rtol=1e-9)  # from z to y about x
     bow = straight(30) * [0.9, 1, 1]
     bow[:, 2] = 0.15 * np.sin(pi * rod.rest[:, 0]) ** 2
-    bent = gs.solve_rod(rod, start=rod.state(bow), tangents={"end": (1, 0.5, 0)}, directors={"end": (-0.5, 1, 1)})
+    bent = rs.solve_rod(rod, start=rod.state(bow), tangents={"end": (1, 0.5, 0)}, directors={"end": (-0.5, 1, 1)})
     d1 = bent.rod.reference_directors(bent.state)[-1]
     t = np.array([1, 0.5, 0]) / sqrt(1.25)
     theta = bent.state[rod.ghost_angles[1], 0]
@@ -302,24 +302,24 @@ def test_clamp_holds_the_director_that_it_is_given():
 def test_twist_of_given_directors_goes_on_to_the_clamps():
     turned = 0.7 * (np.arange(10) + 0.5) / 10
     directors = np.column_stack([0 * turned, -np.sin(turned), np.cos(turned)])
-    rod = gs.ElasticRod.of(straight(10), THIN, director=directors, clamped={"start": X, "end": X})
+    rod = rs.ElasticRod.of(straight(10), THIN, director=directors, clamped={"start": X, "end": X})
     np.testing.assert_allclose(rod.strains(rod.state()).twist, 0.7, rtol=1e-12)
     np.testing.assert_allclose(rod.reference_directors(rod.state())[10], Z, atol=1e-12)  # at the start itself
 
 
 def test_clamp_turned_three_times_around_stays_turned_so():
-    rod = gs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
-    taut = gs.solve_rod(rod, positions={-1: (1.001, 0, 0)})
-    shape = gs.solve_rod(taut.rod, start=taut, turns={"end": 6 * pi})
+    rod = rs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
+    taut = rs.solve_rod(rod, positions={-1: (1.001, 0, 0)})
+    shape = rs.solve_rod(taut.rod, start=taut, turns={"end": 6 * pi})
     np.testing.assert_allclose(shape.strains.twist, 6 * pi, rtol=1e-9)
     np.testing.assert_allclose(shape.frames[-1][2], X, atol=1e-12)
 
 
 def test_reactions_are_in_balance_with_the_loads():
-    rod = gs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
+    rod = rs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
     bow = straight(30) * [0.9, 1, 1]
     bow[:, 2] = 0.15 * np.sin(pi * rod.rest[:, 0]) ** 2
-    shape = gs.solve_rod(
+    shape = rs.solve_rod(
         rod, start=rod.state(bow), turns={"end": 2.0}, tangents={"end": (1, 0.5, 0)}, gravity=(0, 0.1, -0.3)
     )
     (pull0, turn0), (pull1, turn1) = shape.support("start"), shape.support("end")
@@ -333,10 +333,10 @@ def test_reactions_are_in_balance_with_the_loads():
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_shape_does_not_depend_on_the_size_of_the_rod(size):
-    kind = gs.Rod(gs.Circle(1e-4 * size), THIN.material)
-    rod = gs.ElasticRod.of(straight(20) * size, kind, clamped={"start": X})
-    shape = gs.solve_rod(rod, forces={-1: (0, 0, -3 * EI * size**2)})
-    small = gs.solve_rod(gs.ElasticRod.of(straight(20), THIN, clamped={"start": X}), forces={-1: (0, 0, -3 * EI)})
+    kind = rs.Rod(rs.Circle(1e-4 * size), THIN.material)
+    rod = rs.ElasticRod.of(straight(20) * size, kind, clamped={"start": X})
+    shape = rs.solve_rod(rod, forces={-1: (0, 0, -3 * EI * size**2)})
+    small = rs.solve_rod(rs.ElasticRod.of(straight(20), THIN, clamped={"start": X}), forces={-1: (0, 0, -3 * EI)})
     np.testing.assert_allclose(shape.positions / size, small.positions, atol=1e-9)
     assert shape.report.iterations == small.report.iterations
 
@@ -347,14 +347,14 @@ def test_shape_does_not_depend_on_the_size_of_the_rod(size):
 def test_rectangle_has_saint_venants_torsion_constant():
     """Timoshenko and Goodier, table in section 109: J over b a^3, a the shorter side."""
     for ratio, factor in ((1.0, 0.1406), (1.5, 0.196), (2.0, 0.229), (4.0, 0.281), (10.0, 0.312)):
-        assert gs.RectangularSection(ratio, 1.0).torsion_constant / ratio == pytest.approx(factor, abs=6e-4)
-    strip = gs.RectangularSection(1.0, 1e-3)
-    assert strip.torsion_constant == gs.RectangularSection(1e-3, 1.0).torsion_constant
+        assert rs.RectangularSection(ratio, 1.0).torsion_constant / ratio == pytest.approx(factor, abs=6e-4)
+    strip = rs.RectangularSection(1.0, 1e-3)
+    assert strip.torsion_constant == rs.RectangularSection(1e-3, 1.0).torsion_constant
     assert strip.torsion_constant == pytest.approx(1e-9 / 3 * (1 - 0.630e-3), rel=1e-6)
 
 
 def test_round_ellipse_is_a_circle():
-    ellipse, circle = gs.Ellipse(2e-3, 2e-3), gs.Circle(2e-3)
+    ellipse, circle = rs.Ellipse(2e-3, 2e-3), rs.Circle(2e-3)
     assert ellipse.area == pytest.approx(circle.area, rel=1e-15)
     assert ellipse.second_moments == pytest.approx(circle.second_moments, rel=1e-15)
     assert ellipse.torsion_constant == pytest.approx(circle.torsion_constant, rel=1e-15)
@@ -367,16 +367,16 @@ def test_ellipse_has_the_torsion_constant_of_its_stress_function():
     r, w = (rim + 1) / 2, weights / 2  # of the ellipse's own polar coordinates, whose area is a b r dr dphi
     c = 1 / (1 / a**2 + 1 / b**2)
     exact = 2 * float(w @ (c * (1 - r**2) * r)) * 2 * pi * a * b
-    assert gs.Ellipse(a, b).torsion_constant == pytest.approx(exact, rel=1e-12)
+    assert rs.Ellipse(a, b).torsion_constant == pytest.approx(exact, rel=1e-12)
 
 
-@pytest.mark.parametrize("section", [gs.Ellipse(3e-3, 1e-3), gs.RectangularSection(3e-3, 1e-3)], ids=str)
+@pytest.mark.parametrize("section", [rs.Ellipse(3e-3, 1e-3), rs.RectangularSection(3e-3, 1e-3)], ids=str)
 def test_second_moments_are_integrals_over_the_section(section):
     """Midpoint sums; I1 goes with the coordinate along m1, the longer axis."""
     half = (np.arange(-600, 600) + 0.5) / 600 * 3e-3
     x, y = np.meshgrid(half, half / 3)
-    inside = (x / 3e-3) ** 2 + (y / 1e-3) ** 2 < 1 if isinstance(section, gs.Ellipse) else abs(x) < 1.5e-3
-    inside = inside if isinstance(section, gs.Ellipse) else inside & (abs(y) < 0.5e-3)
+    inside = (x / 3e-3) ** 2 + (y / 1e-3) ** 2 < 1 if isinstance(section, rs.Ellipse) else abs(x) < 1.5e-3
+    inside = inside if isinstance(section, rs.Ellipse) else inside & (abs(y) < 0.5e-3)
     cell = (half[1] - half[0]) ** 2 / 3
     assert inside.sum() * cell == pytest.approx(section.area, rel=1e-4)
     moments = (x**2)[inside].sum() * cell, (y**2)[inside].sum() * cell
@@ -384,8 +384,8 @@ def test_second_moments_are_integrals_over_the_section(section):
 
 
 def test_given_section_says_all_itself():
-    section = gs.GivenSection(EA=1.0, EI1=2.0, EI2=3.0, GJ=4.0, mass=5.0, rotary_inertia=6.0)
-    rod = gs.Rod(section)
+    section = rs.GivenSection(EA=1.0, EI1=2.0, EI2=3.0, GJ=4.0, mass=5.0, rotary_inertia=6.0)
+    rod = rs.Rod(section)
     stiffnesses = rod.stretch_stiffness, *rod.bend_stiffnesses, rod.twist_stiffness
     assert (*stiffnesses, rod.mass_per_length, rod.rotary_inertia) == (1, 2, 3, 4, 5, 6)
     assert rod.parameters() == {
@@ -394,102 +394,102 @@ def test_given_section_says_all_itself():
 
 
 def test_shear_modulus_follows_from_poissons_ratio_or_is_given():
-    assert gs.Material(3.0, 1.0).shear_modulus == 1.0
-    timber = gs.Material(11e9, 500.0, shear=0.69e9)
+    assert rs.Material(3.0, 1.0).shear_modulus == 1.0
+    timber = rs.Material(11e9, 500.0, shear=0.69e9)
     assert timber.shear_modulus == 0.69e9
     assert timber.parameters() == {"youngs_modulus": 11e9, "density": 500.0, "shear": 0.69e9}
-    assert gs.Material(3.0, 1.0, 0.3).parameters() == {"youngs_modulus": 3.0, "density": 1.0, "poisson_ratio": 0.3}
+    assert rs.Material(3.0, 1.0, 0.3).parameters() == {"youngs_modulus": 3.0, "density": 1.0, "poisson_ratio": 0.3}
 
 
 # Said loudly
 
 
-ROUND = gs.Rod(gs.Circle(1e-3), gs.Material(1e9, 1e3))
-CLAMPED = gs.ElasticRod.of(straight(4), ROUND, clamped={"end": X})
-FLAT = gs.Rod(gs.Ellipse(1e-3, 2e-3), gs.Material(1e9, 1e3))
+ROUND = rs.Rod(rs.Circle(1e-3), rs.Material(1e9, 1e3))
+CLAMPED = rs.ElasticRod.of(straight(4), ROUND, clamped={"end": X})
+FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
 
 
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
-        (lambda: gs.ElasticRod.of(straight(1), ROUND), "3 nodes or more"),
-        (lambda: gs.ElasticRod.of(np.zeros((4, 3)), ROUND), "has no length"),
-        (lambda: gs.ElasticRod.of(straight(4), [ROUND] * 3), "4 edges takes as many rods"),
-        (lambda: gs.ElasticRod.of(straight(4), FLAT, twist=False), "without twist angles"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, natural_twist=1.0, twist=False), "without twist angles"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, director=X), "along its edge"),
-        (lambda: gs.ElasticRod.of(np.eye(3), ROUND, closed=True, clamped=("start",)), "no ends to clamp"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped=("middle",)), "start"),
-        (lambda: gs.solve_rod(gs.ElasticRod.of(straight(4), ROUND), turns={"end": 1.0}), "not clamped at"),
-        (lambda: gs.solve_rod(gs.ElasticRod.of(straight(4), ROUND), forces={5: X}), "no node 5"),
-        (lambda: gs.solve_rod(gs.ElasticRod.of(straight(4), ROUND), start=np.zeros((3, 3))), "has the shape"),
+        (lambda: rs.ElasticRod.of(straight(1), ROUND), "3 nodes or more"),
+        (lambda: rs.ElasticRod.of(np.zeros((4, 3)), ROUND), "has no length"),
+        (lambda: rs.ElasticRod.of(straight(4), [ROUND] * 3), "4 edges takes as many rods"),
+        (lambda: rs.ElasticRod.of(straight(4), FLAT, twist=False), "without twist angles"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, natural_twist=1.0, twist=False), "without twist angles"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, director=X), "along its edge"),
+        (lambda: rs.ElasticRod.of(np.eye(3), ROUND, closed=True, clamped=("start",)), "no ends to clamp"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped=("middle",)), "start"),
+        (lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), turns={"end": 1.0}), "not clamped at"),
+        (lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), forces={5: X}), "no node 5"),
+        (lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), start=np.zeros((3, 3))), "has the shape"),
         (
-            lambda: gs.solve_rod(gs.ElasticRod.of(straight(4), ROUND), moments={0: 1.0}, positions={0: None, -1: None}),
+            lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), moments={0: 1.0}, positions={0: None, -1: None}),
             "spinning",
         ),
-        (lambda: gs.solve_rod(CLAMPED, spinning=("end",), turns={"end": 1.0}), "both spin and be turned"),
-        (lambda: gs.solve_rod(CLAMPED, tangents={"end": (-1, 0, 0)}), "turns back on itself"),
-        (lambda: gs.ElasticRod.of([["a", "b", "c"]] * 3, ROUND), "must be numbers"),
-        (lambda: gs.ElasticRod.of(straight(4) * [np.nan, 1, 1], ROUND), "must be finite"),
-        (lambda: gs.ElasticRod.of([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]], ROUND), "folds back on itself after edge 0"),
-        (lambda: gs.ElasticRod.of(straight(4), lambda s: None), "made of Rod"),
-        (lambda: gs.ElasticRod.of(straight(4), FLAT, natural="curly"), "curly"),
-        (lambda: gs.ElasticRod.of(straight(4), FLAT, natural=np.zeros((2, 2))), r"shape \(3, 2\)"),
-        (lambda: gs.ElasticRod.of(straight(4), FLAT, natural=(np.nan, 0.0)), "natural curvatures must be finite"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, natural_twist=np.nan), "natural_twist must be finite"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, director=(0, 0, 0)), "director must not be zero"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped={"start": (0, 0, 0)}), "tangent .* must not be zero"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped={"start": (1, 0)}), "three numbers"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped={"end": (-1, 0, 0)}), "points against the rod"),
-        (lambda: gs.ElasticRod.of(straight(4), ROUND, clamped="start"), "in a row"),
+        (lambda: rs.solve_rod(CLAMPED, spinning=("end",), turns={"end": 1.0}), "both spin and be turned"),
+        (lambda: rs.solve_rod(CLAMPED, tangents={"end": (-1, 0, 0)}), "turns back on itself"),
+        (lambda: rs.ElasticRod.of([["a", "b", "c"]] * 3, ROUND), "must be numbers"),
+        (lambda: rs.ElasticRod.of(straight(4) * [np.nan, 1, 1], ROUND), "must be finite"),
+        (lambda: rs.ElasticRod.of([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]], ROUND), "folds back on itself after edge 0"),
+        (lambda: rs.ElasticRod.of(straight(4), lambda s: None), "made of Rod"),
+        (lambda: rs.ElasticRod.of(straight(4), FLAT, natural="curly"), "curly"),
+        (lambda: rs.ElasticRod.of(straight(4), FLAT, natural=np.zeros((2, 2))), r"shape \(3, 2\)"),
+        (lambda: rs.ElasticRod.of(straight(4), FLAT, natural=(np.nan, 0.0)), "natural curvatures must be finite"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, natural_twist=np.nan), "natural_twist must be finite"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, director=(0, 0, 0)), "director must not be zero"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (0, 0, 0)}), "tangent .* must not be zero"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (1, 0)}), "three numbers"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"end": (-1, 0, 0)}), "points against the rod"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped="start"), "in a row"),
         (lambda: CLAMPED.state(np.zeros((3, 3))), r"shape \(5, 3\)"),
         (lambda: CLAMPED.state(angles=np.zeros(3)), r"shape \(4,\)"),
-        (lambda: gs.solve_rod(CLAMPED, forces={0: (0, 0, np.nan)}), "force on node 0 must be finite"),
-        (lambda: gs.solve_rod(CLAMPED, forces=np.full((5, 3), np.inf)), "forces on all nodes must be finite"),
-        (lambda: gs.solve_rod(CLAMPED, forces={1.5: X}), "whole number"),
-        (lambda: gs.solve_rod(CLAMPED, gravity=9.81), "gravity must be three numbers"),
-        (lambda: gs.solve_rod(CLAMPED, positions={0: (1, 0)}), "position of node 0"),
-        (lambda: gs.solve_rod(CLAMPED, along={0: [(2, 0, 0)]}), "unit vectors"),
-        (lambda: gs.solve_rod(CLAMPED, along={0: [X, X]}), "right angles"),
-        (lambda: gs.solve_rod(CLAMPED, tangents={"end": (0, 0, 0)}), "must not be zero"),
-        (lambda: gs.solve_rod(CLAMPED, directors={"end": X}), "the director lies along"),
-        (lambda: gs.solve_rod(CLAMPED, turns={"end": np.nan}), "turn of the .end. must be finite"),
-        (lambda: gs.solve_rod(CLAMPED, angles={0: np.nan}), "angle of edge 0 must be finite"),
-        (lambda: gs.solve_rod(CLAMPED, moments={0: np.nan}), "moment at 0 must be finite"),
-        (lambda: gs.solve_rod(CLAMPED, start=CLAMPED.state() * np.nan), "to start from must be finite"),
-        (lambda: gs.solve_rod(CLAMPED, steps=1.5), "1, 2, ... steps"),
-        (lambda: gs.Rod(gs.GivenSection(1, 1, 1, 1), gs.Material(1.0, 1.0)), "leave the material out"),
-        (lambda: gs.Rod(gs.Circle(1.0)), "needs a material"),
+        (lambda: rs.solve_rod(CLAMPED, forces={0: (0, 0, np.nan)}), "force on node 0 must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, forces=np.full((5, 3), np.inf)), "forces on all nodes must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, forces={1.5: X}), "whole number"),
+        (lambda: rs.solve_rod(CLAMPED, gravity=9.81), "gravity must be three numbers"),
+        (lambda: rs.solve_rod(CLAMPED, positions={0: (1, 0)}), "position of node 0"),
+        (lambda: rs.solve_rod(CLAMPED, along={0: [(2, 0, 0)]}), "unit vectors"),
+        (lambda: rs.solve_rod(CLAMPED, along={0: [X, X]}), "right angles"),
+        (lambda: rs.solve_rod(CLAMPED, tangents={"end": (0, 0, 0)}), "must not be zero"),
+        (lambda: rs.solve_rod(CLAMPED, directors={"end": X}), "the director lies along"),
+        (lambda: rs.solve_rod(CLAMPED, turns={"end": np.nan}), "turn of the .end. must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, angles={0: np.nan}), "angle of edge 0 must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, moments={0: np.nan}), "moment at 0 must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, start=CLAMPED.state() * np.nan), "to start from must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, steps=1.5), "1, 2, ... steps"),
+        (lambda: rs.Rod(rs.GivenSection(1, 1, 1, 1), rs.Material(1.0, 1.0)), "leave the material out"),
+        (lambda: rs.Rod(rs.Circle(1.0)), "needs a material"),
         (lambda: FLAT.bend_stiffness, "two bending stiffnesses"),
-        (lambda: gs.Ellipse(1.0, 0.0), "half-axis b"),
-        (lambda: gs.RectangularSection(-1.0, 1.0), "section width"),
-        (lambda: gs.GivenSection(1, 0, 1, 1), "EI1"),
-        (lambda: gs.Material(1.0, 1.0, 0.3, shear=1.0), "not both"),
+        (lambda: rs.Ellipse(1.0, 0.0), "half-axis b"),
+        (lambda: rs.RectangularSection(-1.0, 1.0), "section width"),
+        (lambda: rs.GivenSection(1, 0, 1, 1), "EI1"),
+        (lambda: rs.Material(1.0, 1.0, 0.3, shear=1.0), "not both"),
     ],
 )
 def test_wrong_input_is_refused_with_its_reason(wrong, says):
-    with pytest.raises(gs.InputError, match=says):
+    with pytest.raises(rs.InputError, match=says):
         wrong()
 
 
 def test_a_shape_is_continued_with_its_own_rod_only():
-    rod = gs.ElasticRod.of(straight(8), THIN, clamped={"start": X})
-    shape = gs.solve_rod(rod, gravity=(0, 0, -1e-6))
-    with pytest.raises(gs.InputError, match=r"shape\.rod"):
-        gs.solve_rod(rod, start=shape)
+    rod = rs.ElasticRod.of(straight(8), THIN, clamped={"start": X})
+    shape = rs.solve_rod(rod, gravity=(0, 0, -1e-6))
+    with pytest.raises(rs.InputError, match=r"shape\.rod"):
+        rs.solve_rod(rod, start=shape)
 
 
 def test_rod_that_nothing_holds_is_refused():
-    rod = gs.ElasticRod.of(straight(8), THIN)
-    with pytest.raises(gs.ConvergenceError, match="hold what is free"):
-        gs.solve_rod(rod, forces={3: (0, 0, EI)})
+    rod = rs.ElasticRod.of(straight(8), THIN)
+    with pytest.raises(rs.ConvergenceError, match="hold what is free"):
+        rs.solve_rod(rod, forces={3: (0, 0, EI)})
 
 
 def squeezed(line=X, **options):
     """A clamped rod, straight, whose ends come nearer by a tenth: at once to 25 times its buckling load."""
-    kind = gs.Rod(gs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=1.0))
-    rod = gs.ElasticRod.of(straight(40)[:, :1] * line, kind, clamped={"start": line, "end": line})
-    return gs.solve_rod(rod, positions={-1: 0.9 * np.array(line)}, steps=10, **options)
+    kind = rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=1.0))
+    rod = rs.ElasticRod.of(straight(40)[:, :1] * line, kind, clamped={"start": line, "end": line})
+    return rs.solve_rod(rod, positions={-1: 0.9 * np.array(line)}, steps=10, **options)
 
 
 def test_bow_that_turns_freely_about_its_line_is_stable():
@@ -497,24 +497,24 @@ def test_bow_that_turns_freely_about_its_line_is_stable():
     for line in np.random.default_rng(0).normal(size=(10, 3)):
         line /= np.linalg.norm(line)
         bow = squeezed(line)
-        more = gs.solve_rod(bow.rod, start=bow, positions={-1: 0.89 * line}, stable=False)
+        more = rs.solve_rod(bow.rod, start=bow, positions={-1: 0.89 * line}, stable=False)
         assert more.report.negative_modes == 0
 
 
 def test_single_mode_of_a_true_saddle_is_counted():
     """In a plane, between the first and the second buckling load of a clamped rod: 4 and 8.18 pi^2 EI."""
-    kind = gs.Rod(gs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=1.0))
-    rod = gs.ElasticRod.of(straight(40), kind, clamped={"start": X, "end": X}, twist=False)
+    kind = rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=1.0))
+    rod = rs.ElasticRod.of(straight(40), kind, clamped={"start": X, "end": X}, twist=False)
     plane = dict.fromkeys(range(1, 40), (X, Z))
     for share, modes in ((3.8, 0), (4.2, 1), (7.8, 1), (8.6, 2)):
-        shape = gs.solve_rod(rod, positions={-1: (1 - share * pi**2 / 1e5, 0, 0)}, along=plane, stable=False)
+        shape = rs.solve_rod(rod, positions={-1: (1 - share * pi**2 / 1e5, 0, 0)}, along=plane, stable=False)
         assert shape.report.negative_modes == modes
 
 
 def test_natural_curvature_at_a_clamp_is_that_of_the_node_beside_it():
     curvatures = np.column_stack([np.arange(1.0, 5.0), np.zeros(4)])
     for clamps in (("start", "end"), ("end", "start")):
-        rod = gs.ElasticRod.of(straight(5), THIN, natural=curvatures, natural_twist=[1, 2, 3, 4], clamped=clamps)
+        rod = rs.ElasticRod.of(straight(5), THIN, natural=curvatures, natural_twist=[1, 2, 3, 4], clamped=clamps)
         natural = rod.elements[0].natural_curvature[:, 0] / rod.bend_lengths
         ends = [1.0 if end == "start" else 4.0 for end in clamps]
         np.testing.assert_allclose(natural, [1, 2, 3, 4, *ends], rtol=1e-14)
@@ -536,16 +536,16 @@ def test_saddle_is_passed_over_if_asked_for():
 
 
 def test_saddle_that_cannot_be_left_is_refused(monkeypatch):
-    monkeypatch.setattr("gridshell.solve.rod_statics.MOST_DOWN", 0)
-    with pytest.raises(gs.ConvergenceError, match="not stable") as caught:
+    monkeypatch.setattr("rodshell.solve.rod_statics.MOST_DOWN", 0)
+    with pytest.raises(rs.ConvergenceError, match="not stable") as caught:
         squeezed()
     assert caught.value.report.negative_modes > 0
 
 
 def test_coil_of_three_turns_relaxes_from_straight():
     """Natural strains are let go bit by bit; at once, with the loads alone fading, the solve is lost."""
-    rod = gs.ElasticRod.of(straight(60), THIN, natural=(6 * pi, 0.0), natural_twist=1.0, clamped={"start": X})
-    shape = gs.solve_rod(rod, steps=10)
+    rod = rs.ElasticRod.of(straight(60), THIN, natural=(6 * pi, 0.0), natural_twist=1.0, clamped={"start": X})
+    shape = rs.solve_rod(rod, steps=10)
     assert shape.report.stable
     np.testing.assert_allclose(shape.strains.curvature, np.tile([6 * pi, 0.0], (60, 1)), atol=1e-6)
     np.testing.assert_allclose(shape.strains.twist, 1.0, atol=1e-6)

@@ -12,18 +12,18 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-import gridshell as gs
-from gridshell.layout import FlatGrid, FlatRod
-from gridshell.model import Shell
-from gridshell.solve import mixed_newton
-from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import find_equilibrium, find_stable
-from gridshell.solve.newton_step import NewtonStep
-from gridshell.solve.path import follow
-from gridshell.solve.problem import Problem
-from gridshell.solve.report import Status
+import rodshell as rs
+from rodshell.layout import FlatGrid, FlatRod
+from rodshell.model import Shell
+from rodshell.solve import mixed_newton
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import find_equilibrium, find_stable
+from rodshell.solve.newton_step import NewtonStep
+from rodshell.solve.path import follow
+from rodshell.solve.problem import Problem
+from rodshell.solve.report import Status
 
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e9, density=1e3))
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e9, density=1e3))
 EI, EA = ROD.bend_stiffness, ROD.stretch_stiffness
 EULER = pi**2 * EI  # buckling load of a pinned rod of length 1 [N]
 OUTWARD = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
@@ -31,7 +31,7 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def straight_rod(edges, **options):
-    mesh = gs.mesh_grid(FlatGrid.of([FlatRod.u("U01", 0.0, -0.5, 0.5)]), 1.0 / edges)
+    mesh = rs.mesh_grid(FlatGrid.of([FlatRod.u("U01", 0.0, -0.5, 0.5)]), 1.0 / edges)
     return Shell.of(mesh, ROD, **options)
 
 
@@ -427,8 +427,8 @@ def test_modes_are_counted_at_the_equilibrium_and_not_where_the_solve_began(begi
 
 @pytest.mark.parametrize("clamped", [False, True])
 def test_supports_of_a_popped_up_shell_are_in_balance(clamped):
-    layout = gs.GridLayout.orthogonal(spacing=0.06, edge=0.02)
-    trimmed = gs.trim(gs.drape(layout, ROD, gs.Ellipsoid(0.2, 0.15, 0.12), anchor=(0.02, 0.01)))
+    layout = rs.GridLayout.orthogonal(spacing=0.06, edge=0.02)
+    trimmed = rs.trim(rs.drape(layout, ROD, rs.Ellipsoid(0.2, 0.15, 0.12), anchor=(0.02, 0.01)))
     shell = Shell.of(trimmed.mesh, ROD, clamped=clamped)
     state = shell.state(trimmed.positions, trimmed.boundary.tangents)
     problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.checks import bending, bending_of, curvatures, fibre_distance, fibre_strain
-from gridshell.checks.bending import curvature_components
-from gridshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+import rodshell as rs
+from rodshell.checks import bending, bending_of, curvatures, fibre_distance, fibre_strain
+from rodshell.checks.bending import curvature_components
+from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 
 RADIUS = 0.2
-ROD = gs.Rod(gs.Circle(radius=1e-3), gs.Material(youngs_modulus=1e6, density=1e3))
+ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
 
 
 def rods_of_length(*lengths: float, edge: float = 0.01) -> GridMesh:
@@ -106,17 +106,17 @@ def test_rods_do_not_see_each_other() -> None:
 
 
 @pytest.mark.parametrize(
-    "section", [gs.Circle(2e-3), gs.Tube(2e-3, 5e-4), gs.RectangularSection(3e-3, 1e-3), gs.Ellipse(3e-3, 1e-3)]
+    "section", [rs.Circle(2e-3), rs.Tube(2e-3, 5e-4), rs.RectangularSection(3e-3, 1e-3), rs.Ellipse(3e-3, 1e-3)]
 )
 def test_fibre_strain_is_the_largest_over_the_outline(section: object) -> None:
     """Against the strain kappa1 x + kappa2 y at many points of the outline."""
     share = np.linspace(0, 2 * np.pi, 2001)
-    if isinstance(section, gs.RectangularSection):
+    if isinstance(section, rs.RectangularSection):
         x, y = 0.5 * section.width * np.array([1, 1, -1, -1]), 0.5 * section.height * np.array([1, -1, 1, -1])
     else:
-        a, b = (section.a, section.b) if isinstance(section, gs.Ellipse) else (section.radius, section.radius)  # type: ignore[attr-defined]
+        a, b = (section.a, section.b) if isinstance(section, rs.Ellipse) else (section.radius, section.radius)  # type: ignore[attr-defined]
         x, y = a * np.cos(share), b * np.sin(share)
-    rod = gs.Rod(section, ROD.material)  # type: ignore[arg-type]
+    rod = rs.Rod(section, ROD.material)  # type: ignore[arg-type]
     for kappa1, kappa2 in ((3.0, 0.0), (0.0, -2.0), (1.5, 4.0), (-2.0, 1.0)):
         largest = np.abs(kappa1 * x + kappa2 * y).max()
         strain = fibre_strain(rod, np.array([kappa1]), np.array([kappa2]))
@@ -125,24 +125,24 @@ def test_fibre_strain_is_the_largest_over_the_outline(section: object) -> None:
 
 
 def test_a_given_section_has_curvature_but_no_stress() -> None:
-    rod = gs.Rod(gs.GivenSection(EA=1.0, EI1=1e-6, EI2=1e-6, GJ=1e-6))
+    rod = rs.Rod(rs.GivenSection(EA=1.0, EI1=1e-6, EI2=1e-6, GJ=1e-6))
     mesh = rods_of_length(0.3)
     bent = bending(mesh, on_circle(mesh, RADIUS)[0], rod)
     assert bent.stress is None
     assert bent.curvature.max() == pytest.approx(1 / RADIUS, rel=1e-3)
-    with pytest.raises(gs.InputError, match="no fibres"):
+    with pytest.raises(rs.InputError, match="no fibres"):
         fibre_strain(rod, np.zeros(1), np.zeros(1))
 
 
-def lath() -> gs.Rod:
+def lath() -> rs.Rod:
     """Four times as broad as thick: it bends over its thickness, so that its far edge says nothing."""
-    return gs.Rod(gs.RectangularSection(width=1e-3, height=4e-3), ROD.material)
+    return rs.Rod(rs.RectangularSection(width=1e-3, height=4e-3), ROD.material)
 
 
 def test_a_lath_on_a_shell_is_judged_by_its_own_axes() -> None:
     """Clamped on a sphere laths bend out of the grid by 1/R, and within it as their geodesic curvature says."""
-    layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.015)
-    form = gs.find_form(gs.Hemisphere(RADIUS), layout, lath(), ends=("clamped",))
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.015)
+    form = rs.find_form(rs.Hemisphere(RADIUS), layout, lath(), ends=("clamped",))
     shell = form.popped["clamped"]
     assert shell.report.converged
     bent = bending_of(shell.shell, shell.state, lath())
@@ -163,4 +163,4 @@ def test_a_lath_on_a_shell_is_judged_by_its_own_axes() -> None:
 
 def test_round_rods_need_no_axes() -> None:
     mesh = rods_of_length(0.3)
-    assert curvature_components(gs.Shell.of(mesh, ROD), on_line(mesh)) is None
+    assert curvature_components(rs.Shell.of(mesh, ROD), on_line(mesh)) is None

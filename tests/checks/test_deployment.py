@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from shells import ROD, dome, wave
 
-import gridshell as gs
-from gridshell.checks import Deployment, check, curvatures, deploy, settled_shell
-from gridshell.checks import deployment as module
-from gridshell.checks.deployment import laid_out
-from gridshell.formfinding.trim import Boundary
+import rodshell as rs
+from rodshell.checks import Deployment, check, curvatures, deploy, settled_shell
+from rodshell.checks import deployment as module
+from rodshell.checks.deployment import laid_out
+from rodshell.formfinding.trim import Boundary
 
 
-def deployed(form: gs.Form, stages: int = 4) -> Deployment:
+def deployed(form: rs.Form, stages: int = 4) -> Deployment:
     shell = form.popped["pinned"]
     return deploy(shell.shell, shell.state, shell.forces, stages=stages)
 
@@ -42,7 +42,7 @@ def test_a_stage_is_what_a_pop_up_from_flat_finds_there() -> None:
     share, stage = way.share[3], way.positions[3]
     mesh = dome().footprint.mesh
     points = stage[mesh.ends.ravel()]
-    risen = gs.pop_up(dome().footprint, Boundary(points, np.zeros_like(points)), ROD, ends="pinned", start="flat")
+    risen = rs.pop_up(dome().footprint, Boundary(points, np.zeros_like(points)), ROD, ends="pinned", start="flat")
     assert risen.report.converged
     assert share == 0.5625
     np.testing.assert_allclose(risen.positions, stage, atol=1e-6)  # two solves to a step of 1e-6 of the size
@@ -80,9 +80,9 @@ def test_a_pattern_serves_only_the_shell_that_it_is_of() -> None:
 
 def test_every_stage_of_laths_is_in_equilibrium_by_its_own_frames() -> None:
     """The gradient of the energy vanishes on all that is free, twist angles of the rods included."""
-    lath = gs.Rod(gs.RectangularSection(width=4e-3, height=1e-3), ROD.material)
-    layout = gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.09, edge=0.03)
-    form = gs.find_form(gs.Hemisphere(0.2), layout, lath, joint=gs.Pin(), ends=("pinned",))
+    lath = rs.Rod(rs.RectangularSection(width=4e-3, height=1e-3), ROD.material)
+    layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.09, edge=0.03)
+    form = rs.find_form(rs.Hemisphere(0.2), layout, lath, joint=rs.Pin(), ends=("pinned",))
     way = deployed(form)
     assert len(way.shells) == 4
     for shell, state in way.shells:
@@ -108,7 +108,7 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
         if len(calls) > 3:  # settled, gone to 56 %, and up again to see whether the path folds there
             from dataclasses import replace
 
-            from gridshell.solve.report import Status
+            from rodshell.solve.report import Status
 
             return replace(found, report=replace(found.report, status=Status.STALLED))
         return found

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from shells import ROD, dome
 
-import gridshell as gs
-from gridshell.checks import reactions, settled_shell
-from gridshell.formfinding.popup import Ends, Popped
-from gridshell.formfinding.trim import Boundary
+import rodshell as rs
+from rodshell.checks import reactions, settled_shell
+from rodshell.formfinding.popup import Ends, Popped
+from rodshell.formfinding.trim import Boundary
 
 
 def popped(ends: Ends, boundary: Boundary) -> Popped:
     form = dome()
-    return gs.pop_up(form.footprint, boundary, ROD, ends=ends)
+    return rs.pop_up(form.footprint, boundary, ROD, ends=ends)
 
 
 def energy(shell: Popped) -> float:
@@ -72,9 +72,9 @@ def test_a_clamp_moment_is_the_energy_gained_where_it_turns() -> None:
 
 def test_out_of_equilibrium_nothing_balances() -> None:
     """The sums test the state: a shell that is not in equilibrium does not pass."""
-    from gridshell.checks.reactions import reactions
-    from gridshell.solve.constraint import Supports
-    from gridshell.solve.mixed_newton import Problem, find_equilibrium
+    from rodshell.checks.reactions import reactions
+    from rodshell.solve.constraint import Supports
+    from rodshell.solve.mixed_newton import Problem, find_equilibrium
 
     shell = dome().popped["pinned"]
     bumped = shell.state.copy()

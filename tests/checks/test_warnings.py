@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from test_bending import on_circle, rods_of_length
 
-import gridshell as gs
-from gridshell.checks import Bending, Checks, bending
-from gridshell.checks.deployment import Deployment
+import rodshell as rs
+from rodshell.checks import Bending, Checks, bending
+from rodshell.checks.deployment import Deployment
 
 E = 1e9
 THICKNESS = 2e-3  # radius of the rod [m]
-ROD = gs.Rod(gs.Circle(radius=THICKNESS), gs.Material(youngs_modulus=E, density=1e3))
+ROD = rs.Rod(rs.Circle(radius=THICKNESS), rs.Material(youngs_modulus=E, density=1e3))
 MESH = rods_of_length(0.3, edge=0.002)
 STRENGTH = E * THICKNESS / 0.1  # used up by a circle of 0.1 m
 

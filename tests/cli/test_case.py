@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from gridshell.case import BUILT_IN, Case, case_keys, load_case
-from gridshell.errors import InputError
+from rodshell.case import BUILT_IN, Case, case_keys, load_case
+from rodshell.errors import InputError
 
 DESIGN = """
 [target]
@@ -284,7 +284,7 @@ def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_file_of_another_type_is_named_with_what_would_do(tmp_path: Path) -> None:
-    for name, content in (("roof.skp", b"\xff\xfe\x00"), ("make.py", b"import gridshell")):
+    for name, content in (("roof.skp", b"\xff\xfe\x00"), ("make.py", b"import rodshell")):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(
             InputError, match=rf"unknown file type \{Path(name).suffix}; use a case \(.toml\) or a surf"
@@ -316,9 +316,9 @@ def test_a_built_target_has_the_numbers_of_its_case(name: str) -> None:
 
 
 def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
-    from gridshell.joints import Ball, Pin
-    from gridshell.layout import GridLayout
-    from gridshell.rods.section import Circle, Material, Rod, Tube
+    from rodshell.joints import Ball, Pin
+    from rodshell.layout import GridLayout
+    from rodshell.rods.section import Circle, Material, Rod, Tube
 
     overrides = {"drape.anchor": "0.1,0", "drape.method": "gravity", "layout.rotate": 0.5}
     _, layout, rod, options = load_case("ellipsoid", overrides).build()
@@ -344,7 +344,7 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
 
 
 def test_a_height_field_gets_its_formula_and_its_domain(monkeypatch: pytest.MonkeyPatch) -> None:
-    from gridshell import targets
+    from rodshell import targets
 
     monkeypatch.setattr(targets, "HeightField", lambda **given: given, raising=False)
     disc = load_case("heightfield", {"target.formula": "x*y"}).target.build()
@@ -435,12 +435,12 @@ def test_a_zero_needs_no_unit_beside_others() -> None:
 
 @pytest.mark.parametrize("angle", [7.0, -30.0, 0.3])
 def test_a_case_of_python_objects_can_be_read_again_whatever_its_angle(load: Any, angle: float) -> None:
-    import gridshell as gs
-    from gridshell.case.of import case_text
+    import rodshell as rs
+    from rodshell.case.of import case_text
 
-    layout = gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02, rotate=angle)
-    rod = gs.Rod(gs.Circle(radius=1e-3), gs.Material(youngs_modulus=1e6, density=1e3))
-    case = load(case_text(gs.Hemisphere(radius=0.2), layout, rod, joint=gs.Ball(), gravity=3.0))
+    layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02, rotate=angle)
+    rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+    case = load(case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball(), gravity=3.0))
     assert cos(case.layout.rotate - angle) == pytest.approx(1)
     assert abs(case.layout.rotate) < tau
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gridshell.case import case_keys, load_case
-from gridshell.cli import main
-from gridshell.cli.options import ALIASES
-from gridshell.cli.rodends import COLUMNS
-from gridshell.errors import NetLimitError
+from rodshell.case import case_keys, load_case
+from rodshell.cli import main
+from rodshell.cli.options import ALIASES
+from rodshell.cli.rodends import COLUMNS
+from rodshell.errors import NetLimitError
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -30,7 +30,7 @@ CROSS = [
 
 class FakeArchive:
     def __init__(self, status: str, case_toml: str) -> None:
-        self.result = {"format": "gridshell-result", "status": status}
+        self.result = {"format": "rodshell-result", "status": status}
         self.case_toml = case_toml
 
     def save(self, folder: Path, kinds: list[str] | None = None) -> None:
@@ -51,10 +51,10 @@ class FakeForm:
 
 
 class FakeFinder(ModuleType):
-    """Stands in for gridshell.form: remembers its calls, and ends as it is told."""
+    """Stands in for rodshell.form: remembers its calls, and ends as it is told."""
 
     def __init__(self) -> None:
-        super().__init__("gridshell.form")
+        super().__init__("rodshell.form")
         self.calls = list[tuple[tuple[Any, ...], dict[str, Any]]]()
         self.status = "converged"
         self.fault: BaseException | None = None
@@ -79,8 +79,8 @@ def _elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 @pytest.fixture
 def finder(monkeypatch: pytest.MonkeyPatch) -> FakeFinder:
     fake = FakeFinder()
-    monkeypatch.setitem(sys.modules, "gridshell.form", fake)
-    monkeypatch.setattr("gridshell.cli.progress.compiled_before", lambda: True)
+    monkeypatch.setitem(sys.modules, "rodshell.form", fake)
+    monkeypatch.setattr("rodshell.cli.progress.compiled_before", lambda: True)
     return fake
 
 
@@ -95,7 +95,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) 
     assert main(arguments) == code
     said = capsys.readouterr()
     assert said.out == ""
-    assert said.err.startswith("gridshell: error: ")
+    assert said.err.startswith("rodshell: error: ")
     assert said.err.count("\n") == 1
     return said.err
 
@@ -221,7 +221,7 @@ def test_the_output_folder_is_left_alone_by_the_check(finder: FakeFinder) -> Non
 
 def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
     Path("dome").mkdir()
-    Path("dome/result.json").write_text('{"format": "gridshell-result", "version": 1}')
+    Path("dome/result.json").write_text('{"format": "rodshell-result", "version": 1}')
     finder.fault = NetLimitError("no net")
     assert main(["form", "hemisphere", "--out", "dome"]) == 2
     assert len(finder.calls) == 1
@@ -233,7 +233,7 @@ def test_not_converged_saves_says_so_and_ends_with_3(finder: FakeFinder, capsys:
     assert Path("out/hemisphere/case.toml").exists()
     last = capsys.readouterr().err.splitlines()[-1]
     assert last == (
-        "gridshell: NOT CONVERGED: stopped after 8 factorisations; partial results are in "
+        "rodshell: NOT CONVERGED: stopped after 8 factorisations; partial results are in "
         f"{Path('out/hemisphere').resolve()}"
     )
 
@@ -253,7 +253,7 @@ def test_json_is_the_result_and_nothing_else_on_stdout(finder: FakeFinder, capsy
     assert main(["form", "hemisphere", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
         "out": str(Path("out/hemisphere").resolve()),
-        "format": "gridshell-result",
+        "format": "rodshell-result",
         "status": "converged",
     }
 
@@ -262,7 +262,7 @@ def test_progress_away_from_a_terminal_is_a_line_for_each_stage(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["form", "hemisphere"]) == 0
-    assert capsys.readouterr().err.splitlines() == ["gridshell: net", "gridshell: drape", "gridshell: pop up"]
+    assert capsys.readouterr().err.splitlines() == ["rodshell: net", "rodshell: drape", "rodshell: pop up"]
 
 
 def test_quiet_says_nothing(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
@@ -275,7 +275,7 @@ def test_the_first_run_announces_the_compilation(
 ) -> None:
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, "gridshell.form", finder)
+    monkeypatch.setitem(sys.modules, "rodshell.form", finder)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     assert main(["form", "hemisphere", "--out", "a"]) == 0
     assert "compiling kernels, once" in capsys.readouterr().err
@@ -319,7 +319,7 @@ def test_a_table_by_semicolons_may_have_decimal_commas(finder: FakeFinder) -> No
 
 
 def test_a_table_takes_the_rod_that_is_asked_for(finder: FakeFinder) -> None:
-    from gridshell.rods.section import Circle, Material, RectangularSection, Tube
+    from rodshell.rods.section import Circle, Material, RectangularSection, Tube
 
     table = write_table(Path("rods.csv"), CROSS)
 
@@ -358,10 +358,10 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     Path("empty.toml").write_text("")
     assert main(["form", "empty.toml"]) == 0
     said = capsys.readouterr().err.splitlines()[0]
-    assert said == "gridshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm, rod radius 1 mm"
+    assert said == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm, rod radius 1 mm"
     Path("big.toml").write_text("target = { radius = 200 }\nlayout.spacing = 25")
     assert main(["form", "big.toml"]) == 0
-    assert capsys.readouterr().err.startswith("gridshell: hemisphere, 400 m wide; edge 4.17 m, rod radius 1 m\n")
+    assert capsys.readouterr().err.startswith("rodshell: hemisphere, 400 m wide; edge 4.17 m, rod radius 1 m\n")
     assert main(["form", "empty.toml", "--quiet", "--out", "quiet"]) == 0
     assert capsys.readouterr().err == ""
 
@@ -428,7 +428,7 @@ def dome() -> Path:
         {"id": "U01", "family": "u", "offset": 0.0, "start": -0.1, "end": 0.1},
         {"id": "V01", "family": "v", "offset": 0.0, "start": -0.1, "end": 0.1},
     ]
-    result = {"format": "gridshell-result", "version": 1, "units": "SI", "rods": rods}
+    result = {"format": "rodshell-result", "version": 1, "units": "SI", "rods": rods}
     (folder / "result.json").write_text(json.dumps(result))
     (folder / "case.toml").write_text(load_case("hemisphere", {"rod.section.radius": 0.007}).to_toml())
     flat = np.array([[-0.1, 0, 0], [0, 0, 0], [0.1, 0, 0], [0, -0.1, 0], [0, 0.1, 0]])
@@ -457,31 +457,31 @@ def test_an_earlier_result_that_cannot_be_read_is_refused(
     assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
     np.savez(dome / "states.npz", draped=np.zeros((5, 3)))
     assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
-    result = {"format": "gridshell-result", "version": 1, "rods": []}
+    result = {"format": "rodshell-result", "version": 1, "rods": []}
     (dome / "result.json").write_text(json.dumps(result))
     assert "dome has no rods" in refused(capsys, "popup", "dome")
     (dome / "result.json").write_text(json.dumps({**result, "rods": [{"id": "U01"}]}))
     assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
     (dome / "result.json").unlink()
-    assert "no gridshell result" in refused(capsys, "popup", "dome")
+    assert "no rodshell result" in refused(capsys, "popup", "dome")
 
 
 def test_ctrl_c_ends_with_one_line_and_130(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     finder.fault = KeyboardInterrupt()
     assert main(["form", "hemisphere"]) == 130
-    assert capsys.readouterr().err.splitlines()[-1] == "gridshell: interrupted"
+    assert capsys.readouterr().err.splitlines()[-1] == "rodshell: interrupted"
     assert not Path("out").exists()
 
 
 WAITING = """
 import sys, time, types
-fake = types.ModuleType("gridshell.form")
+fake = types.ModuleType("rodshell.form")
 def find_form(*args, progress, **options):
     progress("drape", "level 1 of 1, iteration 3", 1e-4)
     time.sleep(60)
 fake.find_form = find_form
-sys.modules["gridshell.form"] = fake
-from gridshell.cli import main
+sys.modules["rodshell.form"] = fake
+from rodshell.cli import main
 sys.exit(main(["form", "hemisphere"]))
 """
 
@@ -517,9 +517,9 @@ def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it
     ],
 )
 def test_help_and_version_import_nothing_heavy(argument: str, heavy: set[str]) -> None:
-    code = f"import sys; from gridshell.cli import main; main([{argument}]); print(*sys.modules)"
+    code = f"import sys; from rodshell.cli import main; main([{argument}]); print(*sys.modules)"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "gridshell" in ended.stdout
+    assert "rodshell" in ended.stdout
     assert heavy.isdisjoint(ended.stdout.split())
 
 

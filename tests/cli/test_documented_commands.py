@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gridshell.cli import main, warmup
-from gridshell.cli.rodends import COLUMNS
+from rodshell.cli import main, warmup
+from rodshell.cli.rodends import COLUMNS
 
 ROOT = Path(__file__).parents[2]
 QUICK = {"form": ["--only", "csv", "--checks.stages", "0", "--pop_up.ends", "clamped"]}
@@ -18,9 +18,9 @@ README = [
     line
     for block in re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     for line in re.split(r"\n|&&", block)
-    if line.strip().startswith("gridshell ")
+    if line.strip().startswith("rodshell ")
 ]
-FILES = re.findall(r"`(gridshell [^`]*)`", (ROOT / "docs" / "files.md").read_text())
+FILES = re.findall(r"`(rodshell [^`]*)`", (ROOT / "docs" / "files.md").read_text())
 FILES = [line for line in FILES if "..." not in line and "paper" not in line]  # figures of the paper take minutes
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gridshell.errors import InputError
-from gridshell.units import Kind, length_text, parse_quantity
+from rodshell.errors import InputError
+from rodshell.units import Kind, length_text, parse_quantity
 
 
 @pytest.mark.parametrize(

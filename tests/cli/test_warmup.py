@@ -1,4 +1,4 @@
-"""`gridshell warmup`: every kernel is compiled by it, it says what it does, and does it once."""
+"""`rodshell warmup`: every kernel is compiled by it, it says what it does, and does it once."""
 
 import importlib
 import os
@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-import gridshell
-from gridshell.cli import main
+import rodshell
+from rodshell.cli import main
 
 SHORT = """
 import sys
 import numpy as np
-from gridshell.cli import main, warmup
-from gridshell.targets.domain import EllipseDomain
+from rodshell.cli import main, warmup
+from rodshell.targets.domain import EllipseDomain
 warmup.JOBS = {"an oval": lambda: EllipseDomain(0.2, 0.1).distance(np.array([[0.1, 0.1]]))}
 sys.exit(main(["warmup"]))
 """
@@ -36,7 +36,7 @@ def warm_up(folder: Path) -> tuple[str, list[str]]:
 def test_the_first_warm_up_compiles_and_the_second_has_nothing_to_do(tmp_path: Path) -> None:
     said, told = warm_up(tmp_path)
     assert re.fullmatch(r"compiled 1 kernels in \d+ s\n", said)
-    assert told == ["gridshell: warm-up 1 of 1, an oval"]
+    assert told == ["rodshell: warm-up 1 of 1, an oval"]
     kept = sorted(tmp_path.rglob("*.nbc"))
     assert kept
     assert warm_up(tmp_path)[0] == "nothing to do: all kernels were compiled before\n"
@@ -48,17 +48,17 @@ def test_every_kernel_is_called_by_some_job() -> None:
     """By a job itself or by a kernel that is; numba asks a function that is called from a kernel for its types."""
     from numba.core.dispatcher import Dispatcher
 
-    for package in pkgutil.walk_packages(gridshell.__path__, "gridshell."):
+    for package in pkgutil.walk_packages(rodshell.__path__, "rodshell."):
         importlib.import_module(package.name)
     kernels = {
         value.py_func: value
         for name, module in list(sys.modules.items())
-        if name.startswith("gridshell.")
+        if name.startswith("rodshell.")
         for value in vars(module).values()
         if isinstance(value, Dispatcher)
     }
-    from gridshell.cli.progress import Progress
-    from gridshell.cli.warmup import warm_up as run_all
+    from rodshell.cli.progress import Progress
+    from rodshell.cli.warmup import warm_up as run_all
 
     run_all(Progress(quiet=True))
     reached = [function for function, kernel in kernels.items() if kernel.signatures]
@@ -73,7 +73,7 @@ def test_every_kernel_is_called_by_some_job() -> None:
 
 
 def test_quiet_says_nothing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    from gridshell.cli import warmup
+    from rodshell.cli import warmup
 
     monkeypatch.setattr(warmup, "JOBS", {})
     assert main(["warmup", "--quiet"]) == 0

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from numpy.linalg import norm
 
-from gridshell.errors import InputError
-from gridshell.geometry import directors_along, parallel_transport
-from gridshell.rods.bend_twist import BendTwist
-from gridshell.rods.isotropic_bend import IsotropicBend
-from gridshell.rods.round_bend_twist import RoundBendTwist
-from gridshell.rods.stretch import Stretch
+from rodshell.errors import InputError
+from rodshell.geometry import directors_along, parallel_transport
+from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.round_bend_twist import RoundBendTwist
+from rodshell.rods.stretch import Stretch
 
 NODES = 7
 Z = np.array([0.0, 0.0, 1.0])

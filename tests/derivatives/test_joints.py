@@ -13,9 +13,9 @@ import pytest
 from numpy.linalg import norm
 from scipy.spatial.transform import Rotation
 
-import gridshell as gs
-from gridshell.joints import ExplicitPenalty, ImplicitPenalty, SharedDofs
-from gridshell.joints.relative_rotation import RelativeRotation
+import rodshell as rs
+from rodshell.joints import ExplicitPenalty, ImplicitPenalty, SharedDofs
+from rodshell.joints.relative_rotation import RelativeRotation
 
 RODS = [
     [[-2.0, 0.0], [2.0, 0.0]],
@@ -27,16 +27,16 @@ RODS = [
     [[-1.5, 1.025], [-1.8, -1.0]],  # ends on the second
 ]
 JOINTS = {
-    "pin": gs.Pin(),
-    "rigid": gs.Rigid(),
-    "spring": gs.Spring(0.7, 1.3, 0.4),
-    "spring at another angle": gs.Spring(0.7, 1.3, 0.4, rest_angle=0.4),
-    "shear alone": gs.Spring(0.7),
-    "twist alone": gs.Spring(twist=2.0),
-    "two linkers": gs.Linker(),
-    "four linkers of their own rod": gs.Linker(rod=gs.Rod(gs.GivenSection(EA=1, EI1=0.4, EI2=0.9, GJ=0.3)), corners=4),
-    "eccentric pin": gs.Pin(eccentricity=0.2),
-    "eccentric spring": gs.Spring(0.3, 0.2, 0.2, eccentricity=0.2),
+    "pin": rs.Pin(),
+    "rigid": rs.Rigid(),
+    "spring": rs.Spring(0.7, 1.3, 0.4),
+    "spring at another angle": rs.Spring(0.7, 1.3, 0.4, rest_angle=0.4),
+    "shear alone": rs.Spring(0.7),
+    "twist alone": rs.Spring(twist=2.0),
+    "two linkers": rs.Linker(),
+    "four linkers of their own rod": rs.Linker(rod=rs.Rod(rs.GivenSection(EA=1, EI1=0.4, EI2=0.9, GJ=0.3)), corners=4),
+    "eccentric pin": rs.Pin(eccentricity=0.2),
+    "eccentric spring": rs.Spring(0.3, 0.2, 0.2, eccentricity=0.2),
 }
 COUPLINGS = {
     "shared": SharedDofs(),
@@ -49,14 +49,14 @@ every_case = pytest.mark.parametrize(("joint", "coupling"), CASES, ids=[" ".join
 
 def grid_of(joint):
     rods = RODS if JOINTS[joint].eccentricity == 0 else [RODS[k] for k in (0, 1, 2, 4, 5)]  # those fit in two layers
-    return gs.straight_rods(rods)
+    return rs.straight_rods(rods)
 
 
 @cache
 def shell_of(joint, coupling, isotropic=False):
-    rod = gs.Rod(gs.GivenSection(EA=3, EI1=1, EI2=1 if isotropic else 2, GJ=0.8, mass=1, rotary_inertia=0.1))
-    mesh = gs.mesh_grid(grid_of(joint), 0.5)
-    return gs.Shell.of(mesh, rod, joint=JOINTS[joint], coupling=COUPLINGS[coupling])
+    rod = rs.Rod(rs.GivenSection(EA=3, EI1=1, EI2=1 if isotropic else 2, GJ=0.8, mass=1, rotary_inertia=0.1))
+    mesh = rs.mesh_grid(grid_of(joint), 0.5)
+    return rs.Shell.of(mesh, rod, joint=JOINTS[joint], coupling=COUPLINGS[coupling])
 
 
 def unused(shell):
@@ -178,15 +178,15 @@ def test_a_joint_gives_way_freely_where_it_is_said_to():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: gs.Spring(-1.0), "shear stiffness must not be negative, not -1.0"),
-        (lambda: gs.Spring(float("nan")), "shear stiffness must not be negative, not nan"),
-        (lambda: gs.Pin(eccentricity=-0.1), "eccentricity must not be negative, not -0.1"),
-        (lambda: gs.Rigid(rest_angle=7.0), "rest angle must lie between -pi and pi, not 7.0"),
-        (lambda: gs.Linker(corners=3), "2 or 4 of its corners, not in 3"),
-        (lambda: gs.ImplicitPenalty(C1=0.0), "C1 must be positive and finite, not 0.0"),
-        (lambda: gs.ExplicitPenalty(C2=inf), "C2 must be positive and finite, not inf"),
+        (lambda: rs.Spring(-1.0), "shear stiffness must not be negative, not -1.0"),
+        (lambda: rs.Spring(float("nan")), "shear stiffness must not be negative, not nan"),
+        (lambda: rs.Pin(eccentricity=-0.1), "eccentricity must not be negative, not -0.1"),
+        (lambda: rs.Rigid(rest_angle=7.0), "rest angle must lie between -pi and pi, not 7.0"),
+        (lambda: rs.Linker(corners=3), "2 or 4 of its corners, not in 3"),
+        (lambda: rs.ImplicitPenalty(C1=0.0), "C1 must be positive and finite, not 0.0"),
+        (lambda: rs.ExplicitPenalty(C2=inf), "C2 must be positive and finite, not inf"),
     ],
 )
 def test_nonsense_is_refused(make, words):
-    with pytest.raises(gs.InputError, match=words):
+    with pytest.raises(rs.InputError, match=words):
         make()

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gridshell.targets import (
+from rodshell.targets import (
     Cap,
     Disc,
     EllipseDomain,

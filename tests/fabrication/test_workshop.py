@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import gridshell as gs
-from gridshell.fabrication import Fabrication, diagonals, fabricate, nest, splices
-from gridshell.layout import FlatGrid, mesh_grid, straight_rods
-from gridshell.layout.gridlayout import GridLayout
-from gridshell.layout.layers import layers
+import rodshell as rs
+from rodshell.fabrication import Fabrication, diagonals, fabricate, nest, splices
+from rodshell.layout import FlatGrid, mesh_grid, straight_rods
+from rodshell.layout.gridlayout import GridLayout
+from rodshell.layout.layers import layers
 
-ROD = gs.Rod(gs.Circle(radius=1e-3), gs.Material(youngs_modulus=1e6, density=1e3))
+ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
 
 
 @given(st.integers(2, 12).flatmap(lambda n: st.tuples(st.just(n), st.sets(st.tuples(*[st.integers(0, n - 1)] * 2)))))
@@ -204,7 +204,7 @@ def test_stock_that_is_too_short_is_said() -> None:
 
 def test_one_rod_that_cannot_be_spliced_is_named_alone() -> None:
     long = [[-0.3, 0.0], [0.3, 0.0]]
-    grid = gs.straight_rods([long, *([[x, -0.03], [x, 0.03]] for x in np.linspace(-0.3, 0.3, 5))])
+    grid = rs.straight_rods([long, *([[x, -0.03], [x, 0.03]] for x in np.linspace(-0.3, 0.3, 5))])
     made = fabricate(mesh_grid(grid, 0.02), ROD, Fabrication(stock_length=0.08))
     assert made.warnings == ("rod R01 cannot be spliced between joints from stock of 80 mm: give longer stock",)
 
@@ -216,5 +216,5 @@ def test_one_rod_that_cannot_be_spliced_is_named_alone() -> None:
      ({"stock_length": 0.0}, "stock of 0.0 m"), ({"stock_length": 0.002, "kerf": 0.003}, "longer bars")],
 )  # fmt: skip
 def test_lengths_that_cannot_be_are_refused(options: dict[str, float], reason: str) -> None:
-    with pytest.raises(gs.InputError, match=reason):
+    with pytest.raises(rs.InputError, match=reason):
         Fabrication(**options)

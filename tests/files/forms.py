@@ -4,24 +4,24 @@ from functools import cache
 
 import numpy as np
 
-import gridshell as gs
-from gridshell.fabrication import Fabrication
-from gridshell.output import Archive
-from gridshell.output.takeaway import DrawingStyle, Takeaway
+import rodshell as rs
+from rodshell.fabrication import Fabrication
+from rodshell.output import Archive
+from rodshell.output.takeaway import DrawingStyle, Takeaway
 from tests.acceptance.cases import ROD, ridge_formula
 
 TARGETS = {
-    "dome": (gs.Hemisphere(0.2), {}),
-    "oval": (gs.Ellipsoid(a=0.2, b=0.15, c=0.12), {"rotate": 0.7853981633974483}),
-    "ridge": (gs.HeightField(formula=ridge_formula(), domain=gs.Disc(0.2)), {}),
+    "dome": (rs.Hemisphere(0.2), {}),
+    "oval": (rs.Ellipsoid(a=0.2, b=0.15, c=0.12), {"rotate": 0.7853981633974483}),
+    "ridge": (rs.HeightField(formula=ridge_formula(), domain=rs.Disc(0.2)), {}),
 }
 
 
 @cache
-def form(name: str) -> gs.Form:
+def form(name: str) -> rs.Form:
     target, turn = TARGETS[name]
-    layout = gs.GridLayout.orthogonal(spacing=0.03, edge=0.01, **turn)
-    return gs.find_form(target, layout, ROD)
+    layout = rs.GridLayout.orthogonal(spacing=0.03, edge=0.01, **turn)
+    return rs.find_form(target, layout, ROD)
 
 
 @cache
@@ -38,13 +38,13 @@ def wished() -> Archive:
     return form("dome").archive(takeaway=Takeaway(strength=2e4, stages=4, fabrication=making, drawings=style))
 
 
-LATH = gs.Rod(
-    gs.RectangularSection(width=0.012, height=0.05), gs.Material(youngs_modulus=11e9, shear=0.69e9, density=470)
+LATH = rs.Rod(
+    rs.RectangularSection(width=0.012, height=0.05), rs.Material(youngs_modulus=11e9, shear=0.69e9, density=470)
 )
-ROOF = gs.HeightField(formula="3*cos(pi*x/16)*cos(pi*y/12) + 0.05*x", domain=gs.Rectangle((12.0, 8.0)))
+ROOF = rs.HeightField(formula="3*cos(pi*x/16)*cos(pi*y/12) + 0.05*x", domain=rs.Rectangle((12.0, 8.0)))
 
 
-def mesh_with_an_opening() -> gs.Target:
+def mesh_with_an_opening() -> rs.Target:
     """A vault of 12 by 8 m with a round opening of 1.3 m off its middle."""
     x, y = np.meshgrid(np.linspace(-6, 6, 61), np.linspace(-4, 4, 41), indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), (3 * np.cos(np.pi * x / 16) * np.cos(np.pi * y / 12)).ravel()])
@@ -53,7 +53,7 @@ def mesh_with_an_opening() -> gs.Target:
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     kept = np.linalg.norm(points[faces].mean(axis=1)[:, :2] - (1.0, 0.5), axis=1) > 1.3
     used, faces = np.unique(faces[kept], return_inverse=True)
-    return gs.Freeform.of(points[used], faces.reshape(-1, 3))
+    return rs.Freeform.of(points[used], faces.reshape(-1, 3))
 
 
 @cache
@@ -62,7 +62,7 @@ def formed(name: str) -> Archive:
     if name in TARGETS:
         return archive(name)
     if name == "sewn":
-        layout = gs.GridLayout.orthogonal(spacing=0.03, edge=0.01)
-        return gs.sew(gs.Hemisphere(0.2), [[(-1.0, 0.0), (1.0, 0.0)]], layout, ROD).archive()
+        layout = rs.GridLayout.orthogonal(spacing=0.03, edge=0.01)
+        return rs.sew(rs.Hemisphere(0.2), [[(-1.0, 0.0), (1.0, 0.0)]], layout, ROD).archive()
     target, spacing = (ROOF, 0.8) if name == "roof" else (mesh_with_an_opening(), 0.6)
-    return gs.find_form(target, gs.GridLayout.orthogonal(spacing=spacing, edge=0.1), LATH).archive()
+    return rs.find_form(target, rs.GridLayout.orthogonal(spacing=spacing, edge=0.1), LATH).archive()

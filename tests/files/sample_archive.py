@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gridshell.output import Archive
+from rodshell.output import Archive
 
 RADIUS = 0.2  # m
 LENGTH = 0.5 * np.pi * RADIUS  # of the flat state's radius: rim to top along a meridian [m]
@@ -69,7 +69,7 @@ def table_archive() -> Archive:
     popped = np.column_stack([0.9 * plane, 0.12 * np.cos(3 * plane[:, 0]) * np.cos(3 * plane[:, 1])])
     counts = [len(each) for each in points]
     return Archive(
-        {"format": "gridshell-result", "version": 1, "units": "SI", "status": "converged",
+        {"format": "rodshell-result", "version": 1, "units": "SI", "status": "converged",
          "name": "table of rods", "rods": rods,
          "pop_up": {"pinned": {"status": "converged", "stable": True, "dofs": 500}}},
         {"flat": flat, "popped_pinned": popped, "rod_nodes": np.arange(len(flat)),
@@ -131,8 +131,8 @@ def _result(rods: list[dict[str, Any]], states: dict[str, np.ndarray]) -> dict[s
     pop_up = {"status": "converged", "iterations": 9, "factorizations": 11, "dofs": 3 * len(states["flat"]),
               "seconds": 1.25, "force_residual": 3.1e-12, "stable": True, "negative_modes": 0}  # fmt: skip
     return {
-        "format": "gridshell-result", "version": 1, "units": "SI", "status": "converged",
-        "name": "sample dome", "version_gridshell": "0.1.0",
+        "format": "rodshell-result", "version": 1, "units": "SI", "status": "converged",
+        "name": "sample dome", "version_rodshell": "0.1.0",
         "target": {"kind": "hemisphere", "radius": RADIUS, "size": RADIUS},
         "layout": {"rods": [9, 9], "spacing": [0.07, 0.07], "length": "auto", "edge": 0.01, "rotate": 0.0,
                    "offset": [0.0, 0.0]},

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from forms import archive
 
-from gridshell.output import beside as module
-from gridshell.output.archive import write
-from gridshell.output.beside import beside
+from rodshell.output import beside as module
+from rodshell.output.archive import write
+from rodshell.output.beside import beside
 
 forked = pytest.mark.skipif(not hasattr(os, "fork"), reason="no child processes here")
 

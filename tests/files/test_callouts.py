@@ -7,13 +7,13 @@ import pytest
 from forms import formed
 from numpy.typing import NDArray
 
-from gridshell.output import Archive
-from gridshell.output.callouts import callouts, outward
-from gridshell.output.drawing import Drawing, Text
-from gridshell.output.drawings.flat import flat_drawing
-from gridshell.output.drawings.supports import supports_drawing
-from gridshell.output.labels import Room, boxes_meet, lines_meet
-from gridshell.output.plan import flat_plan
+from rodshell.output import Archive
+from rodshell.output.callouts import callouts, outward
+from rodshell.output.drawing import Drawing, Text
+from rodshell.output.drawings.flat import flat_drawing
+from rodshell.output.drawings.supports import supports_drawing
+from rodshell.output.labels import Room, boxes_meet, lines_meet
+from rodshell.output.plan import flat_plan
 
 Floats = NDArray[np.float64]
 

@@ -19,22 +19,22 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sample_archive import sample_archive, table_archive
 
-from gridshell.errors import InputError
-from gridshell.output import Archive
-from gridshell.output.archive import export
-from gridshell.output.drawing import LAYERS, Drawing, Pencil, Text
-from gridshell.output.drawing import Path as Line
-from gridshell.output.drawings import drawing_set, sheet_set
-from gridshell.output.drawings.bracing import bracing_drawing
-from gridshell.output.drawings.final import elevations_drawing
-from gridshell.output.drawings.flat import diagonals, flat_drawing
-from gridshell.output.drawings.sheets import OVERLAP, SCALES, TEXT, fitted, room, tiled
-from gridshell.output.dxf import drawing_dxf
-from gridshell.output.labels import boxes_meet, lines_meet, spread
-from gridshell.output.plan import flat_plan
-from gridshell.output.rods import joint_places, rods_of
-from gridshell.output.schedules import rods_table
-from gridshell.output.takeaway import DrawingStyle, Takeaway
+from rodshell.errors import InputError
+from rodshell.output import Archive
+from rodshell.output.archive import export
+from rodshell.output.drawing import LAYERS, Drawing, Pencil, Text
+from rodshell.output.drawing import Path as Line
+from rodshell.output.drawings import drawing_set, sheet_set
+from rodshell.output.drawings.bracing import bracing_drawing
+from rodshell.output.drawings.final import elevations_drawing
+from rodshell.output.drawings.flat import diagonals, flat_drawing
+from rodshell.output.drawings.sheets import OVERLAP, SCALES, TEXT, fitted, room, tiled
+from rodshell.output.dxf import drawing_dxf
+from rodshell.output.labels import boxes_meet, lines_meet, spread
+from rodshell.output.plan import flat_plan
+from rodshell.output.rods import joint_places, rods_of
+from rodshell.output.schedules import rods_table
+from rodshell.output.takeaway import DrawingStyle, Takeaway
 
 PAPER = (420.0, 297.0)  # A3
 FORMED = [*TARGETS, "roof", "opening", "sewn"]
@@ -352,7 +352,7 @@ def test_takeaways_that_make_no_sense_are_refused() -> None:
 
 def test_a_text_box_holds_its_text() -> None:
     """Against the widths of Helvetica, for ids and numbers."""
-    from gridshell.output.pdf import _width
+    from rodshell.output.pdf import _width
 
     for words in ("U01/V12", "1234.56", "-0.07", "ends 14 % of the way", "R07.1"):
         box = Text(words, np.zeros(2), 10.0, "LABEL").box()

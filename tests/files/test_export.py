@@ -12,12 +12,12 @@ import pytest
 from forms import archive, form, wished
 from sample_archive import sample_archive, table_archive
 
-import gridshell as gs
-from gridshell.cli import main
-from gridshell.errors import InputError, OutputError
-from gridshell.output import read, write
-from gridshell.output.archive import export
-from gridshell.output.files import DEFAULT, KINDS, read_kinds
+import rodshell as rs
+from rodshell.cli import main
+from rodshell.errors import InputError, OutputError
+from rodshell.output import read, write
+from rodshell.output.archive import export
+from rodshell.output.files import DEFAULT, KINDS, read_kinds
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -87,7 +87,7 @@ def test_bad_requests_are_one_sentence(
     assert reason in error
     assert error.count("\n") == 1
     assert main(["export", str(tmp_path / "nothing")]) == 2
-    assert "holds no gridshell result" in capsys.readouterr().err
+    assert "holds no rodshell result" in capsys.readouterr().err
 
 
 def test_kinds_are_read_in_any_case_and_checked() -> None:
@@ -153,7 +153,7 @@ def test_millimetres_and_metres_give_the_same_drawings_to_the_byte(tmp_path: Pat
 def test_drawings_are_the_same_whatever_the_hash_seed(tmp_path: Path) -> None:
     """Another process with another order of sets writes the same bytes."""
     first = write(wished(), tmp_path / "first")
-    code = "import sys; from gridshell.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from rodshell.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [
         sys.executable,
         "-c",
@@ -187,7 +187,7 @@ def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Pa
 
 
 def test_without_stages_there_is_no_way_up(tmp_path: Path) -> None:
-    made = form("dome").archive(takeaway=gs.Takeaway(stages=0))
+    made = form("dome").archive(takeaway=rs.Takeaway(stages=0))
     assert "deployment" not in made.result
     assert "history" not in made.states
     names = export(made, tmp_path)

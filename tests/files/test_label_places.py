@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from sample_archive import table_archive
 from test_callouts import cross, off
 
-from gridshell.output import Archive
-from gridshell.output.callouts import callouts, outward
-from gridshell.output.drawing import Drawing
-from gridshell.output.drawings.flat import flat_drawing
-from gridshell.output.drawings.sheets import fitted
-from gridshell.output.drawings.supports import supports_drawing
-from gridshell.output.labels import Room, boxes_meet, lines_meet
-from gridshell.output.plan import FlatPlan, flat_plan
+from rodshell.output import Archive
+from rodshell.output.callouts import callouts, outward
+from rodshell.output.drawing import Drawing
+from rodshell.output.drawings.flat import flat_drawing
+from rodshell.output.drawings.sheets import fitted
+from rodshell.output.drawings.supports import supports_drawing
+from rodshell.output.labels import Room, boxes_meet, lines_meet
+from rodshell.output.plan import FlatPlan, flat_plan
 
 Floats = NDArray[np.float64]
 

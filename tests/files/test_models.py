@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from forms import archive, wished
 
-from gridshell.errors import InputError
-from gridshell.output.archive import export
-from gridshell.output.models.gltf import section_outline, swept
-from gridshell.output.plan import flat_plan
-from gridshell.output.rods import joints_of, rods_of
+from rodshell.errors import InputError
+from rodshell.output.archive import export
+from rodshell.output.models.gltf import section_outline, swept
+from rodshell.output.plan import flat_plan
+from rodshell.output.rods import joints_of, rods_of
 
 RADIUS = 1e-3  # m, of the rods
 
@@ -157,7 +157,7 @@ def test_compas_loads_it(out: Path) -> None:
 def test_rhino_model_has_layers_names_and_user_text(tmp_path: Path) -> None:
     r = pytest.importorskip("rhino3dm", reason="rhino3dm reads 3dm files where it is installed")
     export(wished(), tmp_path, ["3dm"])
-    model = r.File3dm.Read(str(tmp_path / "model/gridshell.3dm"))
+    model = r.File3dm.Read(str(tmp_path / "model/rodshell.3dm"))
     assert model.Settings.ModelUnitSystem == r.UnitSystem.Millimeters
     names = [layer.Name for layer in model.Layers]
     plan = flat_plan(wished())
@@ -178,7 +178,7 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     import sys
 
     monkeypatch.setitem(sys.modules, "rhino3dm", None)
-    with pytest.raises(InputError, match=r"pip install \"gridshell\[rhino\]\""):
+    with pytest.raises(InputError, match=r"pip install \"rodshell\[rhino\]\""):
         export(archive("dome"), tmp_path, ["3dm"])
 
 

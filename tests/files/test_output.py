@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 from sample_archive import sample_archive, table_archive
 
-from gridshell.errors import OutputError
-from gridshell.output import Archive, check_folder, picture_svg, read, write
-from gridshell.output import folder as folder_module
-from gridshell.output.labels import boxes_meet, lines_meet, place
-from gridshell.output.plan import flat_plan
+from rodshell.errors import OutputError
+from rodshell.output import Archive, check_folder, picture_svg, read, write
+from rodshell.output import folder as folder_module
+from rodshell.output.labels import boxes_meet, lines_meet, place
+from rodshell.output.plan import flat_plan
 
 TOLERANCE = 0.01  # mm: a tenth of what a saw or a laser holds
 SVG = "{http://www.w3.org/2000/svg}"
@@ -462,7 +462,7 @@ def test_a_failed_rename_brings_the_old_result_back(
     rename = Path.rename
 
     def broken(self: Path, target: Path) -> Path:
-        if (self / "report.html").exists() and self.name.startswith(".dome.gridshell-"):
+        if (self / "report.html").exists() and self.name.startswith(".dome.rodshell-"):
             raise OSError(5, "Input/output error")
         return rename(self, target)
 
@@ -480,14 +480,14 @@ def test_a_foreign_folder_is_not_replaced(archive: Archive, tmp_path: Path, cont
     mine.mkdir()
     for name, text in content.items():
         (mine / name).write_text(text)
-    with pytest.raises(OutputError, match="holds no gridshell result"):
+    with pytest.raises(OutputError, match="holds no rodshell result"):
         write(archive, mine)
     assert {path.name: path.read_text() for path in mine.iterdir()} == content
     assert os.listdir(tmp_path) == ["mine"]
 
 
 def test_what_a_killed_run_left_is_removed_later(archive: Archive, tmp_path: Path) -> None:
-    old, young, other = (tmp_path / name for name in (".dome.gridshell-a", ".dome.gridshell-b", ".dome.old-c"))
+    old, young, other = (tmp_path / name for name in (".dome.rodshell-a", ".dome.rodshell-b", ".dome.old-c"))
     for left in (old, young, other):
         (left / "model").mkdir(parents=True)
     for left in (old, other):
@@ -519,9 +519,9 @@ def test_where_nothing_can_be_written_is_said(
 
 
 def test_reading_what_is_no_result_says_so(out: Path, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="holds no gridshell result"):
+    with pytest.raises(OutputError, match="holds no rodshell result"):
         read(tmp_path)
-    (tmp_path / "result.json").write_text('{"format": "gridshell-result", "version": 99}')
+    (tmp_path / "result.json").write_text('{"format": "rodshell-result", "version": 99}')
     with pytest.raises(OutputError, match="version 99"):
         read(tmp_path)
     (tmp_path / "result.json").write_bytes((out / "result.json").read_bytes())

@@ -12,14 +12,14 @@ from browser import needs_browser, open_report
 from forms import TARGETS, archive, wished
 from sample_archive import sample_archive, table_archive, with_way_up
 
-import gridshell as gs
-from gridshell.output import Archive, wording
-from gridshell.output.archive import export
-from gridshell.output.figures import key_figures
-from gridshell.output.plan import flat_plan
-from gridshell.output.result import rod_table
-from gridshell.output.verdict import verdict
-from gridshell.output.viewer import viewer_json
+import rodshell as rs
+from rodshell.output import Archive, wording
+from rodshell.output.archive import export
+from rodshell.output.figures import key_figures
+from rodshell.output.plan import flat_plan
+from rodshell.output.result import rod_table
+from rodshell.output.verdict import verdict
+from rodshell.output.viewer import viewer_json
 from tests.acceptance.cases import ROD
 
 
@@ -217,7 +217,7 @@ def test_numbers_are_plain(value: float, shown: str) -> None:
 
 
 def test_every_number_of_a_material_has_its_unit() -> None:
-    timber = gs.Material(youngs_modulus=11e9, density=470.0, shear=0.69e9).parameters()
+    timber = rs.Material(youngs_modulus=11e9, density=470.0, shear=0.69e9).parameters()
     rows = dict(wording.case_rows(timber))
     assert rows == {
         "Young's modulus": "11 GPa",
@@ -229,16 +229,16 @@ def test_every_number_of_a_material_has_its_unit() -> None:
 @pytest.mark.parametrize(
     ("rod", "line"),
     [(ROD, "circle, radius 1 mm; E = 1 MPa, 1000 kg/m3 (the paper's rubber; for another: rod.material)"),
-     (gs.Rod(gs.Tube(0.02, 0.003), gs.Material(25e9, 1900.0)),
+     (rs.Rod(rs.Tube(0.02, 0.003), rs.Material(25e9, 1900.0)),
       "tube, radius 20 mm, thickness 3 mm; E = 25 GPa, 1900 kg/m3 (Poisson's ratio is the paper's rubber's; "),
-     (gs.Rod(gs.Circle(0.02), gs.Material(11e9, 1000.0)),
+     (rs.Rod(rs.Circle(0.02), rs.Material(11e9, 1000.0)),
       "circle, radius 20 mm; E = 11 GPa, 1000 kg/m3 (density and Poisson's ratio are the paper's rubber's; for"),
-     (gs.Rod(gs.Circle(0.02), gs.Material(25e9, 1900.0, 0.3)), "circle, radius 20 mm; E = 25 GPa, 1900 kg/m3"),
-     (gs.Rod(gs.RectangularSection(0.012, 0.05), gs.Material(11e9, 470.0, shear=0.69e9)),
+     (rs.Rod(rs.Circle(0.02), rs.Material(25e9, 1900.0, 0.3)), "circle, radius 20 mm; E = 25 GPa, 1900 kg/m3"),
+     (rs.Rod(rs.RectangularSection(0.012, 0.05), rs.Material(11e9, 470.0, shear=0.69e9)),
       "rectangle, width 12 mm, height 50 mm; E = 11 GPa, 470 kg/m3"),
-     (gs.Rod(gs.GivenSection(1e6, 20.0, 30.0, 5.0)), "given, EA 1000000 N, EI1 20 N m\N{SUPERSCRIPT TWO}")],
+     (rs.Rod(rs.GivenSection(1e6, 20.0, 30.0, 5.0)), "given, EA 1000000 N, EI1 20 N m\N{SUPERSCRIPT TWO}")],
 )  # fmt: skip
-def test_the_summary_names_the_rod(rod: gs.Rod, line: str) -> None:
+def test_the_summary_names_the_rod(rod: rs.Rod, line: str) -> None:
     made = archive("dome")
     text = replace(made, result={**made.result, "rod": rod_table(rod)}).summary()
     (said,) = [one for one in text.splitlines() if one.startswith("  rod ")]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from forms import ROD, archive, form, wished
 
-from gridshell.output.archive import export
-from gridshell.output.rods import joints_of, rods_of
+from rodshell.output.archive import export
+from rodshell.output.rods import joints_of, rods_of
 
 
 @pytest.fixture(scope="module")

@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 from PIL import Image
 from sample_archive import sample_archive
 
-from gridshell.output import Archive
-from gridshell.output.colours import mixed
-from gridshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
-from gridshell.output.labels import Room, lines_meet
-from gridshell.output.pdf import POINTS, WIDTHS, drawings_pdf
-from gridshell.output.pictures import LAYERS, PAPER, picture
-from gridshell.output.png import drawing_png
-from gridshell.output.rods import rods_of
-from gridshell.output.scale import scale_of
-from gridshell.output.shapes import shape_of
-from gridshell.output.svg import drawing_svg, number
+from rodshell.output import Archive
+from rodshell.output.colours import mixed
+from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
+from rodshell.output.labels import Room, lines_meet
+from rodshell.output.pdf import POINTS, WIDTHS, drawings_pdf
+from rodshell.output.pictures import LAYERS, PAPER, picture
+from rodshell.output.png import drawing_png
+from rodshell.output.rods import rods_of
+from rodshell.output.scale import scale_of
+from rodshell.output.shapes import shape_of
+from rodshell.output.svg import drawing_svg, number
 
 numbers = st.floats(-1e6, 1e6).map(lambda x: float(np.round(x, 4))) | st.sampled_from([0.0, -0.001, 100.0, -0.5, 1.005])
 

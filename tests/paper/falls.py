@@ -3,32 +3,32 @@
 import numpy as np
 from numpy.typing import NDArray
 
-import gridshell as gs
-from gridshell.contact.modified_mass import ModifiedMass, Stopped
-from gridshell.model import Freedom
-from gridshell.rods.elements import Elements
-from gridshell.solve.constraint import Supports
-from gridshell.solve.contact_euler import ContactEuler
-from gridshell.solve.forces import Gravity
-from gridshell.solve.implicit_euler import MakeMatrix, Motion, Step
-from gridshell.solve.summed import narrow_or_sparse
+import rodshell as rs
+from rodshell.contact.modified_mass import ModifiedMass, Stopped
+from rodshell.model import Freedom
+from rodshell.rods.elements import Elements
+from rodshell.solve.constraint import Supports
+from rodshell.solve.contact_euler import ContactEuler
+from rodshell.solve.forces import Gravity
+from rodshell.solve.implicit_euler import MakeMatrix, Motion, Step
+from rodshell.solve.summed import narrow_or_sparse
 
 Floats = NDArray[np.float64]
 
 G, STEP, MASS, RADIUS = 9.81, 0.01, 1e-4, 0.2
-PAPER_ROD = gs.Rod(gs.Circle(radius=1e-3), gs.Material(1e6, 1e3))
-HEMISPHERE = gs.Hemisphere(RADIUS)
-TARGETS: dict[str, gs.Target] = {
+PAPER_ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(1e6, 1e3))
+HEMISPHERE = rs.Hemisphere(RADIUS)
+TARGETS: dict[str, rs.Target] = {
     "hemisphere": HEMISPHERE,
-    "paraboloid": gs.Paraboloid(0.2, 0.12),
-    "ellipsoid": gs.Ellipsoid(0.2, 0.15, 0.12),
-    "hollow": gs.HeightField(formula="0.1 + x**2 + 0.5*y**2", domain=gs.Disc(RADIUS)),
+    "paraboloid": rs.Paraboloid(0.2, 0.12),
+    "ellipsoid": rs.Ellipsoid(0.2, 0.15, 0.12),
+    "hollow": rs.HeightField(formula="0.1 + x**2 + 0.5*y**2", domain=rs.Disc(RADIUS)),
 }
 
 
-def slope(tangent: float) -> gs.Target:
+def slope(tangent: float) -> rs.Target:
     """A plane that falls along x by `tangent`."""
-    return gs.HeightField(formula=f"0.3 - {tangent}*x", domain=gs.Disc(RADIUS))
+    return rs.HeightField(formula=f"0.3 - {tangent}*x", domain=rs.Disc(RADIUS))
 
 
 class Particles:
@@ -36,7 +36,7 @@ class Particles:
 
     def __init__(
         self,
-        target: gs.Target,
+        target: rs.Target,
         positions: Floats,
         *,
         elements: tuple[Elements, ...] = (),
@@ -60,5 +60,5 @@ class Particles:
         return taken
 
 
-def coarse_layout() -> gs.GridLayout:
-    return gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)
+def coarse_layout() -> rs.GridLayout:
+    return rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)

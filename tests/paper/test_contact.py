@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-import gridshell as gs
-from gridshell.contact.modified_mass import ModifiedMass
-from gridshell.errors import InputError
-from gridshell.model import Freedom
-from gridshell.rods.stretch import Stretch
-from gridshell.solve.summed import SparseSum
-from gridshell.targets.domain import Domain, EllipseDomain
+import rodshell as rs
+from rodshell.contact.modified_mass import ModifiedMass
+from rodshell.errors import InputError
+from rodshell.model import Freedom
+from rodshell.rods.stretch import Stretch
+from rodshell.solve.summed import SparseSum
+from rodshell.targets.domain import Domain, EllipseDomain
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, RADIUS, STEP, TARGETS, G, Particles, slope
 
 ROUND_OFF = 1e-12  # of numbers of order 1
@@ -51,7 +51,7 @@ def test_a_tail_inside_the_wall_is_moved_by_its_depth_and_not_thrown(name: str, 
         assert np.all(target.contact(particles.state).distance > -1e-9)
 
 
-def _reach(target: gs.Target, way: np.ndarray) -> float:
+def _reach(target: rs.Target, way: np.ndarray) -> float:
     """How far the rim lies from the axis in a direction (2,): by bisection."""
     low, high = 0.0, 1.0
     for _ in range(60):
@@ -75,9 +75,9 @@ def test_no_node_is_corrected_by_more_than_its_depth(name: str) -> None:
 
 SHAPES = {
     **TARGETS,
-    "overhanging cap": gs.Cap(RADIUS, -0.1),
-    "low cap": gs.Cap(RADIUS, 0.12),
-    "rectangle": gs.HeightField(formula="0.1 - x**2", domain=gs.Rectangle((0.3, 0.2))),
+    "overhanging cap": rs.Cap(RADIUS, -0.1),
+    "low cap": rs.Cap(RADIUS, 0.12),
+    "rectangle": rs.HeightField(formula="0.1 - x**2", domain=rs.Rectangle((0.3, 0.2))),
 }
 
 
@@ -92,7 +92,7 @@ def test_what_signs_say_to_be_outside_is_outside(name: str) -> None:
     assert 100 < np.count_nonzero(~outside) < 2900
 
 
-@pytest.mark.parametrize("domain", [gs.Disc(0.2), EllipseDomain(0.2, 0.1), gs.Rectangle((0.3, 0.2))])
+@pytest.mark.parametrize("domain", [rs.Disc(0.2), EllipseDomain(0.2, 0.1), rs.Rectangle((0.3, 0.2))])
 def test_a_domain_holds_what_has_no_positive_distance_to_it(domain: Domain) -> None:
     points = np.random.default_rng(8).uniform(-0.3, 0.3, (500, 2))
     np.testing.assert_array_equal(domain.holds(points), domain.distance(points)[0] <= 0)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.paper.two_rods import LENGTH, RATE, run
+import rodshell as rs
+from rodshell.paper.two_rods import LENGTH, RATE, run
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
@@ -30,7 +30,7 @@ def test_the_code_and_the_tests_that_a_row_names_exist(row: list[str]) -> None:
     assert len(code) == row[2].count("`") // 2 > 0
     assert len(tests) == row[3].count("`") // 2 > 0
     for path, symbol in code:
-        module = import_module("gridshell." + path.removesuffix(".py").replace("/", "."))
+        module = import_module("rodshell." + path.removesuffix(".py").replace("/", "."))
         found = reduce(getattr, symbol.split("."), module)
         assert found is not None
     for path, name in tests:
@@ -51,7 +51,7 @@ def test_targets_are_those_of_equation_13() -> None:
     xy = np.array([[0.0, 0.0], [0.1, 0.05], [-0.03, 0.12], [0.02, -0.14]])
     x, y = xy.T
     found = [
-        gs.Hemisphere(0.2).height(xy), gs.Paraboloid(0.2, 0.12).height(xy), gs.Ellipsoid(0.2, 0.15, 0.12).height(xy),
+        rs.Hemisphere(0.2).height(xy), rs.Paraboloid(0.2, 0.12).height(xy), rs.Ellipsoid(0.2, 0.15, 0.12).height(xy),
     ]  # fmt: skip
     wanted = [
         np.sqrt(0.2**2 - x**2 - y**2),
@@ -59,16 +59,16 @@ def test_targets_are_those_of_equation_13() -> None:
         0.12 * np.sqrt(1 - x**2 / 0.2**2 - y**2 / 0.15**2),
     ]
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
-    assert np.isnan(gs.Hemisphere(0.2).height(np.array([[0.2, 0.01]]))).all()
+    assert np.isnan(rs.Hemisphere(0.2).height(np.array([[0.2, 0.01]]))).all()
 
 
 def test_rod_1_is_led_as_equation_7_says() -> None:
     """x_11 = L/2 (cos wt, sin wt, 0) at 10 rpm, and the joint stays; twisted, the first angle is w t."""
-    turned = run("bending", gs.Linker(), gs.SharedDofs(), until=0.5)
+    turned = run("bending", rs.Linker(), rs.SharedDofs(), until=0.5)
     rate = 10 * 2 * np.pi / 60
     way = 0.5 * LENGTH * np.column_stack([np.cos(rate * turned.times), np.sin(rate * turned.times), 0 * turned.times])
     np.testing.assert_allclose(turned.nodes[:, 0, 0], way, atol=1e-12)
     np.testing.assert_allclose(turned.nodes[:, 0, 2], 0.0, atol=1e-12)
     assert pytest.approx(rate) == RATE
-    twisted = run("twisting", gs.Linker(), gs.SharedDofs(), until=0.5)
+    twisted = run("twisting", rs.Linker(), rs.SharedDofs(), until=0.5)
     np.testing.assert_allclose(twisted.twists[:, 0], rate * twisted.times, atol=1e-12)

@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gridshell.paper import fig1
-from gridshell.paper.drapes import Case
-from gridshell.targets import Hemisphere
+from rodshell.paper import fig1
+from rodshell.paper.drapes import Case
+from rodshell.targets import Hemisphere
 from tests.paper.falls import RADIUS
 
 CASE = Case("a", Hemisphere(RADIUS), (9, 9), spacing=0.04, edge=0.01)

@@ -8,12 +8,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.paper.fig4 import make
-from gridshell.paper.two_rods import LENGTH, RATE, ROD, STEP, run, run_statics
+import rodshell as rs
+from rodshell.paper.fig4 import make
+from rodshell.paper.two_rods import LENGTH, RATE, ROD, STEP, run, run_statics
 
-JOINTS = {"linker": gs.Linker(), "pin": gs.Pin(), "ball": gs.Ball(), "shear spring": gs.Spring(1e-3)}
-COUPLINGS = {"shared": gs.SharedDofs(), "implicit": gs.ImplicitPenalty(), "explicit": gs.ExplicitPenalty()}
+JOINTS = {"linker": rs.Linker(), "pin": rs.Pin(), "ball": rs.Ball(), "shear spring": rs.Spring(1e-3)}
+COUPLINGS = {"shared": rs.SharedDofs(), "implicit": rs.ImplicitPenalty(), "explicit": rs.ExplicitPenalty()}
 UNTIL = 1.5  # a quarter of a revolution
 
 
@@ -37,9 +37,9 @@ def test_rod_2_turns_as_fast_as_rod_1(demonstration, joint, coupling):
 @pytest.mark.parametrize("demonstration", ["twisting", "bending"])
 def test_explicit_ties_start_up_as_implicit_ones_do_with_the_same_step(demonstration):
     explicit = demonstrated(demonstration, "linker", "explicit")
-    same = gs.ExplicitPenalty().of(ROD, LENGTH / 4)
-    ties = gs.ImplicitPenalty(C1=same.C1, C2=same.C2)
-    implicit = run(demonstration, gs.Linker(), ties, until=0.1, step=explicit.step)
+    same = rs.ExplicitPenalty().of(ROD, LENGTH / 4)
+    ties = rs.ImplicitPenalty(C1=same.C1, C2=same.C2)
+    implicit = run(demonstration, rs.Linker(), ties, until=0.1, step=explicit.step)
     every = round(STEP / explicit.step)
     at_its_times = implicit.lag[::every]
     early = explicit.lag[: len(at_its_times)]
@@ -60,10 +60,10 @@ def test_a_spring_about_the_normal_is_all_that_bending_needs():
     assert demonstrated("bending", "shear spring", "shared").follows
 
 
-@pytest.mark.parametrize("coupling", [gs.SharedDofs(), gs.ImplicitPenalty()])
+@pytest.mark.parametrize("coupling", [rs.SharedDofs(), rs.ImplicitPenalty()])
 @pytest.mark.parametrize("demonstration", ["twisting", "bending"])
 def test_in_statics_rod_2_is_where_rod_1_is(demonstration, coupling):
-    one = run_statics(demonstration, gs.Linker(), coupling, until=UNTIL)
+    one = run_statics(demonstration, rs.Linker(), coupling, until=UNTIL)
     assert len(one.times) == 16
     assert one.start_up_lag < 1e-6  # 5e-8 measured: the stepper's tolerance
     assert np.allclose(np.linalg.norm(np.diff(one.nodes, axis=2), axis=-1), LENGTH / 4, rtol=1e-8)

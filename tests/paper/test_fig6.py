@@ -9,13 +9,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.formfinding.fall import Fall
-from gridshell.output.view import TOWARDS
-from gridshell.paper import drape_pictures
-from gridshell.paper.drapefigure import DrapeFigure
-from gridshell.paper.drapes import METHODS, Case, Drape, drape_all
-from gridshell.paper.panels import standing
+import rodshell as rs
+from rodshell.formfinding.fall import Fall
+from rodshell.output.view import TOWARDS
+from rodshell.paper import drape_pictures
+from rodshell.paper.drapefigure import DrapeFigure
+from rodshell.paper.drapes import METHODS, Case, Drape, drape_all
+from rodshell.paper.panels import standing
 from tests.paper.falls import HEMISPHERE
 
 CASE = Case("a", HEMISPHERE, (7, 7), spacing=0.06, edge=0.03)
@@ -32,7 +32,7 @@ def by(method: str) -> Drape:
 
 def test_the_net_that_g0_is_held_against_is_the_spheres_exact_one() -> None:
     for rod, net in zip(by("paper").trimmed.mesh.grid.rods, by("paper").net, strict=True):
-        np.testing.assert_allclose(np.abs(net), gs.sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
+        np.testing.assert_allclose(np.abs(net), rs.sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
 
 
 def test_the_bound_drape_gives_the_net_and_the_falls_come_out_short_of_it_alike() -> None:

@@ -7,10 +7,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from gridshell.joints import ExplicitPenalty
-from gridshell.paper import fig8
-from gridshell.paper.bare_solves import BareSolves
-from gridshell.paper.drapes import Case
+from rodshell.joints import ExplicitPenalty
+from rodshell.paper import fig8
+from rodshell.paper.bare_solves import BareSolves
+from rodshell.paper.drapes import Case
 from tests.paper.falls import HEMISPHERE
 
 CASE = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from gridshell.cli import main, paper
-from gridshell.paper import FIGURES
+from rodshell.cli import main, paper
+from rodshell.paper import FIGURES
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, status: dict[str, str]) -> None:
 def test_a_figure_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["paper", "fig5"]) == 2
     names = ", ".join(FIGURES)
-    refused = f"gridshell: error: there is no figure fig5 here: the figures are {names}; or all\n"
+    refused = f"rodshell: error: there is no figure fig5 here: the figures are {names}; or all\n"
     assert capsys.readouterr().err == refused
 
 
@@ -64,4 +64,4 @@ def test_a_figure_that_does_not_converge_does_not_stop_the_others(
 
 def test_every_figure_is_a_module_that_makes_it() -> None:
     for name in FIGURES:
-        assert callable(__import__(f"gridshell.paper.{name}", fromlist=["make"]).make)
+        assert callable(__import__(f"rodshell.paper.{name}", fromlist=["make"]).make)

@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-import gridshell as gs
-from gridshell.cli import main
-from gridshell.errors import InputError
-from gridshell.formfinding import Footprint, FoundForm, find_stages
-from gridshell.formfinding.progress import silent
-from gridshell.paper import genetic, genetic_design, genetic_search
-from gridshell.paper.drapes import Case
-from gridshell.paper.fig6 import CASES
-from gridshell.paper.genetic_design import Design
-from gridshell.paper.genetic_history import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
+import rodshell as rs
+from rodshell.cli import main
+from rodshell.errors import InputError
+from rodshell.formfinding import Footprint, FoundForm, find_stages
+from rodshell.formfinding.progress import silent
+from rodshell.paper import genetic, genetic_design, genetic_search
+from rodshell.paper.drapes import Case
+from rodshell.paper.fig6 import CASES
+from rodshell.paper.genetic_design import Design
+from rodshell.paper.genetic_history import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
 from tests.paper.falls import HEMISPHERE, PAPER_ROD
 
 SMALL = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)
 POPULATION, MOST, SEED = 6, 3, 3
-LEANING = gs.HeightField(formula="0.12 + 0.2*x - 2.5*x^2 - 2*y^2", domain=gs.Disc(0.2))
+LEANING = rs.HeightField(formula="0.12 + 0.2*x - 2.5*x^2 - 2*y^2", domain=rs.Disc(0.2))
 LEANS = Case("d", LEANING, (5, 5), spacing=0.06, edge=0.03)
 
 
@@ -243,7 +243,7 @@ def test_a_search_says_where_it_is_in_every_generation(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "{", "[]", '{"format": "gridshell-genetic-values", "version": 1}', '{"format": "other"}'],
+    "text", ["", "{", "[]", '{"format": "rodshell-genetic-values", "version": 1}', '{"format": "other"}'],
 )  # fmt: skip
 def test_a_broken_file_is_refused_in_one_sentence(text: str, tmp_path: Path) -> None:
     file = tmp_path / f"hemisphere-seed{SEED}.json"
@@ -278,7 +278,7 @@ def test_values_of_another_search_are_refused(tmp_path: Path) -> None:
 
 def test_without_pymoo_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "pymoo.algorithms.soo.nonconvex.de", None)
-    with pytest.raises(InputError, match=r'needs the package pymoo: pip install "gridshell\[paper\]"'):
+    with pytest.raises(InputError, match=r'needs the package pymoo: pip install "rodshell\[paper\]"'):
         find(tmp_path)
     genetic.make(silent, cases=CASES[1:2])  # the searches that are kept need no such package
 

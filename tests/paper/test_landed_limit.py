@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.contact.modified_mass import ModifiedMass
-from gridshell.errors import StabilityError
-from gridshell.formfinding.fall import Fall
-from gridshell.joints import ExplicitPenalty, Ties
-from gridshell.layout import mesh_grid
-from gridshell.model import Freedom, Shell
-from gridshell.solve.constraint import Supports
-from gridshell.solve.contact_euler import ContactEuler
-from gridshell.solve.forces import Gravity
-from gridshell.solve.implicit_euler import Motion, Step
-from gridshell.solve.step_limit import step_limit
+import rodshell as rs
+from rodshell.contact.modified_mass import ModifiedMass
+from rodshell.errors import StabilityError
+from rodshell.formfinding.fall import Fall
+from rodshell.joints import ExplicitPenalty, Ties
+from rodshell.layout import mesh_grid
+from rodshell.model import Freedom, Shell
+from rodshell.solve.constraint import Supports
+from rodshell.solve.contact_euler import ContactEuler
+from rodshell.solve.forces import Gravity
+from rodshell.solve.implicit_euler import Motion, Step
+from rodshell.solve.step_limit import step_limit
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, coarse_layout, slope
 
 C = 3.0  # N/m
@@ -70,7 +70,7 @@ def test_a_stopped_node_tied_to_a_free_one() -> None:
     assert np.abs(swing(motion, 1.02 * limit)).max() > 30 * APART
 
 
-def explicit_shell(rod: gs.Rod = PAPER_ROD, stiffness: float = C) -> Shell:
+def explicit_shell(rod: rs.Rod = PAPER_ROD, stiffness: float = C) -> Shell:
     layout = coarse_layout()
     ties = ExplicitPenalty(C1=stiffness)
     return Shell.of(mesh_grid(layout.flat_grid((7, 7), 0.9), layout.edge), rod, coupling=ties)
@@ -81,14 +81,14 @@ def test_a_step_that_the_flat_grid_bears_is_refused_once_it_has_landed() -> None
     step = 0.97 * step_limit(Motion.of(shell), shell.state(shell.mesh.flat))
     fall = Fall(coupling=ExplicitPenalty(C1=C), time_step=step, duration=0.6)
     with pytest.raises(StabilityError, match=r"once the grid has landed: at t = 0\.\d+ s, \d+ nodes touching"):
-        gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
     # what is stopped along the normal alone keeps its velocity along the surface
     sliding = replace(fall, stopped="along the normal")
-    assert gs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=sliding).rest is not None
+    assert rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=sliding).rest is not None
 
 
 def test_without_a_time_step_the_fall_takes_one_that_is_borne_whatever_touches() -> None:
-    thick, stiffness = gs.Rod(gs.Circle(radius=3e-3), gs.Material(1e6, 1e3)), 30.0
+    thick, stiffness = rs.Rod(rs.Circle(radius=3e-3), rs.Material(1e6, 1e3)), 30.0
     shell = explicit_shell(thick, stiffness)
     alone = replace(Motion.of(shell), elements=())
     state = shell.state(shell.mesh.flat)
@@ -99,6 +99,6 @@ def test_without_a_time_step_the_fall_takes_one_that_is_borne_whatever_touches()
     # the rods help, but not wherever they are and whatever touches
     assert step_limit(Motion.of(shell), state, stopped=np.arange(len(state))) > 1.05 * borne
     fall = Fall(coupling=ExplicitPenalty(C1=stiffness), duration=0.08)  # not landed: no step is taken in halves
-    draped = gs.drape(coarse_layout(), thick, HEMISPHERE, method="paper", fall=fall)
+    draped = rs.drape(coarse_layout(), thick, HEMISPHERE, method="paper", fall=fall)
     assert draped.rest is not None
     assert draped.rest.steps == np.ceil(0.08 / (0.9 * borne))

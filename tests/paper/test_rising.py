@@ -5,19 +5,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.errors import InputError
-from gridshell.formfinding.rising import Rise, Risen, pop_up_in_time
-from gridshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
+import rodshell as rs
+from rodshell.errors import InputError
+from rodshell.formfinding.rising import Rise, Risen, pop_up_in_time
+from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS
 
 COUPLINGS: dict[str, Coupling] = {"shared": SharedDofs(), "implicit": ImplicitPenalty(), "explicit": ExplicitPenalty()}
 
 
 @cache
-def form() -> gs.Form:
-    layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.05, edge=0.025, length=0.9)
-    return gs.find_form(HEMISPHERE, layout, PAPER_ROD, ends=("pinned",))
+def form() -> rs.Form:
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.05, edge=0.025, length=0.9)
+    return rs.find_form(HEMISPHERE, layout, PAPER_ROD, ends=("pinned",))
 
 
 @cache

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gridshell.paper import studies
-from gridshell.paper.studies import Line, Studies
+from rodshell.paper import studies
+from rodshell.paper.studies import Line, Studies
 from tests.paper.falls import coarse_layout
 
 

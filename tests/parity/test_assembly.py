@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.linalg import eigvalsh, norm
 
-from gridshell.model import Assembly, Freedom
-from gridshell.solve.linear import Qdldl, SingularError
+from rodshell.model import Assembly, Freedom
+from rodshell.solve.linear import Qdldl, SingularError
 
 BLOCKS = 14
 WIDTHS = (1, 2, 3, 5)  # blocks of a surface curvature, an edge, a bend, a bend with twist

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.linalg import solveh_banded
 
-from gridshell.model import Freedom
-from gridshell.solve.banded import Banded
-from gridshell.solve.constraint import NO_CURVATURE
-from gridshell.solve.linear import SingularError
-from gridshell.solve.summed import WIDEST, SparseSum, narrow_or_sparse
+from rodshell.model import Freedom
+from rodshell.solve.banded import Banded
+from rodshell.solve.constraint import NO_CURVATURE
+from rodshell.solve.linear import SingularError
+from rodshell.solve.summed import WIDEST, SparseSum, narrow_or_sparse
 
 BLOCKS = 40
 

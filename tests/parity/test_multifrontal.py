@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sparse
 
-from gridshell.solve import dense, multifrontal
-from gridshell.solve.linear import Qdldl, SingularError
-from gridshell.solve.multifrontal import Multifrontal
-from gridshell.solve.ordering import dissect
+from rodshell.solve import dense, multifrontal
+from rodshell.solve.linear import Qdldl, SingularError
+from rodshell.solve.multifrontal import Multifrontal
+from rodshell.solve.ordering import dissect
 
 RANDOM = np.random.default_rng(20211)
 

@@ -14,14 +14,14 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
-import gridshell as gs
-from gridshell.contact.bound import BoundToTarget
-from gridshell.model import Assembly, Shell
-from gridshell.rods.stretch import Stretch
+import rodshell as rs
+from rodshell.contact.bound import BoundToTarget
+from rodshell.model import Assembly, Shell
+from rodshell.rods.stretch import Stretch
 
 SAME = 1e-9  # of the size, see above
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-ELLIPSOID = gs.Ellipsoid(0.2, 0.15, 0.12)
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+ELLIPSOID = rs.Ellipsoid(0.2, 0.15, 0.12)
 TURN = 0.4  # rad, of no symmetry
 
 
@@ -34,25 +34,25 @@ def turned_hill(x, y):
     return hill(cos(TURN) * x + sin(TURN) * y, cos(TURN) * y - sin(TURN) * x)
 
 
-HILL, TURNED_HILL = (gs.HeightField(function=function, domain=gs.Disc(0.2)) for function in (hill, turned_hill))
+HILL, TURNED_HILL = (rs.HeightField(function=function, domain=rs.Disc(0.2)) for function in (hill, turned_hill))
 CASES = {  # target, layout options, anchor
-    "hemisphere": (gs.Hemisphere(0.2), {}, None),
-    "paraboloid": (gs.Paraboloid(0.2, 0.12), {}, None),
+    "hemisphere": (rs.Hemisphere(0.2), {}, None),
+    "paraboloid": (rs.Paraboloid(0.2, 0.12), {}, None),
     "ellipsoid, turned": (ELLIPSOID, {"rotate": 0.5}, None),
-    "hemisphere, off-centre": (gs.Hemisphere(0.2), {}, (0.03, 0.02)),
-    "hemisphere, shifted by half a spacing": (gs.Hemisphere(0.2), {"offset": (0.025, 0.025)}, None),
+    "hemisphere, off-centre": (rs.Hemisphere(0.2), {}, (0.03, 0.02)),
+    "hemisphere, shifted by half a spacing": (rs.Hemisphere(0.2), {"offset": (0.025, 0.025)}, None),
     "hill": (HILL, {}, (0.02, 0.01)),
 }
 every_case = pytest.mark.parametrize("name", CASES)
 
 
 def layout_of(**options):
-    return gs.GridLayout.orthogonal(**{"spacing": 0.05, "edge": 0.0125} | options)
+    return rs.GridLayout.orthogonal(**{"spacing": 0.05, "edge": 0.0125} | options)
 
 
 def drape_case(name, **options):
     target, own, anchor = CASES[name]
-    return gs.drape(layout_of(**own, **options), ROD, target, anchor=anchor)
+    return rs.drape(layout_of(**own, **options), ROD, target, anchor=anchor)
 
 
 def turned(points, angle):
@@ -100,7 +100,7 @@ def test_nodes_lie_on_the_sphere():
 
 @every_case
 def test_rods_end_where_the_target_ends(name):
-    trimmed = gs.trim(drape_case(name))
+    trimmed = rs.trim(drape_case(name))
     margin = trimmed.draped.target.margin(trimmed.boundary.points)
     # G0 is the net's. Between joints the bound rods leave the net, most where they graze the end: by 4e-3 of the
     # size on the turned ellipsoid, by 5e-4 or less on the others
@@ -108,7 +108,7 @@ def test_rods_end_where_the_target_ends(name):
 
 
 def test_rods_of_a_denser_grid_end_closer_to_the_targets_end():
-    ends = [gs.trim(drape_case("ellipsoid, turned", spacing=h, edge=h / 4)).boundary.points for h in (0.05, 0.025)]
+    ends = [rs.trim(drape_case("ellipsoid, turned", spacing=h, edge=h / 4)).boundary.points for h in (0.05, 0.025)]
     coarse, fine = (np.abs(ELLIPSOID.margin(points)).max() for points in ends)
     assert fine < coarse / 8  # 0.88 and 0.06 mm
 
@@ -273,9 +273,9 @@ def test_draped_state_is_a_minimum_among_the_states_bound_to_the_target(name):
 @pytest.mark.parametrize("scale", [1e-3, 100.0])
 def test_scale_and_material_do_not_enter(scale):
     small = drape_case("hemisphere")
-    rod = gs.Rod(section=gs.Circle(3e-3), material=gs.Material(youngs_modulus=2.5e10, density=7e3))
-    target = gs.Hemisphere(0.2 * scale)
-    large = gs.drape(layout_of(spacing=0.05 * scale, edge=0.0125 * scale), rod, target)
+    rod = rs.Rod(section=rs.Circle(3e-3), material=rs.Material(youngs_modulus=2.5e10, density=7e3))
+    target = rs.Hemisphere(0.2 * scale)
+    large = rs.drape(layout_of(spacing=0.05 * scale, edge=0.0125 * scale), rod, target)
     np.testing.assert_allclose(large.positions / scale, small.positions, rtol=0, atol=SAME * 0.2)
     assert large.report.factorizations == small.report.factorizations
     assert large.pulls == small.pulls
@@ -288,26 +288,26 @@ def test_hemisphere_keeps_the_symmetry_of_the_square_grid():
 
 
 def test_ellipsoid_keeps_its_two_mirrors():
-    x = gs.drape(layout_of(), ROD, ELLIPSOID).positions
+    x = rs.drape(layout_of(), ROD, ELLIPSOID).positions
     for image in (x * [-1, 1, 1], x * [1, -1, 1]):
         assert mismatch(image, x) < SAME * 0.2
     assert mismatch(turned(x, pi / 2), x) > 0.01  # and no more
 
 
 def test_heading_turns_the_grid_on_a_hemisphere():
-    ahead, aside = drape_case("hemisphere"), gs.drape(layout_of(rotate=TURN), ROD, gs.Hemisphere(0.2))
+    ahead, aside = drape_case("hemisphere"), rs.drape(layout_of(rotate=TURN), ROD, rs.Hemisphere(0.2))
     np.testing.assert_allclose(aside.positions, turned(ahead.positions, TURN), rtol=0, atol=SAME * 0.2)
 
 
 def test_target_and_heading_turned_together_turn_the_grid():
     ahead = drape_case("hill")
     anchor = turned(np.array([0.02, 0.01, 0.0]), TURN)[:2]
-    aside = gs.drape(layout_of(rotate=TURN), ROD, TURNED_HILL, anchor=tuple(anchor))
+    aside = rs.drape(layout_of(rotate=TURN), ROD, TURNED_HILL, anchor=tuple(anchor))
     np.testing.assert_allclose(aside.positions, turned(ahead.positions, TURN), rtol=0, atol=SAME * 0.2)
 
 
 def test_heading_of_a_right_angle_swaps_the_families():
-    ahead, aside = (gs.drape(layout_of(rotate=angle), ROD, ELLIPSOID) for angle in (0.0, pi / 2))
+    ahead, aside = (rs.drape(layout_of(rotate=angle), ROD, ELLIPSOID) for angle in (0.0, pi / 2))
     assert mismatch(ahead.positions, aside.positions) < SAME * 0.2
     for family, other in ("uv", "vu"):
         lengths = [(rod.offset, rod.length) for rod in ahead.rods if rod.family == family]
@@ -318,14 +318,14 @@ def test_heading_of_a_right_angle_swaps_the_families():
 @pytest.mark.parametrize("counts", [{}, {"rods": (9, 7)}, {"rods": (8, 6)}], ids=["auto", "odd", "even"])
 def test_spacings_along_x_and_y_keep_to_their_families(counts):
     """Spacing [u, v]: the rods along x lie su apart; exchanging the two turns the grid on a hemisphere."""
-    wide = gs.drape(layout_of(spacing=(0.04, 0.06), **counts), ROD, gs.Hemisphere(0.2))
+    wide = rs.drape(layout_of(spacing=(0.04, 0.06), **counts), ROD, rs.Hemisphere(0.2))
     offsets = {family: [rod.offset for rod in wide.rods if rod.family == family] for family in "uv"}
     for family, side, spacing in (("u", 0, 0.04), ("v", 1, 0.06)):
         np.testing.assert_allclose(np.diff(offsets[family]), spacing)
         np.testing.assert_allclose(np.sum(offsets[family]), 0.0, rtol=0, atol=1e-12)
         assert not counts or len(offsets[family]) == counts["rods"][side]
     swapped = {name: pair[::-1] for name, pair in counts.items()}
-    high = gs.drape(layout_of(spacing=(0.06, 0.04), **swapped), ROD, gs.Hemisphere(0.2))
+    high = rs.drape(layout_of(spacing=(0.06, 0.04), **swapped), ROD, rs.Hemisphere(0.2))
     assert mismatch(turned(wide.positions, pi / 2), high.positions) < SAME * 0.2
 
 
@@ -334,8 +334,8 @@ def test_spacings_along_x_and_y_keep_to_their_families(counts):
 
 @every_case
 def test_footprint_rods_lie_in_the_flat_plane_as_long_as_in_space(name):
-    trimmed = gs.trim(drape_case(name))
-    footprint = gs.map_back(trimmed)
+    trimmed = rs.trim(drape_case(name))
+    footprint = rs.map_back(trimmed)
     ends = footprint.points.reshape(-1, 2, 2)
     for rod, (start, end) in zip(footprint.rods, ends, strict=True):
         along, across = (0, 1) if rod.family == "u" else (1, 0)
@@ -350,7 +350,7 @@ def test_footprint_rods_lie_in_the_flat_plane_as_long_as_in_space(name):
 
 def test_end_directions_point_outwards_and_down_along_the_rods():
     """On a sphere they are tangents; a middle rod, a great circle, goes straight down into the base."""
-    trimmed = gs.trim(drape_case("hemisphere"))
+    trimmed = rs.trim(drape_case("hemisphere"))
     boundary = trimmed.boundary
     np.testing.assert_allclose(np.linalg.norm(boundary.tangents, axis=1), 1.0, rtol=1e-14)
     across = np.einsum("ij,ij->i", boundary.tangents, boundary.points) / 0.2
@@ -364,7 +364,7 @@ def test_end_directions_point_outwards_and_down_along_the_rods():
 def test_many_short_edges_take_no_more_factorisations_than_few_long_ones():
     """Bending outweighs a penalty that does not follow the edge length: forces then settle slowly."""
     few, many = (
-        gs.drape(gs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 6), ROD, gs.Hemisphere(0.2)).report
+        rs.drape(rs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 6), ROD, rs.Hemisphere(0.2)).report
         for spacing in (0.03, 0.008)
     )
     assert many.dofs > 10 * few.dofs

@@ -6,28 +6,28 @@ import numpy as np
 import pytest
 from elastic_twins import ElasticTwin
 
-import gridshell as gs
-from gridshell.contact.unilateral import UnilateralContact
-from gridshell.errors import InputError
-from gridshell.solve.report import Status
+import rodshell as rs
+from rodshell.contact.unilateral import UnilateralContact
+from rodshell.errors import InputError
+from rodshell.solve.report import Status
 
 RADIUS, GRAVITY = 0.2, 9.81
-HEMISPHERE = gs.Hemisphere(RADIUS)
+HEMISPHERE = rs.Hemisphere(RADIUS)
 
 
 def rod_of(factor=1.0):
     """The paper's rod with EA times `factor`; EI and mass as they are."""
-    section = gs.Circle(radius=1e-3 / np.sqrt(factor))
-    return gs.Rod(section=section, material=gs.Material(youngs_modulus=1e6 * factor**2, density=1e3 * factor))
+    section = rs.Circle(radius=1e-3 / np.sqrt(factor))
+    return rs.Rod(section=section, material=rs.Material(youngs_modulus=1e6 * factor**2, density=1e3 * factor))
 
 
 def layout_of(**options):
-    return gs.GridLayout.orthogonal(**{"rods": (9, 9), "spacing": 0.05, "length": 0.9, "edge": 0.0125} | options)
+    return rs.GridLayout.orthogonal(**{"rods": (9, 9), "spacing": 0.05, "length": 0.9, "edge": 0.0125} | options)
 
 
 @cache
 def draped_with(factor=1.0):
-    return gs.drape(layout_of(), rod_of(factor), HEMISPHERE, method="gravity", gravity=GRAVITY)
+    return rs.drape(layout_of(), rod_of(factor), HEMISPHERE, method="gravity", gravity=GRAVITY)
 
 
 def body_normals(x):
@@ -100,8 +100,8 @@ def test_the_body_carries_the_whole_weight():
 
 def ends_off_the_net(draped):
     """(2m,) how much shorter than the inextensible net's each half of a trimmed rod is [m]."""
-    rods = gs.trim(draped).mesh.grid.rods
-    halves = [(abs(end), gs.sphere_net_end(RADIUS, rod.offset)) for rod in rods for end in (rod.start, rod.end)]
+    rods = rs.trim(draped).mesh.grid.rods
+    halves = [(abs(end), rs.sphere_net_end(RADIUS, rod.offset)) for rod in rods for end in (rod.start, rod.end)]
     return np.array([exact - found for found, exact in halves])
 
 
@@ -126,23 +126,23 @@ def test_strain_follows_from_the_weight_that_hangs():
 
 def test_lines_and_lengths_that_the_layout_leaves_open_are_found():
     layout = layout_of(rods="auto", length="auto", spacing=0.06, edge=0.02)
-    draped = gs.drape(layout, rod_of(), HEMISPHERE, method="gravity")
+    draped = rs.drape(layout, rod_of(), HEMISPHERE, method="gravity")
     assert draped.converged
-    whole, cut = {rod.name: rod for rod in draped.rods}, gs.trim(draped).mesh.grid.rods
+    whole, cut = {rod.name: rod for rod in draped.rods}, rs.trim(draped).mesh.grid.rods
     assert len(whole) >= len(cut) >= 10
     assert all(whole[rod.name].start < rod.start < rod.end < whole[rod.name].end for rod in cut)
 
 
 def test_off_the_middle_the_grid_slides_off_and_this_is_said():
     """Nothing holds a frictionless grid but its anchor: at half the radius it turns about it and slides down."""
-    draped = gs.drape(layout_of(edge=0.05 / 3), rod_of(), HEMISPHERE, method="gravity", anchor=(0.1, 0.0))
+    draped = rs.drape(layout_of(edge=0.05 / 3), rod_of(), HEMISPHERE, method="gravity", anchor=(0.1, 0.0))
     assert not draped.converged
     assert draped.report.status in (Status.SLID_OFF, Status.STALLED)
     assert len(draped.report.status.sentence) > 20
 
 
 def test_a_grid_that_slid_off_advises_the_bound_drape():
-    form = gs.find_form(HEMISPHERE, layout_of(edge=0.05), rod_of(), method="gravity", anchor=(0.05, 0.02))
+    form = rs.find_form(HEMISPHERE, layout_of(edge=0.05), rod_of(), method="gravity", anchor=(0.05, 0.02))
     assert form.draped.report.status is Status.SLID_OFF
     assert form.status.startswith("drape")
     assert "method = bound" in form.status
@@ -153,8 +153,8 @@ def test_a_grid_that_slid_off_advises_the_bound_drape():
 def test_a_saddle_is_reported_with_its_negative_modes():
     """Across an ellipsoid's long top the grid sits like a rope over a pulley. (On finer meshes round-off decides
     whether the descent ends there or slides off.)"""
-    layout = gs.GridLayout.orthogonal(spacing=0.04, edge=0.04)
-    draped = gs.drape(layout, rod_of(), gs.Ellipsoid(0.2, 0.15, 0.12), method="gravity")
+    layout = rs.GridLayout.orthogonal(spacing=0.04, edge=0.04)
+    draped = rs.drape(layout, rod_of(), rs.Ellipsoid(0.2, 0.15, 0.12), method="gravity")
     assert draped.converged
     assert draped.report.negative_modes == 1
     assert not draped.report.stable
@@ -167,13 +167,13 @@ def test_a_saddle_is_reported_with_its_negative_modes():
 )
 def test_impossible_inputs_are_refused(options, names):
     with pytest.raises(InputError, match=names):
-        gs.drape(layout_of(), rod_of(), HEMISPHERE, method="gravity", **options)
+        rs.drape(layout_of(), rod_of(), HEMISPHERE, method="gravity", **options)
 
 
 def test_rods_too_short_to_hang_over_the_end_are_named():
-    draped = gs.drape(layout_of(rods=(5, 5), length=0.4, edge=0.05), rod_of(), HEMISPHERE, method="gravity")
+    draped = rs.drape(layout_of(rods=(5, 5), length=0.4, edge=0.05), rod_of(), HEMISPHERE, method="gravity")
     with pytest.raises(InputError, match="too short to reach the end of the target"):
-        gs.trim(draped)
+        rs.trim(draped)
 
 
 # The contact energy
@@ -213,7 +213,7 @@ def slope(steps, remainders):
     return np.polyfit(np.log(steps), np.log(remainders), 1)[0]
 
 
-@pytest.mark.parametrize("target", [HEMISPHERE, gs.Ellipsoid(0.2, 0.15, 0.12), gs.Cap(0.25, 0.1)], ids=lambda t: t.name)
+@pytest.mark.parametrize("target", [HEMISPHERE, rs.Ellipsoid(0.2, 0.15, 0.12), rs.Cap(0.25, 0.1)], ids=lambda t: t.name)
 def test_contact_energy_has_the_gradient_and_hessian_that_taylor_asks_for(target):
     contact, state, ray = contact_case(target, 1)
     energy, gradient, hessians = evaluate(contact, state)

@@ -7,27 +7,27 @@ import numpy as np
 import pytest
 from numpy.linalg import norm
 
-import gridshell as gs
-from gridshell.checks.joint_loads import joint_loads
-from gridshell.checks.reactions import reactions
-from gridshell.joints.crossings import Places
-from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import find_equilibrium
-from gridshell.solve.problem import Problem
+import rodshell as rs
+from rodshell.checks.joint_loads import joint_loads
+from rodshell.checks.reactions import reactions
+from rodshell.joints.crossings import Places
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import find_equilibrium
+from rodshell.solve.problem import Problem
 
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 SPACING = 0.05
 SPAN = ROD.bend_stiffness / SPACING  # N m/rad
-THIN = gs.Rod(section=gs.Circle(radius=4e-4), material=gs.Material(youngs_modulus=1e6, density=1e3))
+THIN = rs.Rod(section=rs.Circle(radius=4e-4), material=rs.Material(youngs_modulus=1e6, density=1e3))
 JOINTS = {
-    "ball": gs.Ball(),
-    "pin": gs.Pin(),
-    "spring": gs.Spring(0.1 * SPAN, 3 * SPAN, SPAN),
-    "rigid": gs.Rigid(),
-    "two linkers": gs.Linker(rod=THIN),
-    "four linkers": gs.Linker(rod=THIN, corners=4),
-    "eccentric pin": gs.Pin(eccentricity=2e-4),
-    "eccentric spring": gs.Spring(0.0, SPAN, SPAN, eccentricity=2e-4),
+    "ball": rs.Ball(),
+    "pin": rs.Pin(),
+    "spring": rs.Spring(0.1 * SPAN, 3 * SPAN, SPAN),
+    "rigid": rs.Rigid(),
+    "two linkers": rs.Linker(rod=THIN),
+    "four linkers": rs.Linker(rod=THIN, corners=4),
+    "eccentric pin": rs.Pin(eccentricity=2e-4),
+    "eccentric spring": rs.Spring(0.0, SPAN, SPAN, eccentricity=2e-4),
 }
 every_joint = pytest.mark.parametrize("name", JOINTS)
 
@@ -35,14 +35,14 @@ every_joint = pytest.mark.parametrize("name", JOINTS)
 @cache
 def trimmed():
     """An ellipsoid turned under the grid: no symmetry."""
-    layout = gs.GridLayout.orthogonal(rods="auto", spacing=SPACING, length="auto", edge=0.0126, rotate=0.3)
-    return gs.trim(gs.drape(layout, ROD, gs.Ellipsoid(a=0.2, b=0.16, c=0.13)))
+    layout = rs.GridLayout.orthogonal(rods="auto", spacing=SPACING, length="auto", edge=0.0126, rotate=0.3)
+    return rs.trim(rs.drape(layout, ROD, rs.Ellipsoid(a=0.2, b=0.16, c=0.13)))
 
 
 @cache
 def popped(name, ends="clamped", start="draped"):
     cut = trimmed()
-    return gs.pop_up(gs.map_back(cut), cut.boundary, ROD, ends=ends, start=start, joint=JOINTS[name])
+    return rs.pop_up(rs.map_back(cut), cut.boundary, ROD, ends=ends, start=start, joint=JOINTS[name])
 
 
 def settled(shell, state, forces):
@@ -116,10 +116,10 @@ def test_pins_from_flat_reach_the_state_that_the_drape_releases_to():
 
 
 def test_soft_joints_pop_up_like_balls_and_stiff_ones_like_welds():
-    soft = gs.Spring(1e-6 * SPAN, 1e-6 * SPAN, 1e-6 * SPAN)
+    soft = rs.Spring(1e-6 * SPAN, 1e-6 * SPAN, 1e-6 * SPAN)
     cut = trimmed()
-    for joint, like in ((soft, "ball"), (gs.Spring(1e4 * SPAN, inf, inf), "rigid")):
-        other = gs.pop_up(gs.map_back(cut), cut.boundary, ROD, joint=joint)
+    for joint, like in ((soft, "ball"), (rs.Spring(1e4 * SPAN, inf, inf), "rigid")):
+        other = rs.pop_up(rs.map_back(cut), cut.boundary, ROD, joint=joint)
         assert norm(other.positions - popped(like).positions, axis=1).max() < 2e-4 * 0.2
     assert norm(popped("ball").positions - popped("rigid").positions, axis=1).max() > 0.01 * 0.2
 
@@ -127,35 +127,35 @@ def test_soft_joints_pop_up_like_balls_and_stiff_ones_like_welds():
 def test_joints_may_differ_from_place_to_place():
     cut = trimmed()
     count = len(cut.mesh.grid.crossings)
-    mixed = [gs.Rigid() if k % 2 else gs.Ball() for k in range(count)]
-    between = gs.pop_up(gs.map_back(cut), cut.boundary, ROD, joint=mixed)
+    mixed = [rs.Rigid() if k % 2 else rs.Ball() for k in range(count)]
+    between = rs.pop_up(rs.map_back(cut), cut.boundary, ROD, joint=mixed)
     assert between.report.stable
     apart = [norm(between.positions - popped(name).positions) for name in ("ball", "rigid")]
     assert min(apart) > 0.1 * norm(popped("ball").positions - popped("rigid").positions)
-    with pytest.raises(gs.InputError, match=f"{count} crossings: give one for all, or as many, not 3"):
-        gs.pop_up(gs.map_back(cut), cut.boundary, ROD, joint=mixed[:3])
+    with pytest.raises(rs.InputError, match=f"{count} crossings: give one for all, or as many, not 3"):
+        rs.pop_up(rs.map_back(cut), cut.boundary, ROD, joint=mixed[:3])
 
 
 def test_a_gravity_drape_with_pins_ends_where_one_with_balls_does():
     """Pins cost nothing (numerics.md, section 2): they scissor freely, and the rods hardly twist."""
-    layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=SPACING, length=0.9, edge=0.0126)
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=SPACING, length=0.9, edge=0.0126)
     lengths = []
-    for joint in (gs.Ball(), gs.Pin()):
-        fallen = gs.drape(layout, ROD, gs.Hemisphere(radius=0.2), method="gravity", joint=joint)
+    for joint in (rs.Ball(), rs.Pin()):
+        fallen = rs.drape(layout, ROD, rs.Hemisphere(radius=0.2), method="gravity", joint=joint)
         assert fallen.converged
-        lengths.append([rod.length for rod in gs.trim(fallen).mesh.grid.rods])
+        lengths.append([rod.length for rod in rs.trim(fallen).mesh.grid.rods])
     assert np.abs(np.subtract(*lengths)).max() < 2e-3 * 0.2
 
 
 def test_three_rods_at_one_node_have_one_kind_of_joint():
-    grid = gs.straight_rods([[[-1, 0], [1, 0]], [[0, -1], [0, 1]], [[-1, -1], [1, 1]]])
-    mesh = gs.mesh_grid(grid, 0.25)
-    for other in (gs.Linker(), gs.Ball(), gs.Rigid()):
-        with pytest.raises(gs.InputError, match="give all of them one kind"):
-            gs.Shell.of(mesh, ROD, joint=[gs.Pin(), gs.Pin(), other])
+    grid = rs.straight_rods([[[-1, 0], [1, 0]], [[0, -1], [0, 1]], [[-1, -1], [1, 1]]])
+    mesh = rs.mesh_grid(grid, 0.25)
+    for other in (rs.Linker(), rs.Ball(), rs.Rigid()):
+        with pytest.raises(rs.InputError, match="give all of them one kind"):
+            rs.Shell.of(mesh, ROD, joint=[rs.Pin(), rs.Pin(), other])
 
 
 def test_eccentric_joints_refuse_rods_that_need_three_layers():
-    grid = gs.straight_rods([[[-1, 0], [1, 0]], [[0.3, -1], [0.3, 1]], [[-1, -0.8], [1, 1.0]]])
-    with pytest.raises(gs.InputError, match="two layers of rods, but R03 crosses rods of both"):
-        gs.Shell.of(gs.mesh_grid(grid, 0.25), ROD, joint=gs.Pin(eccentricity=1e-3))
+    grid = rs.straight_rods([[[-1, 0], [1, 0]], [[0.3, -1], [0.3, 1]], [[-1, -0.8], [1, 1.0]]])
+    with pytest.raises(rs.InputError, match="two layers of rods, but R03 crosses rods of both"):
+        rs.Shell.of(rs.mesh_grid(grid, 0.25), ROD, joint=rs.Pin(eccentricity=1e-3))

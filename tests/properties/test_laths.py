@@ -3,26 +3,26 @@
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.case import load_case
+import rodshell as rs
+from rodshell.case import load_case
 
-TARGET = gs.Hemisphere(radius=0.2)
-LAYOUT = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, length=1.2, edge=0.02)
-LATH = gs.Rod(gs.RectangularSection(width=1e-3, height=3e-3), gs.Material(11e9, 500.0, shear=0.69e9))
+TARGET = rs.Hemisphere(radius=0.2)
+LAYOUT = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, length=1.2, edge=0.02)
+LATH = rs.Rod(rs.RectangularSection(width=1e-3, height=3e-3), rs.Material(11e9, 500.0, shear=0.69e9))
 
 
 def given(EI1, EI2, GJ=2e-3):
-    return gs.Rod(gs.GivenSection(EA=1e4, EI1=EI1, EI2=EI2, GJ=GJ))
+    return rs.Rod(rs.GivenSection(EA=1e4, EI1=EI1, EI2=EI2, GJ=GJ))
 
 
 def popped(rod, ends):
-    trimmed = gs.trim(gs.drape(LAYOUT, rod, TARGET))
-    return gs.pop_up(gs.map_back(trimmed), trimmed.boundary, rod, ends=ends)
+    trimmed = rs.trim(rs.drape(LAYOUT, rod, TARGET))
+    return rs.pop_up(rs.map_back(trimmed), trimmed.boundary, rod, ends=ends)
 
 
 def test_drape_asks_for_the_stiffness_within_the_surface_alone():
     """And, nothing being stretched, for no other."""
-    states = [gs.drape(LAYOUT, rod, TARGET).positions for rod in (LATH, given(1.0, 7.0), given(3e-3, 3e-3))]
+    states = [rs.drape(LAYOUT, rod, TARGET).positions for rod in (LATH, given(1.0, 7.0), given(3e-3, 3e-3))]
     for other in states[1:]:
         np.testing.assert_allclose(other, states[0], atol=1e-7 * TARGET.radius)
 
@@ -37,22 +37,22 @@ def test_nearly_round_rods_pop_up_as_round_ones():
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_flat_and_upright_laths_pop_up(ends):
     """A dome of flat laths comes nearer to its target than one of laths on edge: these do not like to be curved."""
-    upright = gs.Rod(gs.RectangularSection(width=3e-3, height=1e-3), LATH.material)
+    upright = rs.Rod(rs.RectangularSection(width=3e-3, height=1e-3), LATH.material)
     gaps = []
     for rod in (LATH, upright):
         found = popped(rod, ends)
         assert found.report.stable
-        gaps.append(gs.agreement(found, TARGET).rms)
+        gaps.append(rs.agreement(found, TARGET).rms)
     assert max(gaps) < 0.05 * TARGET.radius
     assert abs(gaps[0] - gaps[1]) > 1e-4 * TARGET.radius  # which way they lie is felt
 
 
 SECTIONS = {
-    "ellipse": ({"a": "1 mm", "b": "2 mm"}, gs.Ellipse(1e-3, 2e-3)),
-    "rectangle": ({"width": "1 mm", "height": "3 mm"}, gs.RectangularSection(1e-3, 3e-3)),
+    "ellipse": ({"a": "1 mm", "b": "2 mm"}, rs.Ellipse(1e-3, 2e-3)),
+    "rectangle": ({"width": "1 mm", "height": "3 mm"}, rs.RectangularSection(1e-3, 3e-3)),
     "given": (
         {"EA": "2 kN", "EI1": "5 N m2", "EI2": "0.006 kN m2", "GJ": "3000000 N mm2", "mass": "500 g/m"},
-        gs.GivenSection(2e3, 5.0, 6.0, 3.0, mass=0.5),
+        rs.GivenSection(2e3, 5.0, 6.0, 3.0, mass=0.5),
     ),
 }
 
@@ -83,7 +83,7 @@ def test_case_file_gives_each_section_and_comes_back(kind, tmp_path):
 def test_case_file_refuses_sections_that_make_no_sense(text, says, tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(f"[rod]\n{text}\n")
-    with pytest.raises(gs.InputError, match=says):
+    with pytest.raises(rs.InputError, match=says):
         load_case(path)
 
 
@@ -91,4 +91,4 @@ def test_timber_has_a_shear_modulus_of_its_own(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text('[rod.material]\nyoungs_modulus = "11 GPa"\nshear = "690 MPa"\n')
     rod = load_case(path).build().rod
-    assert rod.material == gs.Material(11e9, 1000.0, shear=690e6)
+    assert rod.material == rs.Material(11e9, 1000.0, shear=690e6)

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from gridshell.errors import InputError
-from gridshell.geometry.curves import on_curve
-from gridshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
-from gridshell.layout.mesh import cut_mesh
+from rodshell.errors import InputError
+from rodshell.geometry.curves import on_curve
+from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+from rodshell.layout.mesh import cut_mesh
 
 ROUND_OFF = 1e-12
 

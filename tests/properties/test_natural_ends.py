@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-import gridshell as gs
-from gridshell.formfinding.natural import with_natural_ends
-from gridshell.layout import FlatGrid, FlatRod, mesh_grid
+import rodshell as rs
+from rodshell.formfinding.natural import with_natural_ends
+from rodshell.layout import FlatGrid, FlatRod, mesh_grid
 
 BEND = 0.01  # so small that beams are cubic splines
 AT = np.array([-2.5, -1.7, -0.9, 0.2, 1.0, 1.9])  # joints, unequally far apart
-PLANE = gs.HeightField(function=lambda x, y: 0 * x, domain=gs.Rectangle((20.0, 20.0)))
+PLANE = rs.HeightField(function=lambda x, y: 0 * x, domain=rs.Rectangle((20.0, 20.0)))
 
 
 @pytest.mark.parametrize("tail", [0.0, 0.35])
@@ -46,17 +46,17 @@ def test_a_line_that_turns_far_in_its_last_span_is_left_alone():
         assert (np.abs(moved).max() > 1e-3) == moves
 
 
-@pytest.mark.parametrize("target", [gs.Hemisphere(0.2), gs.Paraboloid(0.2, 0.15), gs.Ellipsoid(0.2, 0.15, 0.18)])
+@pytest.mark.parametrize("target", [rs.Hemisphere(0.2), rs.Paraboloid(0.2, 0.15), rs.Ellipsoid(0.2, 0.15, 0.18)])
 def test_the_drape_starts_much_nearer_to_where_it_ends(target, monkeypatch):
-    bound, seen = importlib.import_module("gridshell.formfinding.bound"), list[np.ndarray]()
+    bound, seen = importlib.import_module("rodshell.formfinding.bound"), list[np.ndarray]()
 
     def listen(target, mesh, points):
         seen.extend([points, with_natural_ends(target, mesh, points)])
         return seen[-1]
 
     monkeypatch.setattr(bound, "with_natural_ends", listen)
-    rod = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-    draped = gs.drape(gs.GridLayout.orthogonal(spacing=0.03, edge=0.005), rod, target)
+    rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+    draped = rs.drape(rs.GridLayout.orthogonal(spacing=0.03, edge=0.005), rod, target)
     plain, natural = (np.linalg.norm(draped.positions - start, axis=1).max() for start in seen)
     assert natural < 0.25 * plain  # 0.06 to 0.11 measured
     assert draped.report.factorizations <= 3
@@ -64,10 +64,10 @@ def test_the_drape_starts_much_nearer_to_where_it_ends(target, monkeypatch):
 
 def test_it_is_but_a_guess(monkeypatch):
     """The drape is the same from the net itself, the axes too, which it holds."""
-    bound, rod = importlib.import_module("gridshell.formfinding.bound"), gs.Rod(gs.Circle(1e-3), gs.Material(1e6, 1e3))
-    target = gs.HeightField(formula="0.03*sin(20*x)*cos(17*y)", domain=gs.Disc(0.2))
-    layout = gs.GridLayout.orthogonal(spacing=0.05, edge=0.0125, rotate=0.4)
-    found = gs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
+    bound, rod = importlib.import_module("rodshell.formfinding.bound"), rs.Rod(rs.Circle(1e-3), rs.Material(1e6, 1e3))
+    target = rs.HeightField(formula="0.03*sin(20*x)*cos(17*y)", domain=rs.Disc(0.2))
+    layout = rs.GridLayout.orthogonal(spacing=0.05, edge=0.0125, rotate=0.4)
+    found = rs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
     monkeypatch.setattr(bound, "with_natural_ends", lambda target, mesh, points: target.retract(points))
-    plain = gs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
+    plain = rs.drape(layout, rod, target, anchor=(-0.0269, -0.0448))
     assert np.abs(found.positions - plain.positions).max() < 1e-11

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gridshell.layout import FlatGrid, FlatRod
-from gridshell.layout.outline import opens, outlines
+from rodshell.layout import FlatGrid, FlatRod
+from rodshell.layout.outline import opens, outlines
 
 Floats = NDArray[np.float64]
 

@@ -9,34 +9,34 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.errors import InputError
-from gridshell.formfinding import bound, pipeline
-from gridshell.formfinding.roll import roll
-from gridshell.output import read
-from gridshell.output.archive import json_text
-from gridshell.solve.report import Status
+import rodshell as rs
+from rodshell.errors import InputError
+from rodshell.formfinding import bound, pipeline
+from rodshell.formfinding.roll import roll
+from rodshell.output import read
+from rodshell.output.archive import json_text
+from rodshell.solve.report import Status
 
 SIZE = 0.2
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-HEMISPHERE = gs.Hemisphere(SIZE)
-GAUSSIAN = gs.HeightField(formula="0.3*exp(-(x^2 + y^2)/(2*0.05^2))", domain=gs.Disc(SIZE))
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+HEMISPHERE = rs.Hemisphere(SIZE)
+GAUSSIAN = rs.HeightField(formula="0.3*exp(-(x^2 + y^2)/(2*0.05^2))", domain=rs.Disc(SIZE))
 
 
 def layout_of(**options):
-    return gs.GridLayout.orthogonal(**{"spacing": 0.05, "edge": 0.0125} | options)
+    return rs.GridLayout.orthogonal(**{"spacing": 0.05, "edge": 0.0125} | options)
 
 
 @cache
 def hemisphere_form():
-    return gs.find_form(HEMISPHERE, layout_of(), ROD)
+    return rs.find_form(HEMISPHERE, layout_of(), ROD)
 
 
 @cache
 def turned_form():
     """Of no symmetry: an ellipsoid, turned heading, anchor off the middle, a shifted lattice."""
     layout = layout_of(rotate=0.3, offset=(0.01, 0.02), spacing=(0.05, 0.04), edge=0.01)
-    return gs.find_form(gs.Ellipsoid(0.2, 0.15, 0.12), layout, ROD, anchor=(0.02, 0.01))
+    return rs.find_form(rs.Ellipsoid(0.2, 0.15, 0.12), layout, ROD, anchor=(0.02, 0.01))
 
 
 every_form = pytest.mark.parametrize("form", [hemisphere_form, turned_form], ids=["hemisphere", "turned ellipsoid"])
@@ -46,7 +46,7 @@ def altered_pop_up(**changes):
     """pop_up, its report altered."""
 
     def pop_up(*arguments, **options):
-        popped = gs.pop_up(*arguments, **options)
+        popped = rs.pop_up(*arguments, **options)
         return replace(popped, report=replace(popped.report, **changes))
 
     return pop_up
@@ -65,21 +65,21 @@ def test_a_form_that_was_found_is_converged_and_has_nothing_to_warn_of():
 
 
 def test_only_the_end_conditions_asked_for_are_popped_up():
-    form = gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=("pinned",))
+    form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=("pinned",))
     assert list(form.popped) == list(form.result()["pop_up"]) == list(form.result()["agreement"]) == ["pinned"]
     assert form.status == "converged"
 
 
 def test_progress_names_the_stages_in_their_order():
     told = []
-    gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, progress=lambda stage, *rest: told.append((stage, *rest)))
+    rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, progress=lambda stage, *rest: told.append((stage, *rest)))
     assert list(dict.fromkeys(stage for stage, *_ in told)) == ["net", "drape", "pop-up"]
     assert all(isinstance(detail, str) and isinstance(residual, float) for _, detail, residual in told)
 
 
 def test_a_pop_up_that_stops_early_is_named_and_has_no_agreement(monkeypatch):
     monkeypatch.setattr(pipeline, "pop_up", altered_pop_up(status=Status.STALLED))
-    form = gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD)
+    form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD)
     assert form.status == f"pop-up (pinned) {Status.STALLED.sentence}"
     assert form.agreement == {}
     assert form.result()["pop_up"]["pinned"]["status"] == "stalled"
@@ -88,7 +88,7 @@ def test_a_pop_up_that_stops_early_is_named_and_has_no_agreement(monkeypatch):
 
 def test_a_popped_up_saddle_is_warned_of(monkeypatch):
     monkeypatch.setattr(pipeline, "pop_up", altered_pop_up(negative_modes=2))
-    form = gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=("pinned",))
+    form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=("pinned",))
     assert form.status == "converged"
     assert any("pinned" in text and "not stable" in text and "2 negative modes" in text for text in form.warnings)
     assert form.result()["warnings"] == list(form.warnings)
@@ -99,11 +99,11 @@ def test_a_popped_up_saddle_is_warned_of(monkeypatch):
 @pytest.mark.parametrize("kind", ["circle", "lath"])
 def test_rods_too_wide_for_their_distance_are_warned_of(share, says, kind):
     """Where families meet at an angle, parallel rods are nearer than their spacing by its sine."""
-    found = gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=())
+    found = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=())
     apart = 0.05 * np.sin(np.radians(found.result()["drape"]["min_angle_deg"]))
     wide = share * apart
-    section = gs.Circle(wide / 2) if kind == "circle" else gs.RectangularSection(1e-3, wide)
-    rod = gs.Rod(section, ROD.material)
+    section = rs.Circle(wide / 2) if kind == "circle" else rs.RectangularSection(1e-3, wide)
+    rod = rs.Rod(section, ROD.material)
     warnings = replace(found, draped=replace(found.draped, rod=rod)).warnings
     assert [says in text for text in warnings] == [True] * (says is not None)
     assert all(f"{1e3 * wide:.3g} mm wide" in text and f"{1e3 * apart:.3g} mm apart" in text for text in warnings)
@@ -112,9 +112,9 @@ def test_rods_too_wide_for_their_distance_are_warned_of(share, says, kind):
 @pytest.mark.parametrize(("stiffness", "stretched"), [(0.3e6, True), (1e8, False)])
 def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remedy(stiffness, stretched):
     """Strain is density g length / E whatever the section: no other advice is given where that is the cause."""
-    rod = gs.Rod(gs.Circle(1e-3), gs.Material(youngs_modulus=stiffness, density=1e3))
-    layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, length=0.9, edge=0.03)
-    form = gs.find_form(HEMISPHERE, layout, rod, method="gravity")
+    rod = rs.Rod(rs.Circle(1e-3), rs.Material(youngs_modulus=stiffness, density=1e3))
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, length=0.9, edge=0.03)
+    form = rs.find_form(HEMISPHERE, layout, rod, method="gravity")
     assert form.status == "converged"
     found = [text for text in form.warnings if "under their own weight" in text]
     assert len(found) == stretched
@@ -126,18 +126,18 @@ def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remed
         assert sprung[0].endswith("even with clamped ends")
 
 
-STANDING, LYING = gs.RectangularSection(width=4e-3, height=1e-3), gs.RectangularSection(width=1e-3, height=4e-3)
+STANDING, LYING = rs.RectangularSection(width=4e-3, height=1e-3), rs.RectangularSection(width=1e-3, height=4e-3)
 
 
 @cache
 def of_laths(section, joint=None):
-    cap = gs.Cap(SIZE, 0.6 * SIZE)
-    return gs.find_form(cap, layout_of(spacing=0.04), replace(ROD, section=section), joint=joint, ends=("pinned",))
+    cap = rs.Cap(SIZE, 0.6 * SIZE)
+    return rs.find_form(cap, layout_of(spacing=0.04), replace(ROD, section=section), joint=joint, ends=("pinned",))
 
 
 @pytest.mark.parametrize(
     ("section", "joint", "degrees"),
-    [(STANDING, None, 90), (LYING, None, 0), (STANDING, gs.Pin(), 0), (LYING, gs.Pin(), 0), (ROD.section, None, 0)],
+    [(STANDING, None, 90), (LYING, None, 0), (STANDING, rs.Pin(), 0), (LYING, rs.Pin(), 0), (ROD.section, None, 0)],
     ids=["standing", "lying", "standing, pinned", "lying, pinned", "round"],
 )
 def test_laths_that_lie_down_are_warned_of(section, joint, degrees):
@@ -154,7 +154,7 @@ def test_laid_either_way_a_lath_takes_the_same_shape_where_nothing_holds_it():
 @pytest.mark.parametrize("turn", [0.1, 1.0, 2.0, -2.5])
 def test_roll_is_what_the_twist_angles_add(turn):
     """Laths held by pins lie nearly flat; turned by more than a quarter they are nearer to their other side."""
-    popped = of_laths(LYING, gs.Pin()).popped["pinned"]
+    popped = of_laths(LYING, rs.Pin()).popped["pinned"]
     before = roll(popped)
     assert np.degrees(before).max() < 7.0
     state = popped.state.copy()
@@ -167,9 +167,9 @@ def test_roll_is_what_the_twist_angles_add(turn):
 @pytest.mark.parametrize(("ending", "tail", "left"), [(6, 0.5, 5), (4, 0.7, 7), (10, None, 0), (11, None, 0)])
 def test_a_rod_that_runs_far_past_its_last_joint_is_warned_of(ending, tail, left):
     """One rod of 1.1 m, met every 0.1 m; from `ending` on those that meet it end 10 mm past it."""
-    crossing = [gs.FlatRod.v(f"V{k:02d}", k / 10, -0.2, 0.01 if k >= ending else 0.2) for k in range(1, 11)]
-    grid = gs.FlatGrid.of([gs.FlatRod.u("U01", 0.0, 0.0, 1.1), *crossing], margin=0.015)
-    layout = gs.GridLayout.orthogonal(spacing=0.1)
+    crossing = [rs.FlatRod.v(f"V{k:02d}", k / 10, -0.2, 0.01 if k >= ending else 0.2) for k in range(1, 11)]
+    grid = rs.FlatGrid.of([rs.FlatRod.u("U01", 0.0, 0.0, 1.1), *crossing], margin=0.015)
+    layout = rs.GridLayout.orthogonal(spacing=0.1)
     trimmed = SimpleNamespace(mesh=SimpleNamespace(grid=grid), draped=SimpleNamespace(layout=layout))
     found = pipeline._long_tails(trimmed)
     assert len(found) == (tail is not None)
@@ -182,8 +182,8 @@ def test_a_rod_that_runs_far_past_its_last_joint_is_warned_of(ending, tail, left
 
 def test_a_layout_beside_the_target_is_refused():
     with pytest.raises(InputError, match="none of the layout's rods touches the target"):
-        gs.find_form(
-            HEMISPHERE, gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.03, length=1.2, offset=(1.0, 1.0)), ROD
+        rs.find_form(
+            HEMISPHERE, rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.03, length=1.2, offset=(1.0, 1.0)), ROD
         )
 
 
@@ -206,7 +206,7 @@ def test_a_wave_that_springs_off_is_advised_seams():
 
 def test_families_that_meet_at_a_small_angle_are_warned_of():
     """A hemisphere and some more: on the diagonal of the net the angle closes as f(uv/R^2)."""
-    form = gs.find_form(gs.Cap(SIZE, -0.06), layout_of(edge=0.025), ROD, ends=("clamped",))
+    form = rs.find_form(rs.Cap(SIZE, -0.06), layout_of(edge=0.025), ROD, ends=("clamped",))
     angle = form.result()["drape"]["min_angle_deg"]
     assert 10 < angle < 25
     assert any(f"{angle:.1f} degrees" in text for text in form.warnings)
@@ -221,7 +221,7 @@ def test_a_drape_that_is_no_minimum_is_warned_of(monkeypatch):
 
     plain = bound.find_equilibrium
     monkeypatch.setattr(bound, "find_equilibrium", find)
-    form = gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=())
+    form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=())
     assert any("19 negative modes" in text for text in form.warnings)
 
 
@@ -236,7 +236,7 @@ def hurried(monkeypatch):
 
 @pytest.mark.usefixtures("hurried")
 def test_a_drape_that_does_not_converge_leaves_a_partial_result_that_is_saved(tmp_path):
-    form = gs.find_form(GAUSSIAN, layout_of(spacing=0.03, edge=0.01), ROD)
+    form = rs.find_form(GAUSSIAN, layout_of(spacing=0.03, edge=0.01), ROD)
     assert not form.draped.converged
     assert form.status == f"drape {Status.STALLED.sentence}"
     assert form.popped == {}
@@ -254,14 +254,14 @@ def test_a_drape_that_does_not_converge_leaves_a_partial_result_that_is_saved(tm
 
 @pytest.mark.usefixtures("hurried")
 def test_a_mild_target_that_does_not_converge_blames_no_curvature():
-    form = gs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD)
+    form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD)
     assert form.status == f"drape {Status.STALLED.sentence}"
     assert form.warnings == ()
 
 
 def test_a_gravity_drape_that_slides_off_is_kept_too(tmp_path):
     layout = layout_of(rods=(9, 9), length=0.9, edge=0.05)
-    form = gs.find_form(HEMISPHERE, layout, ROD, method="gravity", anchor=(0.05, 0.02))
+    form = rs.find_form(HEMISPHERE, layout, ROD, method="gravity", anchor=(0.05, 0.02))
     assert form.status == f"drape {Status.SLID_OFF.sentence}"
     kept = read(form.save(tmp_path / "slid"))
     assert kept.result["drape"]["status"] == "slid off"
@@ -300,12 +300,12 @@ def test_save_and_read_give_back_every_number(form, tmp_path):
 
 
 def test_the_kept_case_gives_the_same_form_again(tmp_path):
-    from gridshell.case import load_case
+    from rodshell.case import load_case
 
     form = turned_form()
     case = load_case(form.save(tmp_path / "form") / "case.toml")
     target, layout, rod = case.target.build(), case.layout.build(), case.rod.build()
-    again = gs.find_form(target, layout, rod, anchor=tuple(case.drape.anchor))
+    again = rs.find_form(target, layout, rod, anchor=tuple(case.drape.anchor))
     assert (target, layout, rod) == (form.target, form.layout, form.rod)
     np.testing.assert_array_equal(again.popped["clamped"].positions, form.popped["clamped"].positions)
 
@@ -313,7 +313,7 @@ def test_the_kept_case_gives_the_same_form_again(tmp_path):
 @every_form
 def test_result_has_the_keys_and_units_of_the_design(form):
     result = form().result()
-    assert [result[key] for key in ("format", "version", "units")] == ["gridshell-result", 1, "SI"]
+    assert [result[key] for key in ("format", "version", "units")] == ["rodshell-result", 1, "SI"]
     assert {
         "status",
         "target",
@@ -418,10 +418,10 @@ def ripple(x, y):
 def test_a_python_function_is_a_target_like_its_formula(tmp_path):
     formula = "0.1*cos(6*sqrt(x^2 + y^2 + 0.0001))"
     targets = [
-        gs.HeightField(function=ripple, domain=gs.Disc(0.15)),
-        gs.HeightField(formula=formula, domain=gs.Disc(0.15)),
+        rs.HeightField(function=ripple, domain=rs.Disc(0.15)),
+        rs.HeightField(formula=formula, domain=rs.Disc(0.15)),
     ]
-    forms = [gs.find_form(target, layout_of(edge=0.025), ROD) for target in targets]
+    forms = [rs.find_form(target, layout_of(edge=0.025), ROD) for target in targets]
     assert [form.status for form in forms] == ["converged"] * 2
     for ends in ("pinned", "clamped"):
         ours, theirs = (form.popped[ends].positions for form in forms)
@@ -436,8 +436,8 @@ def test_a_python_function_is_a_target_like_its_formula(tmp_path):
 
 def table_of(form, **options):
     names = [rod.name for rod in form.footprint.rods]
-    grid = gs.straight_rods(form.footprint.points.reshape(-1, 2, 2), names=names)
-    return gs.pop_up_table(grid, form.trimmed.boundary.points.reshape(-1, 2, 3), form.rod, **options)
+    grid = rs.straight_rods(form.footprint.points.reshape(-1, 2, 2), names=names)
+    return rs.pop_up_table(grid, form.trimmed.boundary.points.reshape(-1, 2, 3), form.rod, **options)
 
 
 def at_joints(footprint, positions):
@@ -482,7 +482,7 @@ def test_rods_of_a_table_need_no_order_and_no_right_angles():
     flat = form.footprint.points.reshape(-1, 2, 2)[::-1, ::-1]
     finals = form.trimmed.boundary.points.reshape(-1, 2, 3)[::-1, ::-1]
     turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
-    other = gs.pop_up_table(gs.straight_rods(flat @ turn + [3.0, -2.0], names=names), finals, ROD, edge=0.0125)
+    other = rs.pop_up_table(rs.straight_rods(flat @ turn + [3.0, -2.0], names=names), finals, ROD, edge=0.0125)
     straight = table_of(form, edge=0.0125)
     ours, theirs = (at_joints(one.footprint, one.popped["pinned"].positions) for one in (other, straight))
     assert set(ours) == set(theirs)
@@ -504,22 +504,22 @@ SQUARE = [[[0, 0], [1, 0]], [[0, 1], [1, 1]], [[0.2, -1], [0.2, 2]]]
 )
 def test_flat_rods_that_make_no_grid_are_refused(ends, says):
     with pytest.raises(InputError, match=says):
-        gs.straight_rods(ends)
+        rs.straight_rods(ends)
 
 
 def test_final_ends_that_do_not_fit_are_refused():
     form = hemisphere_form()
-    grid = gs.straight_rods(form.footprint.points.reshape(-1, 2, 2), names=[rod.name for rod in form.footprint.rods])
+    grid = rs.straight_rods(form.footprint.points.reshape(-1, 2, 2), names=[rod.name for rod in form.footprint.rods])
     finals = form.trimmed.boundary.points.reshape(-1, 2, 3)
     with pytest.raises(InputError, match=r"of the shape \(22, 2, 3\), not \(21, 2, 3\)"):
-        gs.pop_up_table(grid, finals[1:], ROD)
+        rs.pop_up_table(grid, finals[1:], ROD)
     with pytest.raises(InputError, match="finite"):
-        gs.pop_up_table(grid, np.where(finals == finals[3, 1, 2], np.nan, finals), ROD)
+        rs.pop_up_table(grid, np.where(finals == finals[3, 1, 2], np.nan, finals), ROD)
     with pytest.raises(InputError, match=r"rod U02 is 0\.2744 m long, but its final ends lie 0\.4481 m apart"):
-        gs.pop_up_table(grid, 2 * finals, ROD)
+        rs.pop_up_table(grid, 2 * finals, ROD)
 
 
 def test_a_table_whose_rods_would_all_swing_is_refused():
-    grid = gs.straight_rods(SQUARE)
+    grid = rs.straight_rods(SQUARE)
     with pytest.raises(InputError, match="no rod of the table has 3 joints"):
-        gs.pop_up_table(grid, np.zeros((3, 2, 3)), ROD)
+        rs.pop_up_table(grid, np.zeros((3, 2, 3)), ROD)

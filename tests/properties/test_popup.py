@@ -13,23 +13,23 @@ from elastic_twins import ElasticTwin
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
-import gridshell as gs
-from gridshell.errors import InputError
-from gridshell.formfinding.draped import node_normals
-from gridshell.model import Shell
-from gridshell.solve import newton_step
-from gridshell.solve.constraint import Supports
-from gridshell.solve.mixed_newton import find_equilibrium, find_stable
-from gridshell.solve.problem import Problem
+import rodshell as rs
+from rodshell.errors import InputError
+from rodshell.formfinding.draped import node_normals
+from rodshell.model import Shell
+from rodshell.solve import newton_step
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import find_equilibrium, find_stable
+from rodshell.solve.problem import Problem
 
 SIZE = 0.2  # of all targets [m]
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 HILL = "0.1 - 2*x^2 - 2.5*y^2 + 0.5*x*y"
 TARGETS = {
-    "hemisphere": gs.Hemisphere(0.2),
-    "ellipsoid": gs.Ellipsoid(0.2, 0.15, 0.12),
-    "hill": gs.HeightField(formula=HILL, domain=gs.Disc(0.2)),
-    "bowl": gs.HeightField(formula=f"-({HILL})", domain=gs.Disc(0.2)),
+    "hemisphere": rs.Hemisphere(0.2),
+    "ellipsoid": rs.Ellipsoid(0.2, 0.15, 0.12),
+    "hill": rs.HeightField(formula=HILL, domain=rs.Disc(0.2)),
+    "bowl": rs.HeightField(formula=f"-({HILL})", domain=rs.Disc(0.2)),
 }
 every_target = pytest.mark.parametrize("name", ["hemisphere", "ellipsoid", "hill"])
 both_ends = pytest.mark.parametrize("ends", ["pinned", "clamped"])
@@ -37,14 +37,14 @@ both_ends = pytest.mark.parametrize("ends", ["pinned", "clamped"])
 
 @cache
 def trimmed_on(name, edge=0.0125, spacing=0.05):
-    layout = gs.GridLayout.orthogonal(spacing=spacing, edge=edge)
-    return gs.trim(gs.drape(layout, ROD, TARGETS[name], anchor=(0.0, 0.0)))
+    layout = rs.GridLayout.orthogonal(spacing=spacing, edge=edge)
+    return rs.trim(rs.drape(layout, ROD, TARGETS[name], anchor=(0.0, 0.0)))
 
 
 @cache
 def popped_on(name, ends, start="draped", edge=0.0125):
     trimmed = trimmed_on(name, edge)
-    return gs.pop_up(gs.map_back(trimmed), trimmed.boundary, ROD, ends=ends, start=start)
+    return rs.pop_up(rs.map_back(trimmed), trimmed.boundary, ROD, ends=ends, start=start)
 
 
 def end_directions(mesh, positions):
@@ -92,7 +92,7 @@ def test_chord_steps_lead_where_newtons_lead_with_fewer_factorisations(name, end
     trimmed = trimmed_on(name)
     found = popped_on(name, ends)
     monkeypatch.setattr(newton_step, "CHORD", 0.0)
-    newton = gs.pop_up(gs.map_back(trimmed), trimmed.boundary, ROD, ends=ends)
+    newton = rs.pop_up(rs.map_back(trimmed), trimmed.boundary, ROD, ends=ends)
     assert newton.report.factorizations == newton.report.iterations
     assert found.report.factorizations <= newton.report.factorizations
     if ends == "pinned":
@@ -184,16 +184,16 @@ def test_a_bowl_pops_down_as_its_mirror_image_pops_up(ends, start):
 
 def test_without_end_directions_the_grid_rises():
     trimmed = trimmed_on("hill")
-    nowhere = gs.Boundary(trimmed.boundary.points, np.zeros_like(trimmed.boundary.tangents))
-    risen = gs.pop_up(gs.map_back(trimmed), nowhere, ROD, ends="pinned", start="flat")
+    nowhere = rs.Boundary(trimmed.boundary.points, np.zeros_like(trimmed.boundary.tangents))
+    risen = rs.pop_up(rs.map_back(trimmed), nowhere, ROD, ends="pinned", start="flat")
     np.testing.assert_allclose(risen.positions, popped_on("hill", "pinned").positions, rtol=0, atol=1e-9 * SIZE)
 
 
 def test_where_the_flat_grid_lies_does_not_matter():
     """The boundary turned by 143 degrees about the vertical and moved: so is the shell, at the same expense."""
     trimmed, turn, shift = trimmed_on("hemisphere"), np.array([[-0.8, -0.6, 0], [0.6, -0.8, 0], [0, 0, 1.0]]), [1, 2, 3]
-    boundary = gs.Boundary(trimmed.boundary.points @ turn.T + shift, trimmed.boundary.tangents @ turn.T)
-    moved = gs.pop_up(gs.map_back(trimmed), boundary, ROD, ends="clamped", start="flat")
+    boundary = rs.Boundary(trimmed.boundary.points @ turn.T + shift, trimmed.boundary.tangents @ turn.T)
+    moved = rs.pop_up(rs.map_back(trimmed), boundary, ROD, ends="clamped", start="flat")
     expected = popped_on("hemisphere", "clamped").positions @ turn.T + shift
     np.testing.assert_allclose(moved.positions, expected, rtol=0, atol=1e-9 * SIZE)
     there = popped_on("hemisphere", "clamped", start="flat").report.iterations
@@ -204,7 +204,7 @@ def test_a_boundary_without_draped_state_is_refused_for_a_start_from_it():
     trimmed = trimmed_on("hill")
     bare = replace(trimmed.boundary, draped=None)
     with pytest.raises(InputError, match='use start="flat"'):
-        gs.pop_up(gs.map_back(trimmed), bare, ROD, ends="pinned")
+        rs.pop_up(rs.map_back(trimmed), bare, ROD, ends="pinned")
 
 
 # Invariance
@@ -213,10 +213,10 @@ def test_a_boundary_without_draped_state_is_refused_for_a_start_from_it():
 @both_ends
 def test_scale_and_modulus_do_not_enter_where_the_section_is_scaled_alike(ends):
     scale = 100.0
-    rod = gs.Rod(section=gs.Circle(1e-3 * scale), material=gs.Material(youngs_modulus=2.5e10, density=7e3))
-    layout = gs.GridLayout.orthogonal(spacing=0.05 * scale, edge=0.0125 * scale)
-    trimmed = gs.trim(gs.drape(layout, rod, gs.Hemisphere(0.2 * scale)))
-    large, small = gs.pop_up(gs.map_back(trimmed), trimmed.boundary, rod, ends=ends), popped_on("hemisphere", ends)
+    rod = rs.Rod(section=rs.Circle(1e-3 * scale), material=rs.Material(youngs_modulus=2.5e10, density=7e3))
+    layout = rs.GridLayout.orthogonal(spacing=0.05 * scale, edge=0.0125 * scale)
+    trimmed = rs.trim(rs.drape(layout, rod, rs.Hemisphere(0.2 * scale)))
+    large, small = rs.pop_up(rs.map_back(trimmed), trimmed.boundary, rod, ends=ends), popped_on("hemisphere", ends)
     np.testing.assert_allclose(large.positions / scale, small.positions, rtol=0, atol=1e-9 * SIZE)
     assert large.report.max_strain == pytest.approx(small.report.max_strain, rel=1e-6)
 
@@ -239,7 +239,7 @@ def twin_eigenvalues(mesh, positions):
 
 def test_stability_is_that_of_the_twins_second_derivatives():
     trimmed = trimmed_on("hemisphere", 0.03, 0.09)
-    popped = gs.pop_up(gs.map_back(trimmed), trimmed.boundary, ROD, ends="pinned")
+    popped = rs.pop_up(rs.map_back(trimmed), trimmed.boundary, ROD, ends="pinned")
     eigenvalues = twin_eigenvalues(trimmed.mesh, popped.positions)
     assert eigenvalues[0] > 1e-7 * eigenvalues[-1]  # 5e-7 measured: the long soft modes of bending
     assert popped.report.stable
@@ -272,10 +272,10 @@ def test_a_flat_grid_under_compression_is_left_for_a_shell():
 
 def test_clamps_bring_a_convex_shell_much_closer_to_its_target_than_pins():
     for name in ("hemisphere", "ellipsoid"):
-        pinned, clamped = (gs.agreement(popped_on(name, ends), TARGETS[name]) for ends in ("pinned", "clamped"))
+        pinned, clamped = (rs.agreement(popped_on(name, ends), TARGETS[name]) for ends in ("pinned", "clamped"))
         assert clamped.max < 0.2 * pinned.max  # hemisphere 0.01, ellipsoid 0.13
         assert clamped.rms < 0.15 * pinned.rms  # hemisphere 0.01, ellipsoid 0.09
-    hemisphere = gs.agreement(popped_on("hemisphere", "clamped"), TARGETS["hemisphere"])
+    hemisphere = rs.agreement(popped_on("hemisphere", "clamped"), TARGETS["hemisphere"])
     assert hemisphere.max_relative < 6e-4  # 3.3e-4 here, 1e-4 at 30 mm spacing
     assert hemisphere.rms_relative < 2e-4
 
@@ -287,7 +287,7 @@ def sphere_shell():
 
 
 def test_a_shell_on_its_target_has_no_gap_but_that_of_its_edge_middles():
-    on_target = gs.agreement(sphere_shell(), TARGETS["hemisphere"])
+    on_target = rs.agreement(sphere_shell(), TARGETS["hemisphere"])
     assert np.abs(on_target.gaps).max() < 1e-15
     # the rods between nodes are cubics, of fourth order
     assert on_target.max < 5e-6 * SIZE  # 1.3e-6 measured
@@ -296,7 +296,7 @@ def test_a_shell_on_its_target_has_no_gap_but_that_of_its_edge_middles():
 @pytest.mark.parametrize("share", [0.01, -0.02])
 def test_a_shell_offset_by_a_known_amount_has_that_gap_everywhere(share):
     shell = sphere_shell()
-    offset = gs.agreement(replace(shell, positions=(1 + share) * shell.positions), TARGETS["hemisphere"])
+    offset = rs.agreement(replace(shell, positions=(1 + share) * shell.positions), TARGETS["hemisphere"])
     np.testing.assert_allclose(offset.gaps, share * SIZE, rtol=0, atol=1e-14)  # positive outside
     assert offset.max == pytest.approx(abs(share) * SIZE, abs=5e-6 * SIZE)  # see above
     assert offset.rms == pytest.approx(abs(share) * SIZE, abs=1e-6 * SIZE)
@@ -311,7 +311,7 @@ def test_the_largest_gap_is_found_where_it_is(depth):
     node = inner_nodes(shell.footprint.mesh)[40]
     outward = shell.positions[node] / SIZE
     shell.positions[node] += depth * outward
-    dent = gs.agreement(shell, TARGETS["hemisphere"])
+    dent = rs.agreement(shell, TARGETS["hemisphere"])
     assert dent.max == pytest.approx(abs(depth), abs=1e-12)
     np.testing.assert_allclose(dent.where, shell.positions[node], rtol=0, atol=1e-15)
     assert dent.gaps[node] == pytest.approx(depth, abs=1e-12)
@@ -321,8 +321,8 @@ def test_the_largest_gap_is_found_where_it_is(depth):
 def test_a_gap_between_two_nodes_is_seen():
     """Nodes on the sphere, edges of 50 mm: rods that are curved between them, not chords, which lie 1.6 mm inside."""
     trimmed = trimmed_on("hemisphere", 0.05)
-    shell = gs.pop_up(gs.map_back(trimmed), trimmed.boundary, ROD, ends="clamped")
-    on_nodes = gs.agreement(replace(shell, positions=trimmed.positions), TARGETS["hemisphere"])
+    shell = rs.pop_up(rs.map_back(trimmed), trimmed.boundary, ROD, ends="clamped")
+    on_nodes = rs.agreement(replace(shell, positions=trimmed.positions), TARGETS["hemisphere"])
     assert np.abs(on_nodes.gaps).max() < 1e-15
     assert 1e-5 < on_nodes.max < 0.1 * 0.05**2 / (8 * SIZE)  # 4.7e-5 m
 
@@ -331,14 +331,14 @@ def test_a_gap_between_two_nodes_is_seen():
 def test_a_rod_that_ends_next_to_a_crossing_pops_up_like_any_other(beyond):
     """The middle rods, a quarter circle each way, end a hair before or behind the fifth crossing."""
     spacing = (np.pi / 2 * SIZE + beyond) / 5
-    form = gs.find_form(gs.Hemisphere(SIZE), gs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 4), ROD)
+    form = rs.find_form(rs.Hemisphere(SIZE), rs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 4), ROD)
     for ends, rms in (("pinned", 0.012), ("clamped", 0.0003)):  # 0.0102 and 0.0001 at any other spacing nearby
         assert form.popped[ends].report.stable
         assert form.popped[ends].report.factorizations <= 10  # 900 and no convergence with an edge of 10 nm
         assert form.agreement[ends].rms_relative < rms
 
 
-@pytest.mark.parametrize("joint", [gs.Ball(), gs.Pin()])
+@pytest.mark.parametrize("joint", [rs.Ball(), rs.Pin()])
 def test_long_steps_are_cut_and_lead_to_the_same_shell_in_a_fraction_of_the_factorizations(joint):
     """A ridge, whose free shell springs off by a twenty-fifth of its size: whole steps lead among buckled rods.
 
@@ -346,10 +346,10 @@ def test_long_steps_are_cut_and_lead_to_the_same_shell_in_a_fraction_of_the_fact
     of the way.
     """
     ridge = "2 - 0.03*x^2 - 0.04*y^2 + 0.02*x*y + 0.9*exp(-(0.88*x + 0.48*y)^2/16 - (0.88*y - 0.48*x)^2/2.5)"
-    lath = gs.Rod(gs.Circle(radius=0.01), gs.Material(youngs_modulus=30e9, density=1900.0))
-    layout = gs.GridLayout.orthogonal(spacing=0.9, edge=0.225)
-    trimmed = gs.trim(gs.drape(layout, lath, gs.HeightField(formula=ridge, domain=gs.Rectangle((10.0, 10.0)))))
-    cut = gs.pop_up(gs.map_back(trimmed), trimmed.boundary, lath, ends="pinned", joint=joint)
+    lath = rs.Rod(rs.Circle(radius=0.01), rs.Material(youngs_modulus=30e9, density=1900.0))
+    layout = rs.GridLayout.orthogonal(spacing=0.9, edge=0.225)
+    trimmed = rs.trim(rs.drape(layout, lath, rs.HeightField(formula=ridge, domain=rs.Rectangle((10.0, 10.0)))))
+    cut = rs.pop_up(rs.map_back(trimmed), trimmed.boundary, lath, ends="pinned", joint=joint)
     assert cut.report.stable
     assert cut.report.factorizations < 20
     shell = Shell.of(trimmed.mesh, lath, clamped=False, joint=joint)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-import gridshell as gs
-from gridshell.geometry.curves import resampled
-from gridshell.nets import lines, march
-from gridshell.nets.apron import RINGS
-from gridshell.nets.compass import fill_quadrants
-from gridshell.nets.cuts import inside_nodes
-from gridshell.nets.reach import Covering, march_covering, wanted_nodes
+import rodshell as rs
+from rodshell.geometry.curves import resampled
+from rodshell.nets import lines, march
+from rodshell.nets.apron import RINGS
+from rodshell.nets.compass import fill_quadrants
+from rodshell.nets.cuts import inside_nodes
+from rodshell.nets.reach import Covering, march_covering, wanted_nodes
 from tests.targets.test_nets_on_files import TARGETS as FILES
 
 SIZE = 0.2
@@ -20,18 +20,18 @@ ANCHOR = (0.03, -0.02)
 EXACT = 1e-11  # of the size; 2e-13 measured
 TWO_BUMPS = "0.08*(exp(-((x-.09)^2/.06^2 + y^2/.07^2)/2) + exp(-((x+.09)^2/.06^2 + y^2/.07^2)/2))"
 SLIM = "0.1 - x^2 - .3*x*y + .3*y^2"
-TARGETS: dict[str, gs.Target] = {
-    "hemisphere": gs.Hemisphere(SIZE),
-    "bumps": gs.HeightField(formula=TWO_BUMPS, domain=gs.Disc(SIZE)),
-    "slim": gs.HeightField(formula=SLIM, domain=gs.Rectangle((0.5, 0.12))),
+TARGETS: dict[str, rs.Target] = {
+    "hemisphere": rs.Hemisphere(SIZE),
+    "bumps": rs.HeightField(formula=TWO_BUMPS, domain=rs.Disc(SIZE)),
+    "slim": rs.HeightField(formula=SLIM, domain=rs.Rectangle((0.5, 0.12))),
     "opening": FILES["opening"],
 }
 
 
-SHARP = gs.HeightField(
+SHARP = rs.HeightField(
     formula="-1.69*x^2 + .417*y^2 + .083*x*y + .0837*exp(-((x-.104)^2/.04^2 + (y+.079)^2/.122^2))"
     " + .0507*exp(-((x-.058)^2/.062^2 + (y-.031)^2/.12^2))",
-    domain=gs.Disc(SIZE),
+    domain=rs.Disc(SIZE),
 )
 
 
@@ -40,8 +40,8 @@ def net_of(name):
     target = TARGETS[name]
     anchor = (0.0, 0.0) if name == "opening" else ANCHOR
     s = 0.15 * target.size
-    layout = gs.GridLayout.orthogonal(spacing=(s, 1.2 * s), edge=s / 3, rotate=0.2, offset=(0.2 * s, 0.3 * s))
-    return gs.chebyshev_net(target, layout, anchor=anchor)
+    layout = rs.GridLayout.orthogonal(spacing=(s, 1.2 * s), edge=s / 3, rotate=0.2, offset=(0.2 * s, 0.3 * s))
+    return rs.chebyshev_net(target, layout, anchor=anchor)
 
 
 def whole_march(net):
@@ -86,13 +86,13 @@ def test_a_net_leaves_the_corners_alone_and_asks_the_target_seldom(monkeypatch):
     """A third of the lattice lies past what is used. From node to node the target is asked for the first net alone,
     whose steps are a tenth of the target's width: 109 calls for all, and 401 where the rough march goes so, too."""
     asked, marched = list[int](), list[int]()
-    layout = gs.GridLayout.orthogonal(spacing=0.03, edge=0.005)
+    layout = rs.GridLayout.orthogonal(spacing=0.03, edge=0.005)
     for name in ("level", "implicit"):
-        answer, told = getattr(gs.Hemisphere, name), asked if name == "implicit" else marched
+        answer, told = getattr(rs.Hemisphere, name), asked if name == "implicit" else marched
         monkeypatch.setattr(
-            gs.Hemisphere, name, lambda self, x, say=answer, told=told: told.append(len(x)) or say(self, x)
+            rs.Hemisphere, name, lambda self, x, say=answer, told=told: told.append(len(x)) or say(self, x)
         )
-    net = gs.chebyshev_net(gs.Hemisphere(SIZE), layout)
+    net = rs.chebyshev_net(rs.Hemisphere(SIZE), layout)
     assert np.isfinite(net.net.points[:, :, 0]).mean() < 0.7  # 0.66
     most, next_to_most = sorted(asked, reverse=True)[:2]
     assert most < 0.7 * net.net.points[:, :, 0].size
@@ -168,11 +168,11 @@ def test_where_nothing_is_inside_all_nodes_are_wanted():
 
 def test_inside_nodes_are_those_that_hang_together_with_the_anchor():
     """A sea of waves above and below the base, no steeper than a net's steps are long, against scipy's labels."""
-    target = gs.Hemisphere(SIZE)
+    target = rs.Hemisphere(SIZE)
     s = np.linspace(-1.0, 1.0, 81)
     height = 0.03 * (np.cos(9 * s)[:, None] * np.cos(7 * s) + 0.3 * np.sin(11 * s[:, None] * s) - 0.1)
     points = np.stack([*np.meshgrid(s, s, indexing="ij"), height], axis=-1)
-    net = gs.nets.Net(s, s, points)
+    net = rs.nets.Net(s, s, points)
     islands, count = label(height > 0)
     assert count > 4
     np.testing.assert_array_equal(inside_nodes(target, net), islands == islands[net.origin])

@@ -8,30 +8,30 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-import gridshell as gs
-from gridshell.cli import main
-from gridshell.errors import InputError, NetLimitError
-from gridshell.formfinding.families import LEAVE_OUT, choose_families
-from gridshell.formfinding.patches import carried_heading, patches_of
-from gridshell.formfinding.seams import End, in_a_row
-from gridshell.layout.side_by_side import side_by_side
-from gridshell.output import read
-from gridshell.targets.curvefile import closed_loops, joined
-from gridshell.targets.seam import Seam
+import rodshell as rs
+from rodshell.cli import main
+from rodshell.errors import InputError, NetLimitError
+from rodshell.formfinding.families import LEAVE_OUT, choose_families
+from rodshell.formfinding.patches import carried_heading, patches_of
+from rodshell.formfinding.seams import End, in_a_row
+from rodshell.layout.side_by_side import side_by_side
+from rodshell.output import read
+from rodshell.targets.curvefile import closed_loops, joined
+from rodshell.targets.seam import Seam
 
 Floats = NDArray[np.float64]
 
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-DOME = gs.Hemisphere(radius=0.2)
-BUMPS = gs.HeightField(
-    formula="0.09*exp(-((x - 0.09)^2 + y^2)/0.0072) + 0.07*exp(-((x + 0.09)^2 + y^2)/0.0072)", domain=gs.Disc(0.2)
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+DOME = rs.Hemisphere(radius=0.2)
+BUMPS = rs.HeightField(
+    formula="0.09*exp(-((x - 0.09)^2 + y^2)/0.0072) + 0.07*exp(-((x + 0.09)^2 + y^2)/0.0072)", domain=rs.Disc(0.2)
 )
-VAULT = gs.HeightField(formula="0.08*cos(14*x)", domain=gs.Rectangle((0.18, 0.6)))
-BALL = gs.Cap(radius=0.2, base=-0.13)  # no net covers it from its top
+VAULT = rs.HeightField(formula="0.08*cos(14*x)", domain=rs.Rectangle((0.18, 0.6)))
+BALL = rs.Cap(radius=0.2, base=-0.13)  # no net covers it from its top
 ACROSS, DIAGONAL = [(-1.0, 0.0), (1.0, 0.0)], [(-1.0, -1.0), (1.0, 1.0)]
 CROWN = [(0.1 * np.cos(angle), 0.1 * np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 40)[:-1]]
 
-CASES: dict[str, tuple[gs.Target, list[list[tuple[float, float]]], float]] = {
+CASES: dict[str, tuple[rs.Target, list[list[tuple[float, float]]], float]] = {
     "dome, diagonal": (DOME, [DIAGONAL], 0.04),
     "dome, across": (DOME, [ACROSS], 0.04),
     "dome, aside": (DOME, [[(-1.0, 0.2), (0.0, -0.05), (1.0, 0.1)]], 0.03),
@@ -44,27 +44,27 @@ CASES: dict[str, tuple[gs.Target, list[list[tuple[float, float]]], float]] = {
 HEADINGS = {"dome, aside": 0.6}
 
 
-def layout_of(spacing: float, **options: float) -> gs.GridLayout:
-    return gs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 5, **options)
+def layout_of(spacing: float, **options: float) -> rs.GridLayout:
+    return rs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 5, **options)
 
 
 @cache
-def sewn(name: str) -> gs.Sewn:
+def sewn(name: str) -> rs.Sewn:
     target, seams, spacing = CASES[name]
-    return gs.sew(target, seams, layout_of(spacing, rotate=HEADINGS.get(name, 0.0)), ROD)
+    return rs.sew(target, seams, layout_of(spacing, rotate=HEADINGS.get(name, 0.0)), ROD)
 
 
 every_case = pytest.mark.parametrize("name", CASES)
 
 
-def place_of(form: gs.Sewn, end: End) -> Floats:
+def place_of(form: rs.Sewn, end: End) -> Floats:
     """Where the popped-up pinned shell of a patch has an end."""
     shell = form.found[end.patch]
     rods = [rod.name for rod in shell.footprint.rods]
     return shell.popped["pinned"].positions[shell.footprint.mesh.ends[rods.index(end.rod), end.side]]
 
 
-def off_seams(form: gs.Sewn, x: Floats) -> Floats:
+def off_seams(form: rs.Sewn, x: Floats) -> Floats:
     """(n,) distance in plan to the nearest seam's line, by dense points along it."""
     dense = []
     for seam in form.seams:
@@ -154,7 +154,7 @@ def test_a_patch_alone_is_the_same_form() -> None:
     """One job with the patch's boundary and rods; only its ends are not moved (0.1 mm) to where the others are."""
     form = sewn("dome, diagonal")
     for name, laid in form.laid.items():
-        alone = gs.find_form(laid.patch, laid.layout, ROD, anchor=laid.anchor, ends=("clamped",))
+        alone = rs.find_form(laid.patch, laid.layout, ROD, anchor=laid.anchor, ends=("clamped",))
         found = form.found[name]
         held = found.footprint.mesh.ends.ravel()
         free = np.setdiff1d(np.arange(found.footprint.mesh.node_count), held)
@@ -195,28 +195,28 @@ def test_seams_carry_what_the_patches_do_not() -> None:
 
 def test_a_sphere_beyond_the_nets_limit_is_formed_in_two() -> None:
     with pytest.raises(NetLimitError):
-        gs.find_form(BALL, layout_of(0.035), ROD)
+        rs.find_form(BALL, layout_of(0.035), ROD)
     form = sewn("ball")
     assert min(laid.net.min_angle for laid in form.laid.values()) > np.radians(20)
     assert all("would swing" in why for _, why in form.dropped)
 
 
 def test_a_valley_with_a_seam_holds_the_grid_down() -> None:
-    whole = gs.find_form(BUMPS, layout_of(0.032), ROD, ends=("clamped",))
+    whole = rs.find_form(BUMPS, layout_of(0.032), ROD, ends=("clamped",))
     assert sewn("two bumps, in the valley").agreement["clamped"].rms < 0.3 * whole.agreement["clamped"].rms
 
 
 def test_the_search_leaves_out_no_more_rods_than_the_default_heading() -> None:
     target, seams, spacing = CASES["dome, aside"]
     layout = layout_of(1.2 * spacing)
-    default, found = (gs.sew(target, seams, layout, ROD, ends=(), search=one) for one in (False, True))
+    default, found = (rs.sew(target, seams, layout, ROD, ends=(), search=one) for one in (False, True))
     assert len(found.dropped) < len(default.dropped)
     assert any("rods are left out" in word for word in default.warnings)
 
 
 def test_a_patch_may_have_its_own_spacing_and_anchor() -> None:
-    own = {"B": gs.PatchLayout(anchor=(0.1, -0.1), spacing=(0.05, 0.05))}
-    form = gs.sew(DOME, [DIAGONAL], layout_of(0.04), ROD, own=own, ends=())
+    own = {"B": rs.PatchLayout(anchor=(0.1, -0.1), spacing=(0.05, 0.05))}
+    form = rs.sew(DOME, [DIAGONAL], layout_of(0.04), ROD, own=own, ends=())
     assert form.laid["B"].layout.spacing == (0.05, 0.05)
     np.testing.assert_allclose(form.laid["B"].anchor, (0.1, -0.1), atol=0.03 * 0.05)
     assert len(form.meetings) > 10
@@ -245,7 +245,7 @@ def test_running_a_result_again_gives_the_same(tmp_path, monkeypatch) -> None:
 
 
 def test_an_archive_of_patches_gives_itself_again(tmp_path, capsys) -> None:
-    form = gs.sew(DOME, [DIAGONAL], layout_of(0.06), ROD)
+    form = rs.sew(DOME, [DIAGONAL], layout_of(0.06), ROD)
     form.save(tmp_path / "dome")
     assert main(["popup", str(tmp_path / "dome"), "--out", str(tmp_path / "popped")]) == 2
     assert "one patch's rods" in capsys.readouterr().err
@@ -279,11 +279,11 @@ def test_bad_seams_are_one_sentence(words: str, tmp_path, capsys) -> None:
 
 @pytest.mark.parametrize(
     ("own", "words"),
-    [({"C": gs.PatchLayout()}, "no patch"), ({"A": gs.PatchLayout(anchor=(1.0, 0.0))}, "patch A|no point")],
+    [({"C": rs.PatchLayout()}, "no patch"), ({"A": rs.PatchLayout(anchor=(1.0, 0.0))}, "patch A|no point")],
 )
-def test_patches_that_are_not_there_are_refused(own: dict[str, gs.PatchLayout], words: str) -> None:
+def test_patches_that_are_not_there_are_refused(own: dict[str, rs.PatchLayout], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        gs.sew(DOME, [DIAGONAL], layout_of(0.04), ROD, own=own)
+        rs.sew(DOME, [DIAGONAL], layout_of(0.04), ROD, own=own)
 
 
 @pytest.mark.parametrize("rotate", [0.0, 0.4])

@@ -15,13 +15,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import fresnel
 
-from gridshell.errors import InputError
-from gridshell.formfinding import Draped, Trimmed, drape, map_back, trim
-from gridshell.formfinding.trim import end_tangents, untrimmed
-from gridshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
-from gridshell.nets import sphere_net_end, sphere_net_rod
-from gridshell.rods.section import Circle, Material, Rod
-from gridshell.targets import Ellipsoid, Hemisphere, Paraboloid, Target
+from rodshell.errors import InputError
+from rodshell.formfinding import Draped, Trimmed, drape, map_back, trim
+from rodshell.formfinding.trim import end_tangents, untrimmed
+from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
+from rodshell.nets import sphere_net_end, sphere_net_rod
+from rodshell.rods.section import Circle, Material, Rod
+from rodshell.targets import Ellipsoid, Hemisphere, Paraboloid, Target
 
 Floats = NDArray[np.float64]
 

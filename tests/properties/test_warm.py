@@ -5,27 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.formfinding.carried import carried_edges, carried_nodes, corresponding
-from gridshell.nets import nearby
-from gridshell.nets.chebyshev import chebyshev_net
-from gridshell.nets.compass import march
-from gridshell.nets.nearby import march_near
+import rodshell as rs
+from rodshell.formfinding.carried import carried_edges, carried_nodes, corresponding
+from rodshell.nets import nearby
+from rodshell.nets.chebyshev import chebyshev_net
+from rodshell.nets.compass import march
+from rodshell.nets.nearby import march_near
 
 SIZE = 0.2
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
-HEMISPHERE = gs.Hemisphere(SIZE)
-BUMPS = gs.HeightField(
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
+HEMISPHERE = rs.Hemisphere(SIZE)
+BUMPS = rs.HeightField(
     formula="0.08*(exp(-((x-.09)^2/.06^2 + y^2/.07^2)/2) + exp(-((x+.09)^2/.06^2 + y^2/.07^2)/2))",
-    domain=gs.Disc(SIZE),
+    domain=rs.Disc(SIZE),
 )
-OVAL = gs.Ellipsoid(SIZE, 0.15, 0.12)
+OVAL = rs.Ellipsoid(SIZE, 0.15, 0.12)
 EXACT = 1e-12  # m: the net's equations are solved to 1e-12 of the size and better; 1e-14 measured
 SETTLED = 1e-9 * SIZE  # Newton's last step is shorter than 1e-6 of the size, the error left its square
 
 
 def layout_of(**options):
-    return gs.GridLayout.orthogonal(**{"spacing": 0.05, "edge": 0.0125} | options)
+    return rs.GridLayout.orthogonal(**{"spacing": 0.05, "edge": 0.0125} | options)
 
 
 def lines(reach, step):
@@ -40,7 +40,7 @@ def largest(difference):
 # The net
 
 
-@pytest.mark.parametrize("target", [HEMISPHERE, OVAL, BUMPS, gs.Paraboloid(SIZE, 0.12)], ids=lambda t: t.name)
+@pytest.mark.parametrize("target", [HEMISPHERE, OVAL, BUMPS, rs.Paraboloid(SIZE, 0.12)], ids=lambda t: t.name)
 @pytest.mark.parametrize("step", [0.02, 0.04], ids=["from a near one", "from a rough one"])
 def test_all_nodes_together_are_the_net_that_the_march_finds_one_by_one(target, step):
     """Past the hemisphere's equator there is no net: the same nodes are missing."""
@@ -62,7 +62,7 @@ def test_a_bad_guess_of_the_net_does_no_harm(worse):
     points = expected.points.copy()
     match worse:
         case "of another target":
-            points = march(gs.Paraboloid(0.15, 0.3), u, u, np.array([0.0, 0.0, 0.3]), heading).points
+            points = march(rs.Paraboloid(0.15, 0.3), u, u, np.array([0.0, 0.0, 0.3]), heading).points
         case "of noise":
             points += 0.05 * np.sin(1e5 * np.arange(points.size)).reshape(points.shape)
         case "of nothing":
@@ -89,8 +89,8 @@ def test_a_net_found_near_another_asks_the_target_less_often(monkeypatch):
     layout, asked = layout_of(), []
     last = chebyshev_net(BUMPS, layout_of(spacing=0.051))
     for name in ("level", "implicit"):
-        answer = getattr(gs.HeightField, name)
-        monkeypatch.setattr(gs.HeightField, name, lambda self, x, say=answer: asked.append(len(x)) or say(self, x))
+        answer = getattr(rs.HeightField, name)
+        monkeypatch.setattr(rs.HeightField, name, lambda self, x, say=answer: asked.append(len(x)) or say(self, x))
     chebyshev_net(BUMPS, layout)
     cold, asked[:] = len(asked), []
     chebyshev_net(BUMPS, layout, near=last)
@@ -104,25 +104,25 @@ CHANGES = {
     "unequal spacing": (OVAL, {"spacing": (0.049, 0.052)}, {}),
     "heading": (OVAL, {"rotate": 0.03}, {}),
     "anchor": (OVAL, {}, {"anchor": (0.023, 0.008)}),
-    "size": (gs.Ellipsoid(0.204, 0.15, 0.122), {}, {}),
+    "size": (rs.Ellipsoid(0.204, 0.15, 0.122), {}, {}),
     "edge": (OVAL, {"edge": 0.008}, {}),
     "rods left out": (OVAL, {"rods": (5, 4)}, {}),
-    "another target": (gs.Paraboloid(SIZE, 0.15), {}, {}),
-    "another joint": (OVAL, {}, {"joint": gs.Pin()}),
+    "another target": (rs.Paraboloid(SIZE, 0.15), {}, {}),
+    "another joint": (OVAL, {}, {"joint": rs.Pin()}),
 }
 
 
 @pytest.fixture(scope="module")
 def last():
-    return gs.find_form(OVAL, layout_of(), ROD, anchor=(0.02, 0.01))
+    return rs.find_form(OVAL, layout_of(), ROD, anchor=(0.02, 0.01))
 
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_form_found_from_the_last_one_is_the_form_found_from_nothing(change, last):
     target, layout, options = CHANGES[change]
     options = {"anchor": (0.02, 0.01)} | options
-    cold = gs.find_form(target, layout_of(**layout), ROD, **options)
-    warm = gs.find_form(target, layout_of(**layout), ROD, start=last, **options)
+    cold = rs.find_form(target, layout_of(**layout), ROD, **options)
+    warm = rs.find_form(target, layout_of(**layout), ROD, start=last, **options)
     assert cold.status == warm.status == "converged"
     assert [rod.name for rod in warm.footprint.rods] == [rod.name for rod in cold.footprint.rods]
     assert largest(warm.footprint.points - cold.footprint.points) < EXACT
@@ -134,17 +134,17 @@ def test_a_form_found_from_the_last_one_is_the_form_found_from_nothing(change, l
 
 def test_stiffer_rods_start_with_the_forces_that_they_need(last):
     """The shape does not change: from the last form there is nothing left to do but to see it."""
-    stiff = gs.Rod(section=ROD.section, material=gs.Material(youngs_modulus=1e9, density=1e3))
-    warm = gs.find_form(OVAL, layout_of(), stiff, anchor=(0.02, 0.01), start=last)
+    stiff = rs.Rod(section=ROD.section, material=rs.Material(youngs_modulus=1e9, density=1e3))
+    warm = rs.find_form(OVAL, layout_of(), stiff, anchor=(0.02, 0.01), start=last)
     for popped in warm.popped.values():
         assert popped.report.iterations == 1
         assert popped.report.stable
 
 
 def test_a_shell_that_springs_off_takes_fewer_steps_from_the_last_one():
-    last = gs.find_form(BUMPS, layout_of(), ROD)
+    last = rs.find_form(BUMPS, layout_of(), ROD)
     again = layout_of(spacing=0.0505)
-    cold, warm = (gs.find_form(BUMPS, again, ROD, start=start) for start in (None, last))
+    cold, warm = (rs.find_form(BUMPS, again, ROD, start=start) for start in (None, last))
     for ends in cold.popped:
         assert warm.popped[ends].report.factorizations <= 0.75 * cold.popped[ends].report.factorizations
         assert largest(warm.popped[ends].positions - cold.popped[ends].positions) < SETTLED
@@ -152,10 +152,10 @@ def test_a_shell_that_springs_off_takes_fewer_steps_from_the_last_one():
 
 def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last):
     """Half inside out: from there Newton's method finds the shell that is popped down, stable too, or nothing."""
-    for form in (last, gs.find_form(HEMISPHERE, layout_of(), ROD, ends=("pinned",))):
+    for form in (last, rs.find_form(HEMISPHERE, layout_of(), ROD, ends=("pinned",))):
         popped, trimmed = form.popped["pinned"], form.trimmed
         down = replace(popped, positions=popped.positions * [1.0, 1.0, -0.85])
-        again = gs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", start=down)
+        again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", start=down)
         assert again.report.stable
         assert largest(again.positions - popped.positions) < SETTLED
 
@@ -169,7 +169,7 @@ def test_fields_are_carried_unchanged_to_the_same_mesh_and_linear_ones_to_any(la
     np.testing.assert_allclose(carried_nodes(field, mesh, mesh), field, atol=1e-12)
     forces = np.cos(np.arange(len(mesh.edges)))
     np.testing.assert_allclose(carried_edges(forces, mesh, mesh), forces, atol=1e-12)
-    fine = gs.find_form(OVAL, layout_of(edge=0.005), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
+    fine = rs.find_form(OVAL, layout_of(edge=0.005), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
     straight = mesh.flat[:, :1]
     carried = carried_nodes(straight, mesh, fine)
     np.testing.assert_allclose(carried, fine.flat[:, :1], atol=1e-6)  # rods differ by 3e-7 m in length
@@ -177,7 +177,7 @@ def test_fields_are_carried_unchanged_to_the_same_mesh_and_linear_ones_to_any(la
 
 def test_rods_without_a_counterpart_get_nothing(last):
     mesh = last.footprint.mesh
-    few = gs.find_form(OVAL, layout_of(rods=(5, 4)), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
+    few = rs.find_form(OVAL, layout_of(rods=(5, 4)), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
     pairs = dict(corresponding(few, mesh))
     offsets = {mesh.grid.rods[new].offset: few.grid.rods[old].offset for new, old in pairs.items()}
     assert all(abs(new - old) < 1e-12 for new, old in offsets.items())
@@ -193,7 +193,7 @@ def test_rods_without_a_counterpart_get_nothing(last):
 
 def test_a_net_searched_for_in_its_own_steps_needs_no_other_guess():
     """Narrow, so that the search takes four steps to a spacing, as the coarse march does: no difference to go by."""
-    peak = gs.HeightField(function=lambda x, y: 0.15 * np.exp(-(x * x + y * y) / (2 * 0.04**2)), domain=gs.Disc(0.2))
+    peak = rs.HeightField(function=lambda x, y: 0.15 * np.exp(-(x * x + y * y) / (2 * 0.04**2)), domain=rs.Disc(0.2))
     with np.errstate(all="raise"):
-        net = chebyshev_net(peak, gs.GridLayout.orthogonal(spacing=0.08, edge=0.01))
+        net = chebyshev_net(peak, rs.GridLayout.orthogonal(spacing=0.08, edge=0.01))
     assert net.error_estimate < 0.01 * 0.08

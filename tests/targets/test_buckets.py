@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gridshell.targets.buckets import Buckets
+from rodshell.targets.buckets import Buckets
 from tests.targets.meshes import Floats
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.targets.closest import newton_to_closest, shape_operators
+import rodshell as rs
+from rodshell.targets.closest import newton_to_closest, shape_operators
 from tests.targets.meshes import PARTS, Floats
 
 COUNT = 200
@@ -58,7 +58,7 @@ def test_shape_operators_are_projected_hessians():
 
 
 def test_distances_are_those_of_gaps_on_both_sides():
-    target = gs.Freeform.of(*PARTS["saddle"]())
+    target = rs.Freeform.of(*PARTS["saddle"]())
     x = target.surface.vertices[::7] + np.random.default_rng(2).normal(0, 0.01, (len(target.surface.vertices[::7]), 3))
     gap = target.gap(x)
     assert np.sign(gap.distance).tolist().count(-1.0) > 20

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.case import load_case
-from gridshell.cli import main
-from gridshell.targets import Freeform
-from gridshell.targets.curvefile import read_curves
+import rodshell as rs
+from rodshell.case import load_case
+from rodshell.cli import main
+from rodshell.targets import Freeform
+from rodshell.targets.curvefile import read_curves
 from tests.acceptance.targets_broken import WRITERS, broken_files, called
 from tests.targets.meshes import PARTS, Mesh
 
@@ -36,7 +36,7 @@ def test_every_format_gives_the_same_surface(kind, bowl, tmp_path):
         write_glb(path, bowl)
     else:
         path.write_bytes(WRITERS[kind](*bowl))
-    target = gs.surface_from(path, unit=MM)
+    target = rs.surface_from(path, unit=MM)
     assert target.size == pytest.approx(0.2, rel=1e-5)
     points = bowl[0][::7] * MM
     assert np.abs(target.implicit(points).value).max() < 5e-6
@@ -45,10 +45,10 @@ def test_every_format_gives_the_same_surface(kind, bowl, tmp_path):
 
 def test_gltf_is_in_metres_and_others_must_say_their_unit(bowl, tmp_path):
     write_glb(tmp_path / "bowl.glb", (MM * bowl[0], bowl[1]))
-    assert gs.surface_from(tmp_path / "bowl.glb").size == pytest.approx(0.2, rel=1e-5)
+    assert rs.surface_from(tmp_path / "bowl.glb").size == pytest.approx(0.2, rel=1e-5)
     (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
-    with pytest.raises(gs.InputError, match=r"its unit \(it is 400 x 400 x [0-9.]+ units wide\).* --unit mm"):
-        gs.surface_from(tmp_path / "bowl.obj")
+    with pytest.raises(rs.InputError, match=r"its unit \(it is 400 x 400 x [0-9.]+ units wide\).* --unit mm"):
+        rs.surface_from(tmp_path / "bowl.obj")
 
 
 def test_of_several_objects_one_is_chosen_by_its_name(bowl, tmp_path):
@@ -58,11 +58,11 @@ def test_of_several_objects_one_is_chosen_by_its_name(bowl, tmp_path):
     scene.add_geometry(trimesh.Trimesh(MM * bowl[0], bowl[1], process=False), geom_name="roof")
     scene.add_geometry(trimesh.Trimesh(MM * bowl[0] + 2, bowl[1], process=False), geom_name="wall")
     scene.export(tmp_path / "house.glb")
-    with pytest.raises(gs.InputError, match="2 separate pieces"):
-        gs.surface_from(tmp_path / "house.glb")
-    with pytest.raises(gs.InputError, match=r'no object named "door": it holds "(roof|wall)", "(roof|wall)"'):
-        gs.surface_from(tmp_path / "house.glb", name="door")
-    assert gs.surface_from(tmp_path / "house.glb", name="wall").summit == pytest.approx((2.0, 2.0), abs=1e-3)
+    with pytest.raises(rs.InputError, match="2 separate pieces"):
+        rs.surface_from(tmp_path / "house.glb")
+    with pytest.raises(rs.InputError, match=r'no object named "door": it holds "(roof|wall)", "(roof|wall)"'):
+        rs.surface_from(tmp_path / "house.glb", name="door")
+    assert rs.surface_from(tmp_path / "house.glb", name="wall").summit == pytest.approx((2.0, 2.0), abs=1e-3)
 
 
 def test_a_table_of_heights_is_its_surface(tmp_path):
@@ -74,13 +74,13 @@ def test_a_table_of_heights_is_its_surface(tmp_path):
     x, y = np.linspace(-0.2, 0.2, 41), np.linspace(0.15, -0.15, 31)
     table = height(x[None], y[:, None])
     np.savetxt(tmp_path / "roof.csv", 1e3 * table, delimiter=";")
-    target = gs.heights_from(tmp_path / "roof.csv", size=(0.4, 0.3), height=MM)
+    target = rs.heights_from(tmp_path / "roof.csv", size=(0.4, 0.3), height=MM)
     px, py = np.random.default_rng(0).uniform(-0.14, 0.14, (2, 200))
     assert target.height(np.column_stack([px, py])) == pytest.approx(height(px, py), abs=1e-6)
     rows = [",".join(f"{z:.6f}" for z in row) for row in table]
     rows[15] = ",".join("" if k == 20 else cell for k, cell in enumerate(rows[15].split(",")))
     (tmp_path / "holed.csv").write_text("\n".join(rows))
-    holed = gs.heights_from(tmp_path / "holed.csv", size=(0.4, 0.3))
+    holed = rs.heights_from(tmp_path / "holed.csv", size=(0.4, 0.3))
     assert len(holed.surface.loops) == 2
     assert np.sign(holed.margin(np.array([[0.0, 0.0, 0.1], [0.05, 0.0, 0.1]]))).tolist() == [-1.0, 1.0]
 
@@ -90,7 +90,7 @@ def test_a_grey_image_is_heights_between_black_and_white(tmp_path):
     x, y = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(1, -1, 40))
     share = 0.9 - 0.4 * x**2 - 0.3 * y**2 + 0.1 * x
     image.fromarray(np.rint(65535 * share).astype(np.uint16)).save(tmp_path / "roof.png")
-    target = gs.heights_from(tmp_path / "roof.png", size=(0.6, 0.4), height=0.2)
+    target = rs.heights_from(tmp_path / "roof.png", size=(0.6, 0.4), height=0.2)
     assert target.height(np.array([[0.15, 0.1], [-0.15, -0.1]])) == pytest.approx(
         0.2 * (0.9 - 0.1 - 0.075 + 0.05 * np.array([1, -1])), abs=2e-5
     )
@@ -107,9 +107,9 @@ def test_a_nurbs_patch_is_met_and_its_trim_bounds_it(tmp_path):
     model.Objects.AddBrep(rhino3dm.Brep.CreateTrimmedPlane(rhino3dm.Plane.WorldXY(), circle), named)
     model.Objects.AddBrep(rhino3dm.Sphere(rhino3dm.Point3d(0, 0, 0), 200.0).ToBrep(), rhino3dm.ObjectAttributes())
     model.Write(str(tmp_path / "two.3dm"), 7)
-    with pytest.raises(gs.InputError, match="2 surfaces: choose one"):
-        gs.surface_from(tmp_path / "two.3dm")
-    target = gs.surface_from(tmp_path / "two.3dm", name="round")
+    with pytest.raises(rs.InputError, match="2 surfaces: choose one"):
+        rs.surface_from(tmp_path / "two.3dm")
+    target = rs.surface_from(tmp_path / "two.3dm", name="round")
     angle = np.linspace(0, 6, 40)
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     assert target.margin(0.1 * ring) == pytest.approx(0.05, rel=1e-3)
@@ -138,9 +138,9 @@ def test_a_tube_too_takes_its_radius_from_the_size_of_a_surface(bowl, tmp_path):
     tube = {"target.unit": "mm", "rod.section.kind": "tube", "rod.section.thickness": "0.1 mm"}
     case = load_case(tmp_path / "roof.obj", tube)
     section = case.build().rod.section
-    assert isinstance(section, gs.Tube)
+    assert isinstance(section, rs.Tube)
     assert (section.radius, section.thickness) == (pytest.approx(0.001, rel=1e-4), 0.0001)
-    with pytest.raises(gs.InputError, match="no target whose size"):
+    with pytest.raises(rs.InputError, match="no target whose size"):
         case.rod.build()
 
 
@@ -161,11 +161,11 @@ def test_a_surface_with_nothing_inside_its_edge_is_told_why(bowl, tmp_path):
 
     trimesh.creation.box((12, 8, 3)).export(tmp_path / "box.stl")
     for base in (None, 1.0):
-        with pytest.raises(gs.InputError, match=r'no vertex of "box.stl" lies inside its edge.* mesh it more finely'):
-            gs.surface_from(tmp_path / "box.stl", unit=1.0, base=base)
+        with pytest.raises(rs.InputError, match=r'no vertex of "box.stl" lies inside its edge.* mesh it more finely'):
+            rs.surface_from(tmp_path / "box.stl", unit=1.0, base=base)
     (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
-    with pytest.raises(gs.InputError, match=r'nothing of "bowl\.obj" lies inside its end: choose a lower base'):
-        gs.surface_from(tmp_path / "bowl.obj", unit=MM, base=100.0)
+    with pytest.raises(rs.InputError, match=r'nothing of "bowl\.obj" lies inside its end: choose a lower base'):
+        rs.surface_from(tmp_path / "bowl.obj", unit=MM, base=100.0)
 
 
 def test_broken_files_are_refused_in_one_sentence(tmp_path):
@@ -189,8 +189,8 @@ def test_broken_files_are_refused_in_one_sentence(tmp_path):
 def test_what_went_wrong_inside_a_reader_is_not_the_users_business(name, content, tmp_path):
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(gs.InputError) as caught:
-        gs.surface_from(path, unit=1.0)
+    with pytest.raises(rs.InputError) as caught:
+        rs.surface_from(path, unit=1.0)
     assert f"cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export" in str(
         caught.value
     )
@@ -205,7 +205,7 @@ def test_what_went_wrong_inside_a_reader_is_not_the_users_business(name, content
 def test_curves_that_cannot_be_read_are_refused_in_plain_words(name, content, said, tmp_path):
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    with pytest.raises(gs.InputError, match=said):
+    with pytest.raises(rs.InputError, match=said):
         read_curves(tmp_path / name, 1.0)
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.targets import Freeform
-from gridshell.targets.footing import Outline
-from gridshell.targets.rim import Rim
+import rodshell as rs
+from rodshell.targets import Freeform
+from rodshell.targets.footing import Outline
+from rodshell.targets.rim import Rim
 from tests.acceptance.cases import ROD
 from tests.targets.meshes import Floats, capped_sphere, disc, lattice, sheet
 from tests.targets.test_rim import flat, ring, up
@@ -23,12 +23,12 @@ def ball(opening: float, base: float | None = None, rows: int = 40) -> Freeform:
     return Freeform.of(RADIUS * x, faces, base=base)
 
 
-BODIES: dict[str, tuple[gs.Target, Freeform]] = {
-    "base plane": (gs.Hemisphere(RADIUS), ball(np.pi / 2 + 0.3, base=0.0)),
-    "level edge": (gs.Hemisphere(RADIUS), ball(np.pi / 2)),
-    "overhang": (gs.Cap(radius=RADIUS, base=-0.06), ball(2.4, base=-0.06)),
+BODIES: dict[str, tuple[rs.Target, Freeform]] = {
+    "base plane": (rs.Hemisphere(RADIUS), ball(np.pi / 2 + 0.3, base=0.0)),
+    "level edge": (rs.Hemisphere(RADIUS), ball(np.pi / 2)),
+    "overhang": (rs.Cap(radius=RADIUS, base=-0.06), ball(2.4, base=-0.06)),
     "edge in space": (
-        gs.HeightField(formula="0.12 - 1.2*x^2 - 0.5*y^2 + 0.2*x*y + 0.03*x", domain=gs.Disc(RADIUS)),
+        rs.HeightField(formula="0.12 - 1.2*x^2 - 0.5*y^2 + 0.2*x*y + 0.03*x", domain=rs.Disc(RADIUS)),
         Freeform.of(*disc(roof, RADIUS, 40)),
     ),
 }
@@ -66,10 +66,10 @@ def test_far_from_a_mesh_too_contact_is_that_with_its_formula(name):
 
 
 def test_a_grid_may_fall_on_a_mesh_from_high_above():
-    layout = gs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, edge=0.03, length=0.9)
+    layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, edge=0.03, length=0.9)
     ends = []
     for target in BODIES["base plane"]:
-        draped = gs.drape(layout, ROD, target, method="paper", fall=gs.Fall(height=0.16))
+        draped = rs.drape(layout, ROD, target, method="paper", fall=rs.Fall(height=0.16))
         assert draped.converged
         ends.append(draped.positions)
     assert ends[1] == pytest.approx(ends[0], abs=1e-3 * RADIUS)  # as still as "at rest" is
@@ -79,18 +79,18 @@ def test_an_outline_is_the_region_that_it_encloses():
     round_one = Outline(Rim.of([ring(RADIUS, 200)], flat, up))
     xy = np.random.default_rng(1).uniform(-0.4, 0.4, (500, 2))
     xy = xy[np.hypot(*xy.T) > 0.05]
-    found, exact = round_one.distance(xy), gs.Disc(RADIUS).distance(xy)
+    found, exact = round_one.distance(xy), rs.Disc(RADIUS).distance(xy)
     assert found[0] == pytest.approx(exact[0], abs=1e-6)
     assert found[1] == pytest.approx(exact[1], abs=5e-3)  # edges of a thousandth of the way round
     outer = exact[0] > -0.3 * RADIUS  # nearer to the centre the edges' own turns count more
     assert found[2][outer] == pytest.approx(exact[2][outer], abs=0.05 / RADIUS)
-    assert np.array_equal(round_one.holds(xy), gs.Disc(RADIUS).holds(xy))
+    assert np.array_equal(round_one.holds(xy), rs.Disc(RADIUS).holds(xy))
     corners = np.array([[0.3, 0.2, 0], [-0.3, 0.2, 0], [-0.3, -0.2, 0], [0.3, -0.2, 0]])
     square = Outline(Rim.of([corners], flat, up))
     assert square.half_extent == (0.3, 0.2)
     far = np.random.default_rng(2).uniform(-0.6, 0.6, (500, 2))
     far = far[np.abs(np.abs(far[:, 0]) - np.abs(far[:, 1]) - 0.1) > 0.01]  # off the diagonals, where normals jump
-    for found, exact in zip(square.distance(far), gs.Rectangle((0.6, 0.4)).distance(far), strict=True):
+    for found, exact in zip(square.distance(far), rs.Rectangle((0.6, 0.4)).distance(far), strict=True):
         assert found == pytest.approx(exact, abs=1e-9)
 
 
@@ -104,13 +104,13 @@ def test_a_plane_cuts_a_ball_in_a_circle():
 
 
 def test_a_grid_hangs_on_a_mesh_as_on_its_formula():
-    layout = gs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.02, length=0.9)
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.02, length=0.9)
     ends = []
     for target in BODIES["base plane"]:
-        draped = gs.drape(layout, ROD, target, method="gravity")
+        draped = rs.drape(layout, ROD, target, method="gravity")
         assert draped.converged
         assert draped.report.stable
-        ends.append([(rod.start, rod.end) for rod in gs.trim(draped).mesh.grid.rods])
+        ends.append([(rod.start, rod.end) for rod in rs.trim(draped).mesh.grid.rods])
     assert np.array(ends[1]) == pytest.approx(np.array(ends[0]), abs=5e-5 * RADIUS)
 
 
@@ -121,5 +121,5 @@ def test_what_is_no_body_is_refused_with_what_to_do():
     twice = Freeform.of(*sheet(lambda x, y: 0.1 - 5 * x**2 + 0.1 * y, 0.2, 60), base=0.05)
     x = np.zeros((1, 3))
     for target, why in ((ringed, "has openings"), (steep, "too steep near"), (twice, "at its base and elsewhere")):
-        with pytest.raises(gs.InputError, match=f'{why}.*use drape method "bound"'):
+        with pytest.raises(rs.InputError, match=f'{why}.*use drape method "bound"'):
             target.contact(x)

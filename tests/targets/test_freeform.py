@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.targets import Freeform
-from gridshell.targets.trianglemesh import sound_mesh
+import rodshell as rs
+from rodshell.targets import Freeform
+from rodshell.targets.trianglemesh import sound_mesh
 from tests.targets.meshes import PARTS, Floats, Mesh, capped_sphere, disc, lattice, sheet
 
-ROD = gs.Rod(section=gs.Circle(radius=1e-3), material=gs.Material(youngs_modulus=1e6, density=1e3))
+ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 RADIUS = 0.2
 
 
-def layout(**changes: object) -> gs.GridLayout:
-    return gs.GridLayout.orthogonal(**{"spacing": 0.04, "edge": 0.01, **changes})  # type: ignore[arg-type]
+def layout(**changes: object) -> rs.GridLayout:
+    return rs.GridLayout.orthogonal(**{"spacing": 0.04, "edge": 0.01, **changes})  # type: ignore[arg-type]
 
 
-def ends(target: gs.Target, **options: object) -> dict[tuple[str, float], tuple[float, float]]:
+def ends(target: rs.Target, **options: object) -> dict[tuple[str, float], tuple[float, float]]:
     """Start and end of each line of the net, by family and offset in spacings of 40 mm."""
-    net = gs.chebyshev_net(target, layout(), **options)  # type: ignore[arg-type]
+    net = rs.chebyshev_net(target, layout(), **options)  # type: ignore[arg-type]
     return {(rod.family, round(rod.offset / 0.04, 6)): (rod.start, rod.end) for rod in net.rods}
 
 
@@ -38,9 +38,9 @@ def dome(rows: int = 30) -> Mesh:
 @pytest.mark.parametrize(
     ("kind", "target"),
     [
-        ("ball", gs.Hemisphere(RADIUS)),
-        ("ellipsoid", gs.Ellipsoid(a=0.2, b=0.15, c=0.12)),
-        ("saddle", gs.HeightField(formula="(x^2 - y^2)/0.8", domain=gs.Disc(RADIUS))),
+        ("ball", rs.Hemisphere(RADIUS)),
+        ("ellipsoid", rs.Ellipsoid(a=0.2, b=0.15, c=0.12)),
+        ("saddle", rs.HeightField(formula="(x^2 - y^2)/0.8", domain=rs.Disc(RADIUS))),
     ],
 )
 def test_rod_ends_converge_to_those_of_the_analytic_target(kind, target):
@@ -97,21 +97,21 @@ def test_the_same_surface_written_otherwise_gives_the_same_form(change):
 def test_moved_turned_and_scaled_it_is_the_same_form():
     x, faces = PARTS["bowl"]()
     here = ends(Freeform.of(x, faces), anchor=(0.02, 0.01))
-    place = gs.Placement(scale=1000.0, turn=(0.0, 0.0, 0.7), move=(300.0, -20.0, 5.0))
+    place = rs.Placement(scale=1000.0, turn=(0.0, 0.0, 0.7), move=(300.0, -20.0, 5.0))
     there = Freeform.of(place(x), faces)
     anchor = place(np.array([[0.02, 0.01, 0.0]]))[0, :2]
-    grid = gs.GridLayout.orthogonal(spacing=40.0, edge=10.0, rotate=0.7)
-    net = gs.chebyshev_net(there, grid, anchor=(float(anchor[0]), float(anchor[1])))
+    grid = rs.GridLayout.orthogonal(spacing=40.0, edge=10.0, rotate=0.7)
+    net = rs.chebyshev_net(there, grid, anchor=(float(anchor[0]), float(anchor[1])))
     moved = {(rod.family, round(rod.offset / 40.0, 6)): (rod.start / 1e3, rod.end / 1e3) for rod in net.rods}
     assert apart(here, moved) < 2e-5 * RADIUS
     assert there.size == pytest.approx(1000 * 0.5 * (0.4 * (np.cos(0.7) + np.sin(0.7))), rel=1e-3)
 
 
 def test_placement_turns_about_x_then_y_then_z_and_then_moves():
-    place = gs.Placement(scale=2.0, turn=(np.pi / 2, 0.0, np.pi / 2), move=(1.0, 2.0, 3.0))
+    place = rs.Placement(scale=2.0, turn=(np.pi / 2, 0.0, np.pi / 2), move=(1.0, 2.0, 3.0))
     # y -> z by the turn about x; x -> y by that about z
     assert place(np.eye(3)) == pytest.approx(np.array([[1, 4, 3], [1, 2, 5], [3, 2, 3]]), abs=1e-12)
-    assert gs.Placement(move=(1.0, 0.0, 0.0)).parameters() == {"move": [1.0, 0.0, 0.0]}
+    assert rs.Placement(move=(1.0, 0.0, 0.0)).parameters() == {"move": [1.0, 0.0, 0.0]}
 
 
 def test_a_vault_in_long_triangles_is_round():
@@ -150,7 +150,7 @@ def test_an_open_patch_ends_at_its_boundary_and_the_rim_is_rounded():
 def test_a_closed_ball_cut_by_a_plane_is_the_cap(base):
     x, faces = closed_ball(60)
     target = Freeform.of(RADIUS * x, faces, base=base)
-    assert apart(ends(target, anchor=(0.0, 0.0)), ends(gs.Cap(radius=RADIUS, base=base), anchor=(0.0, 0.0))) < 1e-5
+    assert apart(ends(target, anchor=(0.0, 0.0)), ends(rs.Cap(radius=RADIUS, base=base), anchor=(0.0, 0.0))) < 1e-5
     assert target.summit == pytest.approx((0.0, 0.0), abs=1e-4 * RADIUS)
     assert target.size == pytest.approx(RADIUS, rel=2e-3)
 
@@ -188,7 +188,7 @@ def test_a_closed_curve_bounds_the_shell_and_a_second_one_opens_it():
     def lifted(radius: float) -> Floats:
         return np.column_stack([radius * circle, 0.1 - radius**2 * (circle[:, 0] ** 2 + 0.5 * circle[:, 1] ** 2)])
 
-    round_one = gs.HeightField(formula="0.1 - x^2 - 0.5*y^2", domain=gs.Disc(RADIUS))
+    round_one = rs.HeightField(formula="0.1 - x^2 - 0.5*y^2", domain=rs.Disc(RADIUS))
     exact = ends(round_one, anchor=(0.0, 0.0))
     level = np.column_stack([RADIUS * circle, np.zeros(len(circle))])
     for curve in (lifted(RADIUS), lifted(RADIUS)[::-1], level):  # of any sense; a plan is projected
@@ -204,7 +204,7 @@ def test_rods_are_cut_at_an_opening_into_pieces_with_their_own_ends():
     t, p = np.meshgrid(np.linspace(0.06, RADIUS, 25), np.linspace(0, 2 * np.pi, 121), indexing="ij")
     x, faces = lattice(t * np.cos(p), t * np.sin(p), 0 * t)
     target = Freeform.of(x, faces)
-    form = gs.find_form(target, layout(), ROD, anchor=(0.12, 0.0))
+    form = rs.find_form(target, layout(), ROD, anchor=(0.12, 0.0))
     assert form.status == "converged"
     for rod in form.footprint.rods:
         offset = rod.offset if rod.family == "u" else rod.offset + 0.12
@@ -227,11 +227,11 @@ def test_an_anchor_may_lie_in_an_opening_and_the_net_keeps_the_symmetry():
     """
     t, p = np.meshgrid(np.linspace(0.25, np.pi / 2, 30), np.linspace(0, 2 * np.pi, 121), indexing="ij")
     x, faces = lattice(RADIUS * np.sin(t) * np.cos(p), RADIUS * np.sin(t) * np.sin(p), RADIUS * np.cos(t))
-    net = gs.chebyshev_net(Freeform.of(x, faces), layout(), anchor=(0.0, 0.0))
+    net = rs.chebyshev_net(Freeform.of(x, faces), layout(), anchor=(0.0, 0.0))
     assert {rod.name for rod in net.rods if rod.offset == 0} == {"U08a", "U08b", "V08a", "V08b"}
     for rod in net.rods:
         outer = -rod.start if rod.name.endswith("a") else rod.end
-        assert outer == pytest.approx(gs.sphere_net_end(RADIUS, rod.offset), abs=0.01 * RADIUS)
+        assert outer == pytest.approx(rs.sphere_net_end(RADIUS, rod.offset), abs=0.01 * RADIUS)
         if rod.offset == 0:
             inner = rod.end if rod.name.endswith("a") else -rod.start
             assert -inner == pytest.approx(0.25 * RADIUS, abs=0.01 * RADIUS)
@@ -251,7 +251,7 @@ def test_the_summit_is_the_peak_the_middle_of_a_ridge_or_the_middle_of_a_saddle(
 def test_an_anchor_is_lifted_to_the_uppermost_sheet():
     target = Freeform.of(*closed_ball(50), base=-0.5)
     assert target.lift(np.array([[0.6, 0.0]]))[0] == pytest.approx([0.6, 0.0, 0.8], abs=5e-5)
-    with pytest.raises(gs.InputError, match=r"no point over \(1\.2, 0\) m"):
+    with pytest.raises(rs.InputError, match=r"no point over \(1\.2, 0\) m"):
         target.lift(np.array([[1.2, 0.0]]))
 
 
@@ -293,7 +293,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("sentence", REFUSED)
 def test_what_is_no_smooth_surface_is_refused_in_one_sentence(sentence):
-    with pytest.raises(gs.InputError, match=sentence) as refusal:
+    with pytest.raises(rs.InputError, match=sentence) as refusal:
         Freeform.of(*REFUSED[sentence])
     assert "\n" not in str(refusal.value)
 
@@ -304,7 +304,7 @@ def test_sheets_that_touch_are_refused_with_the_place():
     x = np.concatenate([far, -0.01 * np.sin(turn), far[::-1]])
     z = np.concatenate([0 * far - 0.01, -0.01 * np.cos(turn), 0 * far + 0.01])
     y = np.linspace(-1, 1, 30)
-    with pytest.raises(gs.InputError, match=r"cannot be followed .* near \(-?0\.\d+, "):
+    with pytest.raises(rs.InputError, match=r"cannot be followed .* near \(-?0\.\d+, "):
         Freeform.of(*lattice(x[:, None] + 0 * y, y + 0 * x[:, None], z[:, None] + 0 * y))
 
 

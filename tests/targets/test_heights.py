@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.targets.greyimage import read_image, smoothed
-from gridshell.targets.heightgrid import read_heights
-from gridshell.targets.heighttable import read_table
+import rodshell as rs
+from rodshell.targets.greyimage import read_image, smoothed
+from rodshell.targets.heightgrid import read_heights
+from rodshell.targets.heighttable import read_table
 
 SIZE = (12.0, 8.0)
 X, Y = np.meshgrid(np.linspace(-6, 6, 13), np.linspace(4, -4, 9))
@@ -72,14 +72,14 @@ def test_points_lie_where_they_say_in_unequal_steps_scaled_and_centred(tmp_path)
 )  # fmt: skip
 def test_what_is_no_lattice_of_heights_is_refused_in_one_sentence(text, message, tmp_path):
     (tmp_path / "roof.csv").write_text(text)
-    with pytest.raises(gs.InputError, match=message) as caught:
+    with pytest.raises(rs.InputError, match=message) as caught:
         read_table(tmp_path / "roof.csv", SIZE)
     assert "\n" not in str(caught.value)
 
 
 def test_points_in_another_proportion_than_the_size_are_refused(tmp_path):
     (tmp_path / "roof.csv").write_text(WRITTEN["points"])
-    with pytest.raises(gs.InputError, match=r"its points span 12 x 8, which is not in the proportion of .* 8 x 12 m"):
+    with pytest.raises(rs.InputError, match=r"its points span 12 x 8, which is not in the proportion of .* 8 x 12 m"):
         read_table(tmp_path / "roof.csv", SIZE[::-1])
 
 
@@ -143,7 +143,7 @@ def test_an_image_of_8_bits_is_told_and_one_of_16_bits_is_taken_as_it_is(mode, w
     if coarse:
         assert step == pytest.approx(LEVEL, rel=1e-3)
         assert notes[0].startswith("roof.png has 256 grey levels, steps of 11.8 mm: its heights were smoothed")
-        target = gs.heights_from(tmp_path / "roof.png", size=SIZE, height=3.0)
+        target = rs.heights_from(tmp_path / "roof.png", size=SIZE, height=3.0)
         assert notes[0] in target.warnings
     else:
         assert notes == ()
@@ -154,8 +154,8 @@ def test_a_grid_forms_on_an_image_of_8_bits(tmp_path):
     """Its terraces had no drape without smoothing."""
     image = pytest.importorskip("PIL.Image")
     image.fromarray(np.round(255 * dome(80)).astype(np.uint8)).save(tmp_path / "roof.png")
-    target = gs.heights_from(tmp_path / "roof.png", size=SIZE, height=3.0)
-    rod = gs.Rod(gs.Circle(radius=0.03), gs.Material(youngs_modulus=1e6, density=1e3))
-    draped = gs.drape(gs.GridLayout.orthogonal(spacing=1.0), rod, target)
+    target = rs.heights_from(tmp_path / "roof.png", size=SIZE, height=3.0)
+    rod = rs.Rod(rs.Circle(radius=0.03), rs.Material(youngs_modulus=1e6, density=1e3))
+    draped = rs.drape(rs.GridLayout.orthogonal(spacing=1.0), rod, target)
     assert draped.report.converged
     assert draped.report.negative_modes == 0

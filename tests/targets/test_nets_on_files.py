@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.nets.cuts import _region
-from gridshell.targets import Freeform
+import rodshell as rs
+from rodshell.nets.cuts import _region
+from rodshell.targets import Freeform
 from tests.targets.meshes import PARTS, Mesh, lattice, sheet
 
 
@@ -16,11 +16,11 @@ def tent() -> Mesh:
     return lattice(5 * out * np.cos(angle), 5 * out * np.sin(angle), z)
 
 
-TARGETS: dict[str, gs.Target] = {
+TARGETS: dict[str, rs.Target] = {
     "opening": Freeform.of(*tent()),
     "base": Freeform.of(*PARTS["ball"](), base=-0.2),
     "negative": Freeform.of(*PARTS["saddle"]()),
-    "disc": gs.HeightField(formula="0.1 - x^2 - 2*y^2", domain=gs.Disc(0.2)),
+    "disc": rs.HeightField(formula="0.1 - x^2 - 2*y^2", domain=rs.Disc(0.2)),
 }
 
 
@@ -29,7 +29,7 @@ TARGETS: dict[str, gs.Target] = {
 def test_squares_of_nodes_are_inside_where_each_of_them_is(name, lines):
     target = TARGETS[name]
     spacing = 2 * target.size / lines
-    net = gs.chebyshev_net(target, gs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 3, rotate=0.3)).net
+    net = rs.chebyshev_net(target, rs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 3, rotate=0.3)).net
     known = np.isfinite(net.points[:, :, 0])
     expected = np.zeros(known.shape, dtype=bool)
     expected[known] = target.margin(net.points[known]) > 0
@@ -42,7 +42,7 @@ def test_a_net_across_an_opening_keeps_the_symmetry_of_the_target():
 
     A fill that is not centred in the opening left 1.8e-3.
     """
-    net = gs.chebyshev_net(TARGETS["opening"], gs.GridLayout.orthogonal(spacing=0.6, edge=0.15), anchor=(0.0, 0.0))
+    net = rs.chebyshev_net(TARGETS["opening"], rs.GridLayout.orthogonal(spacing=0.6, edge=0.15), anchor=(0.0, 0.0))
     ends: dict[tuple[str, float], list[float]] = {}
     for rod in net.rods:
         ends.setdefault((rod.family, round(rod.offset, 9)), []).extend((rod.start, rod.end))
@@ -54,20 +54,20 @@ def test_a_net_across_an_opening_keeps_the_symmetry_of_the_target():
 def test_rod_ends_that_two_marches_place_differently_are_warned_of():
     """A peak much sharper than the spacing; the sentence names the place and what helps, and comes true."""
     sharp = Freeform.of(*sheet(lambda x, y: 5 * np.exp(-(x**2 + y**2) / 1.62), 6.0, 121))
-    net = gs.chebyshev_net(sharp, gs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
+    net = rs.chebyshev_net(sharp, rs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
     said = [sentence for sentence in net.warnings if "are known within" in sentence]
     assert len(said) == 1
     assert "use a smaller spacing or shorter edges" in said[0]
     assert f"{net.error_estimate:.3g} m" in said[0]
-    finer = gs.chebyshev_net(sharp, gs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 12))
+    finer = rs.chebyshev_net(sharp, rs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 12))
     assert finer.error_estimate < 0.1 * net.error_estimate
     assert not any("are known within" in sentence for sentence in finer.warnings)
 
 
 def test_lines_that_a_rough_march_misses_are_found_by_a_finer_one():
     """Over a peak with a radius of a seventh of the spacing the march in half spacings ends two lines too early."""
-    target = gs.HeightField(formula="6*exp(-(x^2 + y^2)/1.2)", domain=gs.Disc(6.0))
-    net = gs.chebyshev_net(target, gs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
-    finer = gs.chebyshev_net(target, gs.GridLayout.orthogonal(spacing=0.35, edge=0.7 / 12))
+    target = rs.HeightField(formula="6*exp(-(x^2 + y^2)/1.2)", domain=rs.Disc(6.0))
+    net = rs.chebyshev_net(target, rs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
+    finer = rs.chebyshev_net(target, rs.GridLayout.orthogonal(spacing=0.35, edge=0.7 / 12))
     assert max(rod.end for rod in net.rods) == pytest.approx(max(rod.end for rod in finer.rods), rel=1e-3)
     assert net.min_angle == pytest.approx(finer.min_angle, rel=2e-3)

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gridshell.targets import Freeform
-from gridshell.targets.fitting import Samples, _ring, fit_field
-from gridshell.targets.patches import PatchField
+from rodshell.targets import Freeform
+from rodshell.targets.fitting import Samples, _ring, fit_field
+from rodshell.targets.patches import PatchField
 from tests.targets.meshes import PARTS, Floats, capped_sphere, sheet, strewn
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import gridshell as gs
+import rodshell as rs
 from tests.acceptance.targets_random import ROD, outcome, random_case, unbalanced
 
 
@@ -18,7 +18,7 @@ def test_a_random_target_converges_truly_or_says_why_not(seed):
 
 def test_the_judge_sees_a_state_that_is_no_equilibrium():
     _, target, layout, anchor = random_case(6)
-    form = gs.find_form(target, layout, ROD, anchor=anchor, ends=("pinned",))
+    form = rs.find_form(target, layout, ROD, anchor=anchor, ends=("pinned",))
     shell, boundary = form.popped["pinned"], form.trimmed.boundary
     assert unbalanced(shell, boundary) < 1e-4
     moved = shell.positions.copy()

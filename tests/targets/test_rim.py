@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gridshell.targets.rim import Rim
+from rodshell.targets.rim import Rim
 from tests.targets.meshes import Floats
 
 

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.case import load_case
-from gridshell.cli import main
-from gridshell.formfinding.search import HEADINGS, largest_curvature, search
+import rodshell as rs
+from rodshell.case import load_case
+from rodshell.cli import main
+from rodshell.formfinding.search import HEADINGS, largest_curvature, search
 from tests.acceptance.cases import ROD
 
-ELLIPSOID = gs.Ellipsoid(a=0.2, b=0.15, c=0.12)
-GRID = gs.GridLayout.orthogonal(spacing=0.03, edge=0.005)
+ELLIPSOID = rs.Ellipsoid(a=0.2, b=0.15, c=0.12)
+GRID = rs.GridLayout.orthogonal(spacing=0.03, edge=0.005)
 
 
 def test_shear_is_that_of_the_net_and_the_best_heading_lies_along_the_axes():
@@ -24,28 +24,28 @@ def test_shear_is_that_of_the_net_and_the_best_heading_lies_along_the_axes():
     assert value[15] == pytest.approx(value[75], rel=1e-9)
     assert value[30] == pytest.approx(value[60], rel=1e-9)
     assert found.best.heading == 0.0
-    coarse = gs.GridLayout.orthogonal(spacing=0.05, edge=0.05 / 3)
-    net = gs.chebyshev_net(ELLIPSOID, coarse, anchor=(0.0, 0.0))
+    coarse = rs.GridLayout.orthogonal(spacing=0.05, edge=0.05 / 3)
+    net = rs.chebyshev_net(ELLIPSOID, coarse, anchor=(0.0, 0.0))
     assert value[0] == pytest.approx(90 - degrees(net.min_angle), rel=1e-12)
 
 
 def test_what_is_as_good_as_the_default_loses_to_it():
     """Any heading is as good as any other on a ball."""
-    found = search(gs.Hemisphere(0.2), GRID, ROD, objective="curvature", anchors=[(0.0, 0.0)])
+    found = search(rs.Hemisphere(0.2), GRID, ROD, objective="curvature", anchors=[(0.0, 0.0)])
     assert np.ptp([trial.value for trial in found.trials]) < 0.01 * found.trials[0].value
     assert found.best is found.trials[0]
 
 
 def test_largest_curvature_of_rods_on_a_cylinder():
     """Rods along 0 run round and straight: 1/R; at 45 degrees helices: 1/2R."""
-    vault = gs.HeightField(formula="sqrt(0.25 - x^2)", domain=gs.Rectangle((0.5, 0.5)))
+    vault = rs.HeightField(formula="sqrt(0.25 - x^2)", domain=rs.Rectangle((0.5, 0.5)))
     for turn, exact in ((0.0, 2.0), (pi / 4, 1.0)):
-        layout = gs.GridLayout.orthogonal(spacing=0.08, edge=0.01, rotate=turn)
-        assert largest_curvature(gs.chebyshev_net(vault, layout)) == pytest.approx(exact, rel=2e-3)
+        layout = rs.GridLayout.orthogonal(spacing=0.08, edge=0.01, rotate=turn)
+        assert largest_curvature(rs.chebyshev_net(vault, layout)) == pytest.approx(exact, rel=2e-3)
 
 
 def test_what_has_no_net_is_shown_as_none_and_never_chosen():
-    cap = gs.Cap(radius=0.2, base=-0.1)
+    cap = rs.Cap(radius=0.2, base=-0.1)
     found = search(cap, GRID, ROD, anchors=[(0.1, 0.0), (0.0, 0.0)], headings=[0.0])
     assert np.isinf(found.trials[0].value)
     assert "no inextensible net" in found.trials[0].reason
@@ -53,16 +53,16 @@ def test_what_has_no_net_is_shown_as_none_and_never_chosen():
     lines = found.table().splitlines()
     assert "none" in lines[2]
     assert lines[3].endswith("*")
-    with pytest.raises(gs.InputError, match="none of 1 anchors and headings will do"):
+    with pytest.raises(rs.InputError, match="none of 1 anchors and headings will do"):
         search(cap, GRID, ROD, anchors=[(0.1, 0.0)], headings=[0.0])
-    with pytest.raises(gs.InputError, match='"size": use "shear", "curvature" or "gap"'):
+    with pytest.raises(rs.InputError, match='"size": use "shear", "curvature" or "gap"'):
         search(cap, GRID, ROD, objective="size")  # type: ignore[arg-type]
 
 
 def test_gap_is_that_of_the_clamped_pop_up():
     found = search(ELLIPSOID, GRID, ROD, objective="gap", anchors=[(0.0, 0.0)], headings=HEADINGS[:1])
-    coarse = gs.GridLayout.orthogonal(spacing=0.05, edge=0.05 / 3)
-    form = gs.find_form(ELLIPSOID, coarse, ROD, anchor=(0.0, 0.0), ends=("clamped",))
+    coarse = rs.GridLayout.orthogonal(spacing=0.05, edge=0.05 / 3)
+    form = rs.find_form(ELLIPSOID, coarse, ROD, anchor=(0.0, 0.0), ends=("clamped",))
     assert found.best.value == pytest.approx(form.agreement["clamped"].rms_relative, rel=1e-9)
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import gridshell as gs
-from gridshell.targets import step
+import rodshell as rs
+from rodshell.targets import step
 from tests.targets.meshes import Floats
 from tests.targets.stepfile import StepFile
 
@@ -31,7 +31,7 @@ def plan(reach: float) -> Floats:
 
 def test_a_face_is_its_surface(tmp_path):
     pytest.importorskip("OCP")
-    target = gs.surface_from(written(tmp_path / "saddle.step", saddle()))
+    target = rs.surface_from(written(tmp_path / "saddle.step", saddle()))
     xy = plan(0.18)
     assert target.height(xy) == pytest.approx((xy[:, 0] ** 2 - xy[:, 1] ** 2) / 0.8, abs=2e-7)
     assert target.size == pytest.approx(0.2, rel=1e-5)
@@ -50,7 +50,7 @@ def test_splines_with_inner_knots_are_met(tmp_path):
     controls[2, 2, 2] = 0.8
     file = StepFile("m")
     file.patch(controls, 3, knots)
-    target = gs.surface_from(written(tmp_path / "bent.stp", file))
+    target = rs.surface_from(written(tmp_path / "bent.stp", file))
     assert target.height(np.zeros((1, 2))) == pytest.approx(0.8 * 0.5**2, abs=1e-4)  # the middle spline is 1/2 there
 
 
@@ -61,7 +61,7 @@ def test_a_face_ends_where_its_edge_is(tmp_path):
     file.cap(200.0, 50.0, "cap")
     file.disc(150.0, "disc")
     path = written(tmp_path / "two.step", file)
-    cap, disc = (gs.surface_from(path, name=name) for name in ("cap", "disc"))
+    cap, disc = (rs.surface_from(path, name=name) for name in ("cap", "disc"))
     angle = np.linspace(0, 6, 40)
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     rim = np.arccos(0.25)
@@ -79,25 +79,25 @@ def test_of_several_faces_one_is_chosen_by_name_or_number(tmp_path):
     file.cap(0.2, 0.05, "cap")
     path = written(tmp_path / "house.step", file)
     there = r'\(there: 1, "roof"; 2, "cap"\)'
-    with pytest.raises(gs.InputError, match=f"has 2 faces: choose one by its name or number {there}"):
-        gs.surface_from(path)
-    with pytest.raises(gs.InputError, match=f'has 0 faces named "wall": .* {there}'):
-        gs.surface_from(path, name="wall")
+    with pytest.raises(rs.InputError, match=f"has 2 faces: choose one by its name or number {there}"):
+        rs.surface_from(path)
+    with pytest.raises(rs.InputError, match=f'has 0 faces named "wall": .* {there}'):
+        rs.surface_from(path, name="wall")
     for name, top in (("cap", 0.2), ("1", 0.0)):
-        target = gs.surface_from(path, name=name)
+        target = rs.surface_from(path, name=name)
         assert target.height(np.zeros((1, 2))) == pytest.approx(top, abs=1e-6)
         assert target.parameters() == {"kind": "nurbs", "object": name, "file": str(path)}  # as in a case file
 
 
 def test_a_unit_beside_that_of_the_file_is_refused(tmp_path):
-    with pytest.raises(gs.InputError, match="say their unit: leave it out, or scale the target"):
-        gs.surface_from(written(tmp_path / "saddle.step", saddle()), unit=1e-3)
+    with pytest.raises(rs.InputError, match="say their unit: leave it out, or scale the target"):
+        rs.surface_from(written(tmp_path / "saddle.step", saddle()), unit=1e-3)
 
 
 def test_without_opencascade_the_sentence_says_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setattr(step, "find_spec", lambda name: None)
-    with pytest.raises(gs.InputError, match=r'pip install "gridshell\[step\]"'):
-        gs.surface_from(written(tmp_path / "saddle.step", saddle()))
+    with pytest.raises(rs.InputError, match=r'pip install "rodshell\[step\]"'):
+        rs.surface_from(written(tmp_path / "saddle.step", saddle()))
 
 
 @pytest.mark.parametrize(
@@ -113,5 +113,5 @@ def test_a_reader_that_falls_or_hangs_is_told_of_in_one_sentence(does, said, tmp
     monkeypatch.setattr(step, "READER", tmp_path / "reader.py")
     monkeypatch.setattr(step, "LONGEST", 1.0)
     monkeypatch.setattr(step, "find_spec", lambda name: True)
-    with pytest.raises(gs.InputError, match=said):
-        gs.surface_from(written(tmp_path / "saddle.step", saddle()))
+    with pytest.raises(rs.InputError, match=said):
+        rs.surface_from(written(tmp_path / "saddle.step", saddle()))

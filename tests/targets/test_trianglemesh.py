@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gridshell.targets.trianglemesh import unique_rows
+from rodshell.targets.trianglemesh import unique_rows
 
 
 @pytest.mark.parametrize("largest", [3, 1000, 5_000_000, 2**40])

@@ -1,7 +1,0 @@
-"""The case file: everything that decides one job, read from TOML, completed, and written back in SI."""
-
-from gridshell.case.keys import CaseKey, case_keys
-from gridshell.case.load import BUILT_IN, load_case
-from gridshell.case.schema import Built, Case
-
-__all__ = ["BUILT_IN", "Built", "Case", "CaseKey", "case_keys", "load_case"]

@@ -1,7 +1,0 @@
-"""The flat grid: straight rods, their crossings, and the mesh of nodes and edges on them."""
-
-from gridshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, straight_rods
-from gridshell.layout.gridlayout import GridLayout
-from gridshell.layout.mesh import GridMesh, mesh_grid
-
-__all__ = ["Crossings", "FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"]

@@ -1,0 +1,153 @@
+"""From a name or a file, and what the command line adds, to a complete case or one clear sentence."""
+
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from difflib import get_close_matches
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rodshell.case.keys import BY_KIND, case_keys, case_tables
+from rodshell.case.schema import IDLE, Case
+from rodshell.case.sentences import not_a_table, sentence, unknown_key
+from rodshell.errors import InputError
+from rodshell.units import shown
+
+Raw = dict[str, Any]
+
+
+def _paper(rods: tuple[int, int]) -> Raw:
+    """A grid of the paper [HQK section 3.1] with so many rods along x and y."""
+    grid = {"rods": rods, "spacing": 0.03, "length": 1.2, "edge": 0.005}
+    return {"layout": grid, "rod": {"section": {"radius": 0.001}}}
+
+
+BUILT_IN: dict[str, Raw] = {
+    "hemisphere": _paper((17, 17)),
+    "paraboloid": _paper((15, 15)),
+    "ellipsoid": _paper((11, 15)),
+    "cap": _paper((17, 17)),
+    "heightfield": {},
+}
+"""The cases that need no file, each named like its target's kind; the schema's defaults give the rest."""
+
+BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf"), "mesh")
+BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
+BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
+"""Kinds of targets by the file that holds them: the file alone is a case."""
+
+CASE_FILE = ".toml"
+FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
+FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
+
+
+def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Case:
+    """The case of this name or in this file, with some keys set anew.
+
+    Parameters
+    ----------
+    name_or_path : one of `BUILT_IN`, or the path of a TOML file, or of a surface (`BY_SUFFIX`).
+    overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
+        keeps those keys of its table that it has too.
+
+    Raises
+    ------
+    InputError : no such case or file, not TOML, an unknown key, a value that cannot be used; in one sentence.
+    """
+    overrides = dict(overrides or {})
+    raw = _read(name_or_path)
+    for path in case_tables():
+        if not isinstance(_table(raw, path), dict):
+            raise InputError(not_a_table(path, _table(raw, path)))
+    for path, kind in BY_KIND.items():
+        _table(raw, path).setdefault("kind", kind)
+    _drop_for_another_kind(raw, overrides)
+    if str(name_or_path) in BUILT_IN and {"seams.lines", "seams.file"} & overrides.keys():
+        for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
+            raw["layout"].pop(key, None)
+    for path, value in overrides.items():
+        if path not in case_keys():
+            raise InputError(unknown_key(path, value, raw))
+        table, _, key = path.rpartition(".")
+        _table(raw, table)[key] = value
+    try:
+        return Case.model_validate(raw)
+    except ValidationError as error:
+        raise InputError(sentence(error, raw)) from None
+
+
+def _table(raw: Raw, path: str) -> Any:
+    """The table at a dotted path, made where it is missing."""
+    inner: Any = raw
+    for name in path.split("."):
+        inner = inner.setdefault(name, {})
+    return inner
+
+
+def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
+    """Where an override sets another kind (or domain), drop what was given for the old one alone."""
+    for path in BY_KIND:
+        kind, table = overrides.get(f"{path}.kind"), _table(raw, path)
+        if kind is not None and kind != table["kind"]:
+            for key in case_keys().values():
+                if key.table == path and key.kinds and kind not in key.kinds:
+                    table.pop(key.name, None)
+    method = overrides.get("drape.method")
+    if method is not None and method != raw["drape"].get("method", "bound"):
+        for name in IDLE.get(str(method), ()):
+            raw["drape"].pop(name, None)
+    domain, target = overrides.get("target.domain"), raw["target"]
+    if domain is not None and domain != target.get("domain", "disc"):
+        for name in ("radius", "size"):
+            target.pop(name, None)
+
+
+def _read(name_or_path: str | PathLike[str]) -> Raw:
+    name, path = str(name_or_path), Path(name_or_path)
+    if name in BUILT_IN:
+        return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
+    if kind := BY_SUFFIX.get(path.suffix.lower()):
+        return {"target": {"kind": kind, "file": name}}
+    if path.is_dir():
+        raise InputError(f"{name} is a folder: give {_wanted_in(path)}")
+    if not path.exists():
+        near = get_close_matches(name, BUILT_IN, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"give a case file, a surface, or one of {', '.join(BUILT_IN)}"
+        raise InputError(f"there is no case and no file named {shown(name)}: {hint}")
+    try:
+        return _beside(path, tomllib.loads(path.read_bytes().decode("utf-8-sig")))
+    except OSError as reason:
+        raise InputError(f"{name} cannot be read: {reason.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(_unknown_type(path) or f"{name} is not text in UTF-8: save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as reason:
+        raise InputError(_unknown_type(path) or f"{name} is not valid TOML: {reason}") from None
+
+
+def _unknown_type(path: Path) -> str:
+    """What is wrong with a file that holds no case, if its name does not say that it does."""
+    if path.suffix.lower() in ("", CASE_FILE):
+        return ""
+    return f"{path}: unknown file type {path.suffix}; use {FILES}"
+
+
+def _wanted_in(folder: Path) -> str:
+    """The first file in a folder that could be meant, a case before a surface; without one, what could be."""
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (CASE_FILE, *BY_SUFFIX))
+    files.sort(key=lambda path: path.suffix.lower() != CASE_FILE)
+    return f"a file in it, such as {files[0]}" if files else FILES
+
+
+def _beside(path: Path, raw: Raw) -> Raw:
+    """Files that a case names lie in its own folder, unless they are given from the root."""
+    for name, keys in FILE_KEYS.items():
+        table = raw.get(name)
+        if not isinstance(table, dict):
+            continue
+        for key in keys:
+            if isinstance(table.get(key), str):
+                table[key] = str(path.parent / table[key])
+    return raw

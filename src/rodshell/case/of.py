@@ -1,0 +1,60 @@
+"""The case file of objects that were made in Python."""
+
+from math import fmod, tau
+from typing import Any
+
+from rodshell.case.schema import Case
+from rodshell.formfinding import Fall
+from rodshell.formfinding.sewn import SewnForm
+from rodshell.joints import Joint, joint_parameters
+from rodshell.layout import GridLayout
+from rodshell.output.takeaway import Takeaway
+from rodshell.rods.section import Rod
+from rodshell.targets import Target
+
+
+def case_text(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    joint: Joint,
+    method: str = "bound",
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    fall: Fall | None = None,
+    takeaway: Takeaway | None = None,
+    sewn: SewnForm | None = None,
+) -> str:
+    """A case file that gives these objects again; of a target that is a Python function, a note that says so."""
+    shape: dict[str, Any] = target.parameters()
+    if "function" in shape:
+        return f"# the target was the Python function {shape['function']}: no case file can give it again\n"
+    if "vertices" in shape:
+        return (
+            f"# the target was a mesh of {shape['vertices']} vertices made in Python: no case file can give it again\n"
+        )
+    if "turn" in shape:
+        shape = {**shape, "turn": [_within_a_turn(angle) for angle in shape["turn"]]}
+    drape: dict[str, Any] = {"method": method, **(fall.parameters() if fall else {})}
+    if method != "bound":
+        drape["gravity"] = gravity
+    if anchor is not None:
+        drape["anchor"] = anchor
+    case = Case.model_validate(
+        {
+            "target": shape,
+            "layout": {**layout.parameters(), "rotate": _within_a_turn(layout.rotate)},
+            "rod": rod.parameters(),
+            "joint": joint_parameters(joint),
+            "drape": drape,
+            **({"seams": sewn.parameters()} if sewn else {}),
+            **(takeaway or Takeaway()).parameters(),
+        }
+    )
+    return case.to_toml()
+
+
+def _within_a_turn(angle: float) -> float:
+    """The angle [rad] as a case file has it; one within a turn to the last bit."""
+    return fmod(angle, tau)

@@ -1,0 +1,149 @@
+"""The target's tables, one for each kind."""
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import Field, model_validator
+
+from rodshell.case.table import Table
+from rodshell.case.values import Angles, Coordinate, Factor, Length, Point3, Size, Unit
+
+if TYPE_CHECKING:
+    from rodshell.targets import Target
+
+
+class HemisphereTable(Table):
+    kind: Literal["hemisphere"] = "hemisphere"
+    radius: Length = Field(default=0.2, description="radius")
+
+    def build(self) -> "Target":
+        from rodshell.targets import Hemisphere
+
+        return Hemisphere(radius=self.radius)
+
+
+class CapTable(Table):
+    kind: Literal["cap"] = "cap"
+    radius: Length = Field(default=0.25, description="radius")
+    base: Coordinate = Field(default=0.1, description="z of the base plane, the sphere's centre being z = 0")
+
+    def build(self) -> "Target":
+        from rodshell.targets import Cap
+
+        return Cap(radius=self.radius, base=self.base)
+
+
+class ParaboloidTable(Table):
+    kind: Literal["paraboloid"] = "paraboloid"
+    radius: Length = Field(default=0.2, description="radius")
+    height: Length = Field(default=0.12, description="height of the top above the base")
+
+    def build(self) -> "Target":
+        from rodshell.targets import Paraboloid
+
+        return Paraboloid(radius=self.radius, height=self.height)
+
+
+class EllipsoidTable(Table):
+    kind: Literal["ellipsoid"] = "ellipsoid"
+    a: Length = Field(default=0.2, description="half-axis along x")
+    b: Length = Field(default=0.15, description="half-axis along y")
+    c: Length = Field(default=0.12, description="half-axis along z")
+
+    def build(self) -> "Target":
+        from rodshell.targets import Ellipsoid
+
+        return Ellipsoid(a=self.a, b=self.b, c=self.c)
+
+
+class HeightFieldTable(Table):
+    kind: Literal["heightfield"] = "heightfield"
+    formula: str = Field(description='height z = f(x, y) in metres, such as "0.1 - 2*x**2 - y**2"')
+    domain: Literal["disc", "rectangle"] = Field(default="disc", description="the plan, centred on the origin")
+    radius: Length | None = Field(default=None, description="radius; of a height field: of its disc")
+    size: Size | None = Field(default=None, description="width along x and depth along y of a rectangle")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _domain_decides(cls, given: dict[str, Any]) -> dict[str, Any]:
+        domain = given.get("domain", "disc")
+        if domain == "disc":
+            if "size" in given:
+                raise ValueError('target.size is for domain "rectangle": leave it out, or set target.domain')
+            return {"radius": 0.2, **given}
+        if domain == "rectangle":
+            if "radius" in given:
+                raise ValueError('target.radius is for domain "disc": leave it out, or set target.domain')
+            if "size" not in given:
+                raise ValueError('target.size is missing: give width and depth, such as ["400 mm", "300 mm"]')
+        return given
+
+    def build(self) -> "Target":
+        from rodshell.targets import Disc, HeightField, Rectangle
+
+        if self.radius is not None:
+            return HeightField(formula=self.formula, domain=Disc(self.radius))
+        assert self.size is not None
+        return HeightField(formula=self.formula, domain=Rectangle(self.size))
+
+
+class PlacedTable(Table):
+    """Keys of every target that comes from a file."""
+
+    file: str = Field(description="path of the file; in a case file from the case file's folder")
+    base: Coordinate | None = Field(default=None, description="z of the base plane; of a cap: its sphere's centre is 0")
+    boundary: str | None = Field(default=None, description="OBJ or DXF with closed curves: the shell's edge, openings")
+    scale: Factor = Field(default=1.0, description="factor, about the origin")
+    turn: Angles = Field(default=(0.0, 0.0, 0.0), description="angles about x, y, z, in that order")
+    move: Point3 = Field(default=(0.0, 0.0, 0.0), description="shift along x, y, z")
+
+    def options(self) -> dict[str, Any]:
+        """Keyword arguments that all files have."""
+        from rodshell.targets import Placement
+
+        placement = Placement(scale=self.scale, turn=self.turn, move=self.move)
+        return {"base": self.base, "boundary": self.boundary, "placement": placement}
+
+
+class SurfaceTable(PlacedTable):
+    unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
+    object: str | None = Field(
+        default=None, description="name, of several; 3dm: or its layer; STEP: or a face's number"
+    )
+
+    def build(self) -> "Target":
+        from rodshell.targets import surface_from
+
+        return surface_from(self.file, unit=self.unit, name=self.object, **self.options())
+
+
+class MeshTable(SurfaceTable):
+    kind: Literal["mesh"] = "mesh"
+
+
+class NurbsTable(SurfaceTable):
+    kind: Literal["nurbs"] = "nurbs"
+
+
+class HeightsTable(PlacedTable):
+    kind: Literal["heights"] = "heights"
+    size: Size = Field(description="width along x and depth along y of a rectangle")
+    height: Length | None = Field(
+        default=None, description="of a paraboloid; of an image: of white; of a CSV: its unit"
+    )
+
+    def build(self) -> "Target":
+        from rodshell.targets import heights_from
+
+        return heights_from(self.file, size=self.size, height=self.height, **self.options())
+
+
+TargetTable = (
+    HemisphereTable
+    | CapTable
+    | ParaboloidTable
+    | EllipsoidTable
+    | HeightFieldTable
+    | MeshTable
+    | NurbsTable
+    | HeightsTable
+)

@@ -1,0 +1,65 @@
+"""The checks of several shells as of one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from rodshell.checks.check import Checks
+from rodshell.checks.deployment import Deployment
+from rodshell.formfinding.popup import Ends
+
+
+@dataclass(frozen=True)
+class JoinedChecks(Checks):
+    """The checks of several shells, which are `named`, as of one."""
+
+    named: Mapping[str, Checks]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return tuple(f"patch {name}: {word}" for name, one in self.named.items() for word in one.warnings)
+
+
+def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
+    """Of shells that share nothing: what all were checked for, one after the other.
+
+    The way up has the stages that all were followed through.
+    """
+    parts = list(named.values())
+    ends = [one for one in parts[0].bending if all(one in part.bending for part in parts)]
+
+    def each(table: str) -> dict[Ends, Any]:
+        return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
+
+    ways = [part.deployment for part in parts if part.deployment is not None]
+    if len(ways) < len(parts):
+        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), named)
+    shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
+    rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
+    bent = tuple(
+        _stacked([part.on_the_way[row[k]] for part, row in zip(parts, rows, strict=True)]) for k in range(len(shared))
+    )
+    way = _joined_ways(ways, rows)
+    return JoinedChecks(each("bending"), each("reactions"), each("joints"), way, bent, named)
+
+
+def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
+    """The ways up of several shells at the shares that all reached, their `rows`."""
+    lost = [one.lost_at for one in ways if one.lost_at is not None]
+    return Deployment(
+        ways[0].share[rows[0]],
+        np.concatenate([one.positions[row] for one, row in zip(ways, rows, strict=True)], axis=1),
+        (),
+        tuple(sorted({pair for one in ways for pair in one.snaps})),
+        max(lost, default=None),
+    )
+
+
+def _stacked(parts: Sequence[Any]) -> Any:
+    """Records of arrays, joined array by array; None where one part has none."""
+    columns = [[getattr(part, field.name) for part in parts] for field in fields(parts[0])]
+    return type(parts[0])(
+        *(None if any(one is None for one in column) else np.concatenate(column) for column in columns)
+    )

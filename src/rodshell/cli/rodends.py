@@ -1,0 +1,127 @@
+"""Rods given by where their ends lie flat and where they go: from a table, or from an earlier result."""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.units import parse_quantity, read_unit
+
+COLUMNS = (
+    "flat_x0", "flat_y0", "flat_x1", "flat_y1",
+    "final_x0", "final_y0", "final_z0", "final_x1", "final_y1", "final_z1",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RodEnds:
+    """Both ends of each rod, before and after.
+
+    Parameters
+    ----------
+    names : m labels, or None.
+    flat : (m, 2, 2), the two ends in the plane [m].
+    final : (m, 2, 3), the same two ends of the popped shell [m].
+    """
+
+    names: list[str] | None
+    flat: NDArray[np.float64]
+    final: NDArray[np.float64]
+
+    @property
+    def longest(self) -> float:
+        """Length of the longest rod [m]."""
+        return float(np.linalg.norm(self.flat[:, 1] - self.flat[:, 0], axis=1).max())
+
+
+def read_table(path: Path, unit: str) -> RodEnds:
+    """The rods of a CSV table with the columns `COLUMNS` and, if it likes, `id`; coordinates in `unit`.
+
+    Cells are parted by commas, semicolons or tabs; unless by commas, a comma is a decimal point.
+
+    Raises
+    ------
+    InputError : no such file, no rods, a missing column, a cell without a finite number, an id used twice.
+    """
+    try:
+        scale = float(read_unit(unit, "length"))
+    except ValueError as reason:
+        raise InputError(f'--unit = "{unit}": {reason}') from None
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as reason:
+        raise InputError(f"{path} cannot be read: {reason.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is not text in UTF-8: give a CSV table") from None
+    names, numbers = list[str](), list[list[float]]()
+    for where, row in _rows(path, lines):
+        numbers.append([parse_quantity(row[column], "number", f"{where}, {column}") for column in COLUMNS])
+        names.append(row.get("id", "").strip())
+    if not numbers:
+        raise InputError(f"{path} has no rods: give one row for each rod under the header")
+    values = np.array(numbers) * scale
+    return RodEnds(_labels(path, names), values[:, :4].reshape(-1, 2, 2), values[:, 4:].reshape(-1, 2, 3))
+
+
+def _rows(path: Path, lines: list[str]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Each row that is not blank, by column, and how to name it in a message."""
+    delimiter = max(",;\t", key=lines[0].count) if lines else ","
+    reader = csv.reader(lines, delimiter=delimiter)
+    header = [name.strip() for name in next(reader, [])]
+    for column in COLUMNS:
+        if column not in header:
+            near = get_close_matches(column, header, n=1)
+            hint = f" ({near[0]} looks like it)" if near and near[0] not in COLUMNS else ""
+            raise InputError(f"{path}: the column {column} is missing{hint}; it needs {', '.join(COLUMNS)}")
+    for cells in reader:
+        where = f"{path} line {reader.line_num}"
+        if not any(cell.strip() for cell in cells):
+            continue
+        if len(cells) != len(header):
+            raise InputError(f"{where} has {len(cells)} cells, the header {len(header)}: give one for each")
+        if delimiter != ",":
+            cells = [cell if name == "id" else cell.replace(",", ".") for name, cell in zip(header, cells, strict=True)]
+        yield where, dict(zip(header, cells, strict=True))
+
+
+def _labels(path: Path, names: list[str]) -> list[str] | None:
+    if not any(names):
+        return None
+    for k, name in enumerate(names):
+        if not name or name in names[:k]:
+            fault = f'the id "{name}" stands twice' if name else f"rod {k + 1} has no id"
+            raise InputError(f"{path}: {fault}: give each rod its own, or leave the column out")
+    return names
+
+
+def read_result(folder: Path) -> RodEnds:
+    """The rods of an earlier result: their flat ends, and where its shell has them.
+
+    Raises
+    ------
+    OutputError : the folder holds no result that can be read.
+    InputError : the result has no rods, or no shell in space.
+    """
+    from rodshell.output.archive import SHELLS, read
+    from rodshell.output.rods import rods_of
+
+    archive = read(folder)
+    if archive.result.get("patches"):
+        raise InputError(
+            f"{folder} holds patches, whose flat grids lie side by side: pop up a table of one patch's rods"
+        )
+    try:
+        rods = rods_of(archive)
+        shell = archive.states[next(name for name in SHELLS if name in archive.states)]
+        flat = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
+        final = np.array([shell[rod.nodes[[0, -1]]] for rod in rods]).reshape(-1, 2, 3)
+    except (StopIteration, KeyError, IndexError, TypeError, ValueError):
+        raise InputError(f"the result in {folder} lacks its rods or its states: run it again") from None
+    if not rods:
+        raise InputError(f"the result in {folder} has no rods")
+    return RodEnds([rod.id for rod in rods], flat, final)

@@ -1,0 +1,223 @@
+"""Contact with a target in time: touching nodes lose a direction for one step [HQK Eqs 8-12, Algorithm 1].
+
+A node that a step would leave below the surface is moved to it along its normal and has, in that step, no other
+motion along it: the paper's S_i = I - n n', an infinite mass in one direction. Here the direction is taken out of the
+system, which stays symmetric; where S_i also filters the rows of the forces, the paper's system is not (ERRATA to
+Eq 11). Both have the same solution: along the free directions the same balance, along the normal the prescribed way.
+
+Two more ERRATA. Eqs 8 to 10 measure along z, which is undefined beside the target, and singular at a rim with an
+upright tangent, where they throw hanging nodes sideways by the square root of their depth. Here n and the way along
+it are those of the closest point of the body, the target closed by a wall under its rim: no node moves further than
+it is deep. And the way is counted from the start of the step: dv_pre = ((c - x_k)/h - v_k).n n, c the closest point.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import isfinite
+from typing import Any, Literal
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.geometry.vectors import dot
+from rodshell.model import Freedom
+from rodshell.targets import Target
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+ROUND_OFF = 1e-10  # of the target's size: a node is below the surface only from this depth on
+SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal
+
+Stopped = Literal["wholly", "along the normal"]
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Planes that nodes may slide on, added to their supports: a flat constraint of one step.
+
+    The blocked directions keep their places among the unknowns (see `Freedom`), so that nodes may come and go from
+    step to step in one and the same plan of the matrix.
+
+    Parameters
+    ----------
+    supports : what holds the shell anyway.
+    free : its free directions.
+    nodes : (k,); points, normals : (k, 3) the planes [m].
+    stuck : (k,) bool; nodes that friction holds in their place in the plane.
+    """
+
+    supports: Any  # a solver's `Constraint`, which is defined above this floor
+    free: Freedom
+    nodes: Ints
+    points: Floats
+    normals: Floats
+    stuck: NDArray[np.bool_]
+
+    @staticmethod
+    def none(supports: Any, state: Floats) -> "Touching":
+        """Nothing touches."""
+        nowhere, no_nodes = np.empty((0, 3)), np.empty(0, dtype=np.intp)
+        return Touching(supports, supports.freedom(state), no_nodes, nowhere, nowhere, np.empty(0, dtype=bool))
+
+    def freedom(self, state: Floats) -> Freedom:
+        return self._turned[0]
+
+    def curvature(self, state: Floats, gradient: Floats) -> Floats:
+        return np.asarray(self.supports.curvature(state, gradient))
+
+    def remaining(self, state: Floats) -> Floats | None:
+        """The way to the planes, along the free part of their normals, besides what the supports prescribe."""
+        given = self.supports.remaining(state)
+        result = np.zeros_like(state) if given is None else given.copy()
+        _, along, cosine = self._turned
+        gap = dot(self.points - state[self.nodes] - result[self.nodes], self.normals)
+        result[self.nodes] += (gap / cosine)[:, None] * along
+        return result
+
+    def retract(self, state: Floats) -> Floats:
+        return state
+
+    @cached_property
+    def _turned(self) -> tuple[Freedom, Floats, Floats]:
+        """The supports' directions of each node turned so that the last lies along the normal, and is blocked.
+
+        And (k, 3) the unit parts of the normals in the free directions, and (k,) their cosines with the normals.
+        """
+        if not len(self.nodes):
+            return self.free, self.normals, np.empty(0)
+        directions, along, cosine = self.free.directions.copy(), self.normals.copy(), np.empty(len(self.nodes))
+        _turn(directions, self.free.count, self.nodes, self.stuck, along, cosine)
+        return Freedom(directions, self.free.count), along, cosine
+
+    def free_share(self, nodes: Ints, normals: Floats) -> Floats:
+        """(k,) cosines of the normals (k, 3) of some nodes with the directions that their supports leave free."""
+        along = np.einsum("kcx,kx->kc", self.free.directions[nodes], normals)
+        along[np.arange(3) >= self.free.count[nodes][:, None]] = 0.0
+        return np.asarray(np.sqrt(dot(along, along)))
+
+
+@dataclass(frozen=True)
+class ModifiedMass:
+    """What contact with a target does to a motion.
+
+    Parameters
+    ----------
+    target : its body, closed by the wall under its rim.
+    nodes : blocks that may touch it.
+    stopped : what an inelastic impact takes of a touching node's velocity: all of it [HQK 3.1], or what is along
+        the normal. The first acts on sliding nodes as a drag m/h, which depends on the time step.
+    friction : Coulomb's coefficient, by which touching nodes stick or slip; it stops only what is along the normal.
+
+    Raises
+    ------
+    InputError : the coefficient is negative or not finite.
+    """
+
+    target: Target
+    nodes: Ints
+    stopped: Stopped = "wholly"
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.friction) and self.friction >= 0):
+            raise InputError(f"the friction coefficient must be 0 or positive, not {self.friction}")
+
+    @property
+    def stops_wholly(self) -> bool:
+        """Whether touching nodes lose their velocity along the surface, too."""
+        return self.stopped == "wholly" and not self.friction
+
+    def touching(self, supports: Any, state: Floats) -> Touching:
+        """The constraint to start a step with: nothing touches, whatever did in the step before."""
+        return Touching.none(supports, state)
+
+    def below(self, state: Floats, touching: Touching) -> Touching | None:
+        """The constraint with all nodes that are newly below the surface at `state`; None where no node is.
+
+        Nodes that touch already are not looked at again: a plane's node is below a hollow by the square of its
+        slide, and on the plane by round-off (ERRATA to Algorithm 1, which could loop on them).
+        """
+        outside = np.ones(len(state), dtype=bool)
+        outside[self.nodes] = self.target.outside(state[self.nodes])
+        outside[touching.nodes] = True
+        open_nodes = np.flatnonzero(~outside)
+        gap = self.target.contact(state[open_nodes])
+        new = gap.distance < -ROUND_OFF * self.target.size
+        new &= touching.free_share(open_nodes, gap.normal) > SUPPORTED
+        if not new.any():
+            return None
+        points = state[open_nodes] - gap.distance[:, None] * gap.normal
+        sticking = np.full(int(np.count_nonzero(new)), self.friction > 0)
+        return Touching(
+            touching.supports,
+            touching.free,
+            np.append(touching.nodes, open_nodes[new]),
+            np.vstack([touching.points, points[new]]),
+            np.vstack([touching.normals, gap.normal[new]]),
+            np.append(touching.stuck, sticking),
+        )
+
+    def released(self, touching: Touching, reactions: Floats) -> tuple[Touching, Floats] | None:
+        """The constraint without the nodes that stick by more than friction can hold; None where none does.
+
+        And the force (N, 3) [N] of friction on these once they slip, against the way they would go.
+
+        reactions : (N, 3) of all supports [N]; a stuck node's lies in its cone, |tangential| <= friction * normal.
+        """
+        if not touching.stuck.any():
+            return None
+        given = reactions[touching.nodes]
+        push = np.maximum(dot(given, touching.normals), 0.0)
+        across = given - dot(given, touching.normals)[:, None] * touching.normals
+        size = np.sqrt(dot(across, across))
+        slips = touching.stuck & (size > self.friction * push)
+        if not slips.any():
+            return None
+        rubbing = np.zeros_like(reactions)
+        rubbing[touching.nodes[slips]] = self.friction * (push / np.maximum(size, 1e-300))[slips, None] * across[slips]
+        return replace(touching, stuck=touching.stuck & ~slips), rubbing
+
+    def landed(self, velocity: Floats, touching: Touching) -> Floats:
+        """(N, 3) the velocity after the inelastic impact."""
+        result, nodes = velocity.copy(), touching.nodes
+        if self.stops_wholly:
+            result[nodes] = 0.0
+        else:
+            result[nodes] -= dot(velocity[nodes], touching.normals)[:, None] * touching.normals
+        return result
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _turn(directions, count, nodes, stuck, along, cosine):  # type: ignore[no-untyped-def]
+    """Reflect the directions of each node so that the last is the free part of the normal `along`; it becomes zero."""
+    part, mirror = np.empty(3), np.empty(3)
+    for m in range(len(nodes)):
+        d, last, length = directions[nodes[m]], count[nodes[m]] - 1, 0.0
+        for c in range(last + 1):
+            part[c] = d[c, 0] * along[m, 0] + d[c, 1] * along[m, 1] + d[c, 2] * along[m, 2]
+            length += part[c] * part[c]
+        cosine[m] = np.sqrt(length)
+        for x in range(3):
+            along[m, x] = 0.0
+            for c in range(last + 1):
+                along[m, x] += part[c] / cosine[m] * d[c, x]
+        if stuck[m]:
+            d[:] = 0.0
+            continue
+        square = 0.0
+        for c in range(last + 1):
+            part[c] /= cosine[m]
+            if c == last:
+                part[c] += -1.0 if part[c] < 0 else 1.0
+            square += part[c] * part[c]
+        for x in range(3):
+            mirror[x] = 0.0
+            for c in range(last + 1):
+                mirror[x] += part[c] * d[c, x]
+        for x in range(3):
+            for c in range(last):
+                d[c, x] -= 2.0 * part[c] / square * mirror[x]
+            d[last, x] = 0.0

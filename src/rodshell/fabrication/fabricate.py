@@ -1,0 +1,126 @@
+"""All that the workshop needs of a grid, in one call."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.fabrication.bracing import Diagonal, diagonals
+from rodshell.fabrication.nesting import Nesting, nest
+from rodshell.fabrication.options import Fabrication
+from rodshell.fabrication.splices import splices
+from rodshell.layout import GridMesh
+from rodshell.layout.layers import layers
+from rodshell.rods.section import Rod
+from rodshell.units import length_text
+
+Floats = NDArray[np.float64]
+
+SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
+
+
+@dataclass(frozen=True)
+class Fabricated:
+    """Cut list and more, rod by rod in the order of the grid.
+
+    Parameters
+    ----------
+    cut_length : (m,) with both end allowances [m]; mass : (m,) of it [kg]; layer : (m,) 1 the lowest.
+    splices : distances from each rod's start, its allowance not counted [m].
+    pieces : (rod, number along the rod, length [m]) of all that is cut from stock, rods one after the other.
+    nesting : of the pieces; None where there is no stock length, or a piece does not fit.
+    bracing : diagonals between joints, by their index among the grid's crossings.
+    """
+
+    options: Fabrication
+    cut_length: Floats
+    mass: Floats
+    layer: NDArray[np.intp]
+    splices: tuple[tuple[float, ...], ...]
+    pieces: tuple[tuple[int, int, float], ...]
+    nesting: Nesting | None
+    bracing: tuple[Diagonal, ...]
+    warnings: tuple[str, ...]
+
+
+def fabricate(
+    mesh: GridMesh, rod: Rod, options: Fabrication, *, curvature: Floats | None = None, final: Floats | None = None
+) -> Fabricated:
+    """Cut list, layers, splices, stock and bracing of a grid.
+
+    Parameters
+    ----------
+    curvature : (k,) the sharpest bend that each entry of `rod_nodes` sees [1/m], which splices avoid.
+    final : (n, 3) the final shape, for the bracing [m].
+    """
+    rods, crossings = mesh.grid.rods, mesh.grid.crossings
+    lengths = np.array([rod_line.length for rod_line in rods])
+    cut = lengths + 2 * options.end_allowance
+    made, warnings = _splices(mesh, options, curvature)
+    pieces = _pieces_of(lengths, made, options)
+    nesting = None
+    if options.stock_length is not None and not warnings:
+        bars = partial(nest, stock=options.stock_length, kerf=options.kerf)
+        nesting = bars([piece for _, _, piece in pieces])
+        longer, _ = _splices(mesh, options, curvature, short=SHORT)
+        others = _pieces_of(lengths, longer, options)
+        tried = bars([piece for _, _, piece in others])
+        if len(tried.bars) <= len(nesting.bars):
+            made, pieces, nesting = longer, others, tried
+    bracing: tuple[Diagonal, ...] = ()
+    if final is not None:
+        places = (mesh.flat[mesh.joint_nodes], final[mesh.joint_nodes])
+        bracing = tuple(diagonals(crossings.rods, crossings.at, *places))
+    return Fabricated(
+        options, cut, cut * rod.mass_per_length, layers(len(rods), crossings.rods.tolist()),
+        made, pieces, nesting, bracing, warnings,
+    )  # fmt: skip
+
+
+def _splices(
+    mesh: GridMesh, options: Fabrication, curvature: Floats | None, *, short: float = 0.0
+) -> tuple[tuple[tuple[float, ...], ...], tuple[str, ...]]:
+    """Splices of each rod [m from its start], and a sentence about rods that cannot be spliced.
+
+    short : pieces of so many joint distances are avoided.
+    """
+    rods, stock = mesh.grid.rods, options.stock_length
+    if stock is None:
+        return ((),) * len(rods), ()
+    bend = np.zeros(len(mesh.rod_nodes)) if curvature is None else curvature
+    made, hopeless = list[tuple[float, ...]](), list[str]()
+    for k, rod in enumerate(rods):
+        here, crossings = mesh.rod_slice(k), mesh.grid.crossings
+        shift = options.end_allowance - rod.start  # from material coordinates to the cut rod
+        joints = crossings.at[crossings.rods == k] + shift
+        cut = rod.length + 2 * options.end_allowance
+        apart = float(np.median(np.diff(np.sort(joints)))) if len(joints) > 1 else 0.0
+        found = splices(
+            cut, joints, stock, places=mesh.stations[here] + shift, curvature=bend[here], short=short * apart
+        )
+        if found is None:
+            hopeless.append(rod.name)
+        made.append(tuple(at - options.end_allowance for at in found or ()))
+    if not hopeless:
+        return tuple(made), ()
+    who = f"rod {hopeless[0]}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {hopeless[0]})"
+    return tuple(made), (
+        f"{who} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock",
+    )
+
+
+def _pieces_of(
+    lengths: Floats, made: tuple[tuple[float, ...], ...], options: Fabrication
+) -> tuple[tuple[int, int, float], ...]:
+    """(rod, number along the rod, length [m]) of every piece."""
+    return tuple(
+        (k, number, piece)
+        for k, at in enumerate(made)
+        for number, piece in enumerate(_pieces(float(lengths[k]), at, options), start=1)
+    )
+
+
+def _pieces(length: float, at: tuple[float, ...], options: Fabrication) -> list[float]:
+    stops = [-options.end_allowance, *at, length + options.end_allowance]
+    return np.diff(stops).tolist()

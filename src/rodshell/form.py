@@ -1,0 +1,263 @@
+"""The front door: from a target to a form in one call, and what can be done with it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rodshell.case.of import case_text
+from rodshell.checks import Checks, check
+from rodshell.checks.joined import joined_checks
+from rodshell.errors import InputError
+from rodshell.fabrication import fabricate
+from rodshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
+from rodshell.formfinding.drape import Method, require
+from rodshell.formfinding.popup import Ends
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
+from rodshell.joints import Joint
+from rodshell.layout import FlatGrid, GridLayout
+from rodshell.output import Archive
+from rodshell.output.result import States, form_result, form_states, table_result, table_states
+from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
+from rodshell.output.summary import summary_text
+from rodshell.output.takeaway import Takeaway
+from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
+from rodshell.rods.section import Rod
+from rodshell.targets import Target
+from rodshell.targets.seam import Seam
+
+FOUND = "a form that an earlier rodshell.find_form returned (one read from a folder: run its case.toml again)"
+LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
+
+
+class Form(FoundForm):
+    """A form that was found: its stages, and its files."""
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json before anything was checked."""
+        return form_result(self)
+
+    def summary(self) -> str:
+        """One screen of text."""
+        return summary_text(self.result())
+
+    def archive(
+        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+    ) -> Archive:
+        """Everything that is kept, checked and made ready to be built.
+
+        case_toml : the input it came from, by default one made from the objects.
+        """
+        takeaway = takeaway or Takeaway()
+        if case_toml is None:
+            draped = self.draped
+            case_toml = case_text(
+                self.target, self.layout, self.rod, joint=self.joint,
+                method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
+                fall=draped.fall, takeaway=takeaway,
+            )  # fmt: skip
+        return _archive(self, form_states(self), case_toml, takeaway, progress)
+
+    def save(
+        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+    ) -> Path:
+        """Write archive, drawings, schedules, models and report; the folder's absolute path.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written, or holds something else.
+        """
+        return self.archive(case_toml, takeaway=takeaway).save(folder)
+
+
+class PoppedUp(PoppedTable):
+    """A table of rods that was popped up, and its files."""
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json before anything was checked."""
+        return table_result(self, "popup")
+
+    def summary(self) -> str:
+        """One screen of text."""
+        return summary_text(self.result())
+
+    def archive(self, *, takeaway: Takeaway | None = None, progress: Progress = silent) -> Archive:
+        """Everything that is kept, checked and made ready to be built."""
+        return _archive(self, table_states(self), "", takeaway or Takeaway(), progress)
+
+    def save(self, folder: str | PathLike[str], *, takeaway: Takeaway | None = None) -> Path:
+        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
+        return self.archive(takeaway=takeaway).save(folder)
+
+
+class Sewn(SewnForm):
+    """A form in patches that are sewn together, and its files."""
+
+    def result(self) -> dict[str, Any]:
+        """The content of result.json before anything was checked."""
+        return sewn_result(self)
+
+    def summary(self) -> str:
+        """One screen of text."""
+        return summary_text(self.result())
+
+    def archive(
+        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+    ) -> Archive:
+        """All patches as one: everything that is kept, checked and made ready to be built."""
+        takeaway = takeaway or Takeaway()
+        if case_toml is None:
+            case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+        checks = joined_checks(
+            {k: check(one.popped, self.rod, stages=takeaway.stages, progress=progress) for k, one in self.found.items()}
+        )
+        result = with_seam_forces(self.result(), self, checks)
+        shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
+        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway)
+
+    def save(
+        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+    ) -> Path:
+        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
+        return self.archive(case_toml, takeaway=takeaway).save(folder)
+
+
+def _archive(job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress) -> Archive:
+    """A job's result and states with its checks and its fabrication."""
+    checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
+    shapes = {ends: shell.positions for ends, shell in job.popped.items()}
+    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway)
+
+
+def _kept(
+    job: Form | PoppedUp | Sewn, result: dict[str, Any], states: States, checks: Checks, shapes: Mapping[Ends, Any],
+    case_toml: str, takeaway: Takeaway,
+) -> Archive:  # fmt: skip
+    mesh = job.footprint.mesh
+    final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
+    made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
+    result = workshop_result(result, mesh, checks, made, takeaway.strength)
+    result["drawings"] = takeaway.drawings.parameters()
+    return Archive(result, states | workshop_states(checks), case_toml).as_stored()
+
+
+def find_form(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    method: Method = "bound",
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    joint: Joint | None = None,
+    fall: Fall | None = None,
+    ends: Sequence[Ends] = ("pinned", "clamped"),
+    start: FoundForm | None = None,
+    progress: Progress = silent,
+) -> Form:
+    """From a target to the flat grid that pops up into it, with the proof.
+
+    Parameters
+    ----------
+    target : the shape wanted.
+    layout : the flat grid asked for.
+    rod : section and material of every rod.
+    method, anchor, gravity : of the drape, see `drape`.
+    joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
+    fall : of method "paper", see `drape`.
+    ends : end conditions of the pop-up.
+    start : a form found before, for a spacing, heading, anchor or target that has changed a little: its net is where
+        the new net is looked for (method "bound"), and where its shells went from their draped states is where the new
+        ones start, rods being matched by their place in the lattice. Any form will do; what does not help is
+        left, and the result is the same as without, to the solver's tolerance. A shell that has several equilibria
+        stays with the one that it is in.
+    progress : called as progress(stage, detail, residual) at every iteration.
+
+    Returns
+    -------
+    The form. Its `status` is "converged", or says which stage stopped; nothing is raised for that.
+
+    Raises
+    ------
+    InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
+    """
+    for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
+        require(name, value, kind)
+    if start is not None:
+        require("start", start, FoundForm, FOUND)
+    found = find_stages(
+        target, layout, rod,
+        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,
+        start=start, progress=progress,
+    )  # fmt: skip
+    return Form(**{field.name: getattr(found, field.name) for field in fields(found)})
+
+
+def sew(
+    target: Target,
+    seams: Sequence[ArrayLike],
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    own: Mapping[str, PatchLayout] | None = None,
+    joint: Joint | None = None,
+    ends: Sequence[Ends] = ("pinned", "clamped"),
+    search: bool = False,
+    progress: Progress = silent,
+) -> Sewn:
+    """From a target cut into patches to the flat grids that pop up into them and meet at the seams.
+
+    Parameters
+    ----------
+    seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down; each goes on
+        straight past its ends, unless it is closed.
+    layout : of every patch, rods and length "auto"; its heading is that at the target's summit.
+    own : what patches, by their names A, B, ... from left to right, have of their own.
+    rod, joint, ends, progress : as of `find_form`.
+    search : whether to look for the heading that leaves out the fewest rods, in place of the layout's.
+
+    Raises
+    ------
+    InputError : a value does not fit. NetLimitError : no net covers a patch from its anchor and heading.
+    """
+    for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
+        require(name, value, kind)
+    found = find_sewn_stages(
+        target, [Seam.of(row) for row in seams], layout, rod,
+        own=own, joint=joint, ends=ends, search=search, progress=progress,
+    )  # fmt: skip
+    return Sewn(**{field.name: getattr(found, field.name) for field in fields(found)})
+
+
+def pop_up_table(
+    grid: FlatGrid, finals: ArrayLike, rod: Rod, *, edge: float | None = None, progress: Progress = silent
+) -> PoppedUp:
+    """Pop up rods from elsewhere: pinned, from flat.
+
+    Parameters
+    ----------
+    grid : the rods, flat (see `straight_rods`).
+    finals : (m, 2, 3) where the ends of each rod go [m].
+    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+
+    Raises
+    ------
+    InputError : `finals` does not fit `grid`; no rod has three joints.
+    """
+    points = np.asarray(finals, dtype=float)
+    if points.shape != (len(grid.rods), 2, 3) or not np.isfinite(points).all():
+        raise InputError(f"final ends must be finite and of the shape ({len(grid.rods)}, 2, 3), not {points.shape}")
+    apart = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+    for rod_line, distance in zip(grid.rods, apart, strict=True):
+        if distance > LONGEST_STRETCH * rod_line.length:
+            raise InputError(
+                f"rod {rod_line.name} is {rod_line.length:.4g} m long, but its final ends lie {distance:.4g} m apart: "
+                "move them closer, or give a longer rod"
+            )
+    found = pop_up_stages(grid, points, rod, edge=edge, progress=progress)
+    return PoppedUp(**{field.name: getattr(found, field.name) for field in fields(found)})

@@ -1,0 +1,14 @@
+"""Form finding: drape, trim, map back, pop up, agreement."""
+
+from rodshell.formfinding.agreement import Agreement, agreement
+from rodshell.formfinding.drape import drape
+from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.pipeline import FoundForm, PoppedTable, find_stages, pop_up_stages
+from rodshell.formfinding.popup import Popped, pop_up
+from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, map_back, trim
+
+__all__ = [
+    "Agreement", "Boundary", "Draped", "Fall", "Footprint", "FoundForm", "Popped", "PoppedTable", "Trimmed",
+    "agreement", "drape", "find_stages", "map_back", "pop_up", "pop_up_stages", "trim",
+]  # fmt: skip

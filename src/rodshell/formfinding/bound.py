@@ -1,0 +1,187 @@
+"""The bound drape: march the net, then bind the elastic grid to the target (numerics.md, section 4).
+
+Every node slides on the target without friction, rods do not stretch, and bending alone decides what the net
+leaves open: the shape of each span between its joints. No load and no stretch stiffness enter, so that the
+result does not depend on scale or material. The axes and the anchor are held, as the net holds them.
+"""
+
+from math import degrees
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.contact.bound import BoundToTarget
+from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.natural import with_natural_ends
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
+from rodshell.layout.flatgrid import whole_rods
+from rodshell.layout.mesh import nodes_along
+from rodshell.model import Shell
+from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.nets.apron import with_apron
+from rodshell.rods.section import GivenSection, Rod
+from rodshell.rods.stretch import Stretch
+from rodshell.solve.mixed_newton import find_equilibrium
+from rodshell.solve.problem import Problem
+from rodshell.targets import Target
+
+Floats = NDArray[np.float64]
+
+CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
+WARN_ANGLE = 25.0  # degrees
+PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces settle by 0.05 a step at 200 rods
+
+
+def bound_drape(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    anchor: tuple[float, float] | None = None,
+    near: Draped | None = None,
+    progress: Progress = silent,
+) -> Draped:
+    """Drape `layout` over `target` by its net; see `drape`."""
+    progress("net", "marching", 0.0)
+    net = chebyshev_net(target, layout, anchor=anchor, near=near.net if near else None)
+    grid = with_apron(net, CLEARANCE * layout.edge)
+    cuts = [list[FlatRod]() for _ in grid.rods]
+    for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
+        cuts[whole].append(piece)
+    mesh = mesh_grid(grid, layout.edge, marks=[[s for cut in on for s in (cut.start, cut.end)] for on in cuts])
+    start = np.empty((mesh.node_count, 3))
+    for k, line in enumerate(grid.rods):
+        start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
+    rod_within = _within_surface(rod)
+    shell = Shell.of(mesh, rod_within)
+    problem = Problem(
+        elements=shell.elements,
+        stretch=_penalty(shell.stretch, rod_within, target),
+        constraint=_bind(target, mesh, start),
+        length=target.size,
+        inextensible=True,
+        places=shell.places,
+    )
+    found = find_equilibrium(
+        problem,
+        with_natural_ends(target, mesh, start),
+        np.zeros(len(mesh.edges)),
+        progress=lambda k, step: progress("drape", f"bound, iteration {k}", step),
+    )
+    on_target = _nodes_on_target(mesh, cuts)
+    pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
+    warnings = [*target.warnings, *net.warnings]
+    if found.report.negative_modes:
+        warnings.append(
+            f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
+            "modes): use a smaller spacing"
+        )
+    if not found.report.stable:
+        warnings += _tightest_bend(target, layout, found.state[on_target])
+    if degrees(net.min_angle) < WARN_ANGLE:
+        x, y, z = net.min_angle_at
+        warnings.append(
+            f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
+            "joints there must close far; another anchor or heading, a smaller part or a seam may open them"
+        )
+    return Draped(
+        method="bound",
+        target=target,
+        layout=layout,
+        rod=rod,
+        mesh=mesh,
+        positions=found.state,
+        rods=tuple(line for line in net.rods if not line.virtual),
+        levels=(found.report,),
+        max_gap=float(np.abs(target.distance(found.state[on_target])).max()),
+        pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
+        min_angle=net.min_angle,
+        min_angle_at=net.min_angle_at,
+        own_ends=_own_ends(target, mesh, cuts, found.state),
+        anchor=anchor,
+        gravity=0.0,
+        net=net,
+        dropped=net.dropped,
+        warnings=tuple(warnings),
+    )
+
+
+def _within_surface(rod: Rod) -> Rod:
+    """The rod with EI2 for all directions.
+
+    Out of the surface the rods bend as it bends; what is theirs to choose is the bend within it, towards m2, the first
+    director being the normal. So the twist angles are left out, as of a round rod.
+    """
+    within = rod.bend_stiffnesses[1]
+    return Rod(GivenSection(rod.stretch_stiffness, within, within, rod.twist_stiffness))
+
+
+def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
+    """Edges whose stiffness only has to outweigh bending, which goes with the square of the size over the edge."""
+    weight = max(LEAST_PENALTY, PENALTY * (target.size / float(np.median(stretch.rest_lengths))) ** 2)
+    stiffness = weight * rod.bend_stiffness / target.size**2
+    return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
+
+
+def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
+    """All nodes on the target; those of the two axes keep to their lines, the anchor to its place."""
+    count = np.full(mesh.node_count, 2, dtype=np.intp)
+    guides = np.tile([1.0, 0.0, 0.0], (mesh.node_count, 1))
+    guides[np.abs(target.on_surface(start).normal[:, 0]) > 0.7] = [0.0, 1.0, 0.0]
+    for k, line in enumerate(mesh.grid.rods):
+        if line.offset == 0.0:
+            nodes = mesh.nodes_of(k)
+            count[nodes] -= 1
+            guides[nodes] = np.gradient(start[nodes], axis=0)
+    return BoundToTarget(target, count, guides)
+
+
+def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> NDArray[np.intp]:
+    """Nodes between the ends of some rod: all but the apron's."""
+    whole = np.repeat(np.arange(len(cuts)), [len(pieces) for pieces in cuts])
+    _, _, nodes = nodes_along(mesh, [cut for pieces in cuts for cut in pieces], whole)
+    on = np.zeros(mesh.node_count, dtype=bool)
+    on[nodes] = True
+    return np.flatnonzero(on)
+
+
+def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[str]:
+    """Where the target curves too sharply for the spacing, which is what stops a bound drape that has a net."""
+    curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
+    k = int(np.argmax(curvature))
+    radius, (x, y, z) = 1.0 / curvature[k], np.where(np.abs(points[k]) < 1e-6 * target.size, 0.0, points[k])
+    if radius > 2 * max(layout.spacing):
+        return []
+    return [
+        f"near ({x:.4g}, {y:.4g}, {z:.4g}) m the target's radius of curvature is {radius:.3g} m, the spacing "
+        f"{max(layout.spacing):.3g} m: a spacing below half of that radius would do"
+    ]
+
+
+def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
+    """Distance [m] along each rod between its end and where this state crosses the target's end."""
+    windows, places = list[NDArray[np.intp]](), list[Floats]()
+    for k, pieces in enumerate(cuts):
+        s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
+        for end in (end for cut in pieces if not cut.virtual for end in (cut.start, cut.end)):
+            first = min(max(int(np.searchsorted(s, end)) - 1, 0), max(len(s) - 3, 0))
+            three = np.minimum(first + np.arange(3), len(s) - 1)
+            windows.append(nodes[three])
+            places.append(s[three] - end)
+    x = np.array(places).T
+    f = target.margin(positions[np.concatenate(windows)]).reshape(-1, 3).T
+    slope = (f[1] - f[0]) / (x[1] - x[0])  # Newton's parabola through three nodes
+    bend = np.zeros_like(slope)
+    bent = x[2] > x[1]
+    bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
+    return np.abs((f[0] - x[0] * slope + x[0] * x[1] * bend) / (slope - (x[0] + x[1]) * bend))
+
+
+def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
+    """Key figures of a net for the result file."""
+    return {
+        "error_estimate": net.error_estimate,
+        "min_angle_deg": degrees(net.min_angle),
+        "min_angle_at": list(net.min_angle_at),
+    }

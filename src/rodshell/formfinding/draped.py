@@ -1,0 +1,120 @@
+"""The draped grid: what both ways of draping return."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.formfinding.fall import Fall
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.layout import FlatRod, GridLayout, GridMesh
+from rodshell.nets import ChebyshevNet
+from rodshell.rods.section import Rod
+from rodshell.solve.report import SolveReport, Status
+from rodshell.targets import Target
+
+if TYPE_CHECKING:
+    from rodshell.formfinding.rest import Rest
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Draped:
+    """A flat grid lying on a target, not yet trimmed.
+
+    Parameters
+    ----------
+    mesh : the whole mesh, with the lines and tails that are cut off later.
+    positions : (n, 3) of its nodes [m].
+    rods : the rods to be built, each from end to end of the target (bound), or whole (gravity).
+    levels : report of the solve on each level of refinement, the last at the layout's own edge length.
+    max_gap : largest distance between the target and a node that should touch it, or depth of a node inside [m].
+    pulls : number of nodes on the target that it would have to pull to hold them.
+    min_angle : smallest angle between two rods at a joint on the target [rad], at the point `min_angle_at` [m].
+    own_ends : (k,) distance along each rod between its end in the flat grid and the end that this drape alone
+        would give it [m]; None where they are the same.
+    anchor : x, y of the anchor as it was given [m], or None; gravity : [m/s2].
+    net : the net that the drape started from; None where it started from the flat grid.
+    rest, fall : how it came to rest, and how it fell, where it fell in time (paper).
+    """
+
+    method: str
+    target: Target
+    layout: GridLayout
+    rod: Rod
+    mesh: GridMesh
+    positions: Floats
+    rods: tuple[FlatRod, ...]
+    levels: tuple[SolveReport, ...]
+    max_gap: float
+    pulls: int
+    min_angle: float
+    min_angle_at: tuple[float, float, float]
+    own_ends: Floats | None
+    anchor: tuple[float, float] | None
+    gravity: float
+    net: ChebyshevNet | None
+    dropped: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[str, ...] = ()
+    rest: "Rest | None" = None
+    fall: Fall | None = None
+
+    @property
+    def report(self) -> SolveReport:
+        return self.levels[-1]
+
+    @property
+    def converged(self) -> bool:
+        return self.report.status is Status.CONVERGED
+
+
+def smallest_joint_angle(
+    mesh: GridMesh, positions: Floats, inside: NDArray[np.bool_]
+) -> tuple[float, tuple[float, float, float]]:
+    """Smallest angle between two rods [rad] over the joints whose node is `inside` (n,), and where it is."""
+    tangents = joint_tangents(mesh, positions)
+    angle = np.arctan2(
+        np.linalg.norm(cross(tangents[:, 0], tangents[:, 1]), axis=1), np.abs(dot(tangents[:, 0], tangents[:, 1]))
+    )
+    angle = np.where(inside[mesh.joint_nodes], angle, np.inf)
+    k = int(np.argmin(angle))
+    x, y, z = positions[mesh.joint_nodes[k]].tolist()
+    return float(angle[k]), (x, y, z)
+
+
+def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
+    """(c, 3) unit normals at the joints, across both rods, on the side that was up in the flat grid."""
+    tangents, flat = joint_tangents(mesh, positions), joint_tangents(mesh, mesh.flat)
+    up = np.sign(cross(flat[:, 0], flat[:, 1])[:, 2:])
+    return unit(up * cross(tangents[:, 0], tangents[:, 1]))
+
+
+def node_normals(mesh: GridMesh, positions: Floats) -> Floats:
+    """(n, 3) normals at all nodes, those of the joints interpolated along the rods."""
+    at_joints, total = joint_normals(mesh, positions), np.zeros((mesh.node_count, 3))
+    for rod in range(len(mesh.grid.rods)):
+        here = mesh.rod_slice(rod)
+        on, side = np.nonzero(mesh.grid.crossings.rods == rod)
+        order = np.argsort(mesh.grid.crossings.at[on, side])
+        at, normals = mesh.grid.crossings.at[on, side][order], at_joints[on[order]]
+        for k in range(3):
+            np.add.at(total[:, k], mesh.rod_nodes[here], np.interp(mesh.stations[here], at, normals[:, k]))
+    return unit(total)
+
+
+def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
+    """(c, 2, 3) tangents of both rods at each joint, from the neighbours on either side."""
+    result = np.empty((len(mesh.grid.crossings), 2, 3))
+    for side in (0, 1):
+        rods, at = mesh.grid.crossings.rods[:, side], mesh.grid.crossings.at[:, side]
+        place = np.empty(len(rods), dtype=np.intp)
+        for rod in np.unique(rods):
+            here = mesh.rod_slice(int(rod))
+            mine = np.flatnonzero(rods == rod)
+            place[mine] = here.start + np.abs(mesh.stations[here] - at[mine, None]).argmin(axis=1)
+        before = np.maximum(place - 1, mesh.rod_start[rods])
+        after = np.minimum(place + 1, mesh.rod_stop[rods] - 1)
+        result[:, side] = positions[mesh.rod_nodes[after]] - positions[mesh.rod_nodes[before]]
+    return result

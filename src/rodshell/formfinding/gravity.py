@@ -1,0 +1,169 @@
+"""The gravity drape: static equilibrium of the user's rods under their weight, in unilateral contact.
+
+From the flat grid, on nested meshes. One joint, the anchor, is held in x and y, and a neighbour keeps its
+heading: without friction the draped grid would else slide or turn off at once. Even so the state may be a
+saddle; the negative modes of its exact Hessian say so (numerics.md, section 4). Stretch makes its footprint
+fall short of the inextensible net: that is physics, and grows with the weight over the stretch stiffness.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.contact.unilateral import UnilateralContact
+from rodshell.formfinding.draped import Draped, node_normals, smallest_joint_angle
+from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.joints import Joint
+from rodshell.layout import GridLayout, GridMesh, mesh_grid
+from rodshell.model import Freedom, Shell
+from rodshell.rods.section import Rod
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
+from rodshell.solve.problem import Problem
+from rodshell.solve.report import SolveReport, Status
+from rodshell.targets import Target
+
+Floats = NDArray[np.float64]
+
+DEPTH = 1e-5  # of the size: deepest node inside the target
+CONTACT_UPDATES = 12
+REFINE = 3.0  # edge length from level to level
+MOST_COLD, MOST_WARM = 300, 80
+
+
+def gravity_drape(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    joint: Joint | None = None,
+    progress: Progress = silent,
+) -> Draped:
+    """Let `layout` fall on `target`; see `drape`."""
+    top = standing_point(target, anchor, gravity)
+    grid = falling_grid(target, layout, anchor)
+    mesh: GridMesh | None = None
+    state: Floats | None = None
+    levels = list[SolveReport]()
+    for edge in _edges(layout):
+        coarse, mesh = mesh, mesh_grid(grid, edge, marks=middle_marks(grid, layout))
+        start = over(mesh, layout, top) if coarse is None or state is None else coarse.prolong(state, mesh)
+        name = f"level {len(levels) + 1}"
+        shell = Shell.of(mesh, rod, joint=joint)
+        found, contact = _settle(target, layout, rod, shell, start, top, gravity, len(levels) == 0, name, progress)
+        levels.append(found.report)
+        state = shell.positions(found.state)
+        if not found.report.converged:
+            break
+    assert mesh is not None
+    assert state is not None
+    inside = target.margin(state) > 0
+    angle, where = smallest_joint_angle(mesh, state, inside)
+    warnings = []
+    if levels[-1].negative_modes:
+        warnings.append(
+            f"the draped state is a saddle or near one ({levels[-1].negative_modes} negative modes): without friction "
+            'the grid would slide off; method "bound" does not depend on this'
+        )
+    return Draped(
+        method="gravity",
+        target=target,
+        layout=layout,
+        rod=rod,
+        mesh=mesh,
+        positions=state,
+        rods=grid.rods,
+        levels=tuple(levels),
+        max_gap=float(max(0.0, -target.contact(state).distance.min())),
+        pulls=int(np.count_nonzero(contact.multipliers < 0)),
+        min_angle=angle,
+        min_angle_at=where,
+        own_ends=None,
+        anchor=anchor,
+        gravity=gravity,
+        net=None,
+        warnings=tuple(warnings),
+    )
+
+
+def _edges(layout: GridLayout) -> list[float]:
+    """Edge lengths of the levels, coarse to fine: the spacing, then finer by thirds down to the layout's edge."""
+    edges = [min(layout.spacing)]
+    while edges[-1] / REFINE > 1.5 * layout.edge:
+        edges.append(edges[-1] / REFINE)
+    return [*edges, layout.edge] if edges[-1] > 1.01 * layout.edge else [layout.edge]
+
+
+def _held(shell: Shell, layout: GridLayout) -> Freedom:
+    """The node nearest the middle held in x and y; the next joint along its rod held across the heading."""
+    mesh = shell.mesh
+    flat = mesh.flat[:, :2]
+    joints = mesh.joint_nodes
+    anchor = joints[np.argmin(np.linalg.norm(flat[joints], axis=1))]
+    along = np.array([np.cos(layout.rotate), np.sin(layout.rotate), 0.0])
+    apart = flat[joints] - flat[anchor]
+    same = np.abs(apart[:, 1]) < 1e-9 * layout.spacing[0]
+    ahead = np.where(same & (apart[:, 0] > 0), apart[:, 0], np.inf)
+    neighbour = joints[np.argmin(ahead)]
+    free = shell.freedom().with_directions(np.array([anchor]), (0.0, 0.0, 1.0))
+    return free.with_directions(np.array([neighbour]), (along[0], along[1], 0.0), (0.0, 0.0, 1.0))
+
+
+def _settle(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    shell: Shell,
+    start: Floats,
+    top: Floats,
+    gravity: float,
+    cold: bool,
+    name: str,
+    progress: Progress,
+) -> tuple[Equilibrium, UnilateralContact]:
+    """Equilibrium on one mesh: Newton's method for given contact multipliers, which are then updated."""
+    mesh = shell.mesh
+    nodes = np.arange(shell.node_count)
+    load = np.zeros((len(shell.like), 3))
+    load[nodes, 2] = -gravity * shell.mass[nodes, 2]
+    weight = rod.mass_per_length * gravity
+    longest = max(line.length for line in mesh.grid.rods)
+    stiffness = np.full(len(nodes), weight * longest / (5e-3 * target.size))
+    contact = UnilateralContact(target, nodes[:, None], stiffness, np.zeros(len(nodes)))
+    supports = Supports(_held(shell, layout))
+    normals = node_normals(mesh, start) if shell.angles else None
+    state, forces, reports = shell.state(start, normals=normals), np.zeros(len(mesh.edges)), list[SolveReport]()
+    for update in range(CONTACT_UPDATES):
+        problem = Problem(
+            (*shell.elements, contact), shell.stretch, supports, target.size, load=load, places=shell.places
+        )
+        found = find_equilibrium(
+            problem,
+            state,
+            forces,
+            descend=update == 0,
+            most_iterations=MOST_COLD if cold and update == 0 else MOST_WARM,
+            progress=_telling(progress, f"gravity, {name}, contact {update + 1}"),
+        )
+        state, forces = found.state, found.forces
+        reports.append(found.report)
+        depth = -float(target.contact(state[nodes]).distance.min())
+        if not found.report.converged or depth < DEPTH * target.size:
+            break
+        contact = contact.updated(state)
+    status = found.report.status
+    if found.report.converged and depth >= DEPTH * target.size:
+        status = Status.STALLED
+    if slid_off(mesh, shell.positions(state), layout, top, target):
+        status = Status.SLID_OFF
+    report = replace(found.report.after(*reports[:-1]), status=status)
+    return replace(found, report=report), contact
+
+
+def _telling(progress: Progress, where: str) -> Callable[[int, float], None]:
+    return lambda iteration, step: progress("drape", f"{where}, iteration {iteration}", step)

@@ -1,0 +1,282 @@
+"""The main job: drape, trim, map back, pop up, compare; and the pop-up of a table of rods on its own."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import degrees, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.formfinding.agreement import Agreement, agreement
+from rodshell.formfinding.drape import Method, drape
+from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.popup import Ends, Popped, pop_up
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.roll import roll
+from rodshell.formfinding.trim import (
+    FEWEST_JOINTS,
+    NEAREST_JOINT,
+    Boundary,
+    Footprint,
+    Trimmed,
+    map_back,
+    trim,
+    untrimmed,
+)
+from rodshell.joints import Ball, Joint
+from rodshell.layout import FlatGrid, GridLayout, mesh_grid
+from rodshell.layout.gridlayout import EDGES_A_SPAN
+from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
+from rodshell.targets import Target
+from rodshell.units import length_text
+
+Floats = NDArray[np.float64]
+
+SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
+STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
+ROLLED = pi / 4  # rad: a lath that turns by more bends about its other axis rather than its own
+LONG_TAIL = 3.0  # spacings past a rod's last joint
+ROOM = 0.5  # of the clear distance of parallel rods: wider ones leave no room for joints
+
+
+@dataclass(frozen=True)
+class FoundForm:
+    """Every stage of the main job. A stage that was not reached, because one before did not converge, is missing.
+
+    Parameters
+    ----------
+    popped, agreement : by end condition, "pinned" and "clamped".
+    """
+
+    target: Target
+    layout: GridLayout
+    rod: Rod
+    joint: Joint
+    draped: Draped
+    trimmed: Trimmed
+    footprint: Footprint
+    popped: dict[Ends, Popped]
+    agreement: dict[Ends, Agreement]
+
+    @property
+    def status(self) -> str:
+        """ "converged", or which stage stopped and what to do."""
+        if not self.draped.converged:
+            sentence = self.draped.report.status.sentence
+            weighed = self.draped.method != "bound" and "bound" not in sentence
+            other = ', or use method = "bound", which asks for no weight' if weighed else ""
+            return f"drape {sentence}{other}"
+        return _popped_status(self.popped)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read before anything else."""
+        stretched = _stretched(self.draped)
+        off = _springs_off(self.agreement, advise=not stretched)
+        built = (*_crowded(self.draped), *(_long_tails(self.trimmed) if self.draped.converged else ()))
+        return (*self.draped.warnings, *stretched, *built, *_popped_warnings(self.popped), *off)
+
+
+@dataclass(frozen=True)
+class PoppedTable:
+    """A table of rods, popped up from flat with pinned ends."""
+
+    rod: Rod
+    footprint: Footprint
+    boundary: Boundary
+    popped: dict[Ends, Popped]
+    dropped: tuple[tuple[str, str], ...]
+
+    @property
+    def status(self) -> str:
+        """ "converged", or what to do."""
+        return _popped_status(self.popped)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return _popped_warnings(self.popped)
+
+
+def find_stages(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    method: Method = "bound",
+    anchor: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    joint: Joint | None = None,
+    fall: Fall | None = None,
+    ends: Sequence[Ends] = ("pinned", "clamped"),
+    start: FoundForm | None = None,
+    cut: Callable[[Draped], Trimmed] = trim,
+    progress: Progress = silent,
+) -> FoundForm:
+    """Drape, trim, map back, pop up and compare; see `rodshell.find_form`.
+
+    cut : how the draped shell is trimmed.
+    """
+    joint = joint or Ball()
+    draped = drape(
+        layout, rod, target,
+        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall,
+        start=start.draped if start else None, progress=progress,
+    )  # fmt: skip
+    trimmed = cut(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
+    footprint = map_back(trimmed)
+    popped: dict[Ends, Popped] = {}
+    if draped.converged:
+        last = start.popped if start else {}
+        popped = {
+            end: pop_up(
+                footprint, trimmed.boundary, rod,
+                ends=end, start=last.get(end, "draped"), joint=joint, progress=progress,
+            )
+            for end in ends
+        }  # fmt: skip
+    compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
+    return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared)
+
+
+def pop_up_stages(
+    grid: FlatGrid, finals: Floats, rod: Rod, *, edge: float | None = None, progress: Progress = silent
+) -> PoppedTable:
+    """Pop up rods given by their flat lines and the final places of their ends.
+
+    Parameters
+    ----------
+    finals : (m, 2, 3) where the two ends of each rod of `grid` go [m].
+    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+
+    Raises
+    ------
+    InputError : no rod has three joints.
+    """
+    spans = _spans(grid)
+    joined = FlatGrid.of(grid.rods, margin=NEAREST_JOINT * spans)
+    kept, swinging = joined.without(lambda some: some.joint_counts() < FEWEST_JOINTS)
+    if not kept.rods:
+        raise InputError(
+            f"no rod of the table has {FEWEST_JOINTS} joints with others: such rods swing; give a denser grid"
+        )
+    row = {rod.name: k for k, rod in enumerate(grid.rods)}
+    rows = [row[rod.name] for rod in kept.rods]
+    footprint = Footprint(mesh_grid(kept, edge or spans / EDGES_A_SPAN))
+    points = finals[rows].reshape(-1, 3)
+    boundary = Boundary(points, np.zeros_like(points))
+    popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", progress=progress)
+    dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
+    return PoppedTable(rod, footprint, boundary, {"pinned": popped}, dropped)
+
+
+def _spans(grid: FlatGrid) -> float:
+    """Median distance between neighbouring joints [m]."""
+    gaps = []
+    for rod in range(len(grid.rods)):
+        on_rod = grid.crossings.at[grid.crossings.rods == rod]
+        gaps += np.diff(np.sort(on_rod)).tolist()
+    return float(np.median(gaps)) if gaps else min(rod.length for rod in grid.rods)
+
+
+def _popped_status(popped: dict[Ends, Popped]) -> str:
+    for ends, shell in popped.items():
+        if not shell.report.converged:
+            return f"pop-up ({ends}) {shell.report.status.sentence}"
+    return "converged"
+
+
+def _stretched(draped: Draped) -> tuple[str, ...]:
+    """Rods that hang stretch by weight over stiffness, in which their section's area cancels out."""
+    strain = draped.report.max_strain
+    if draped.method == "bound" or not draped.converged or strain <= STRETCHED:
+        return ()
+    return (
+        f"on the target the rods stretch by {100 * strain:.2g} % under their own weight, so that they are cut too "
+        'short: use a stiffer or lighter material (rod.material; a thicker section does not help), or method "bound"',
+    )
+
+
+def _crowded(draped: Draped) -> tuple[str, ...]:
+    """Rods too wide for their distance, where shear brings parallel ones nearest to each other."""
+    apart, wide = min(draped.layout.spacing) * sin(draped.min_angle), _breadth(draped.rod)
+    if not wide > ROOM * apart:
+        return ()
+    what = "they would touch" if wide >= apart else "that leaves hardly any room for joints"
+    return (
+        f"the rods are {1e3 * wide:.3g} mm wide, and parallel ones {1e3 * apart:.3g} mm apart where the families meet "
+        f"at {degrees(draped.min_angle):.0f} degrees: {what}; use thinner rods (rod.section) or a larger spacing",
+    )
+
+
+def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
+    """Rods that run far past their last joint, since crossings there lie too near to an end."""
+    grid = trimmed.mesh.grid
+    ends = np.array([(rod.start, rod.end) for rod in grid.rods])
+    first, last = ends[:, 1].copy(), ends[:, 0].copy()
+    np.minimum.at(first, grid.crossings.rods, grid.crossings.at)
+    np.maximum.at(last, grid.crossings.rods, grid.crossings.at)
+    tails = np.maximum(first - ends[:, 0], ends[:, 1] - last)
+    spacing = max(trimmed.draped.layout.spacing)
+    long, worst = int(np.count_nonzero(tails > LONG_TAIL * spacing)), int(np.argmax(tails))
+    if not long:
+        return ()
+    left = len(FlatGrid.of(grid.rods).crossings) - len(grid.crossings)
+    others = f" ({long} rods do so by more than {LONG_TAIL:g} spacings)" if long > 1 else ""
+    near = f"no joint is made within {NEAREST_JOINT:g} spacings of a rod's end, here at {left} crossings"
+    why = f": {near}" if left else ""
+    return (
+        f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
+        "anchor of the layout may help, or leave such rods out",
+    )
+
+
+def _breadth(rod: Rod) -> float:
+    """What a rod covers of the grid's plane across its line [m]; 0 where the shape of its section is not known."""
+    section = rod.section
+    if isinstance(section, GivenSection):
+        return 0.0
+    if isinstance(section, Circle | Tube):
+        return 2 * section.outer_radius
+    return 2 * section.b if isinstance(section, Ellipse) else section.height
+
+
+def _springs_off(compared: dict[Ends, Agreement], *, advise: bool) -> tuple[str, ...]:
+    """With its ends clamped a convex shell keeps to the target; one that does not is held by nothing there.
+
+    advise : what to do, where nothing else is known to be the cause.
+    """
+    gap = compared.get("clamped")
+    if gap is None or gap.max_relative < SPRUNG:
+        return ()
+    x, y, z = gap.where
+    advice = ": dips and ridges need seams, graded stiffness or supports" if advise else ""
+    return (
+        f"the free grid springs off the target by {gap.max:.3g} m ({100 * gap.max_relative:.1f} % of its size) near "
+        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends{advice}",
+    )
+
+
+def _popped_warnings(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+    found = {ends: shell for ends, shell in popped.items() if shell.report.converged}
+    unstable = tuple(
+        f"the popped-up shell with {ends} ends is not stable: {shell.report.negative_modes} negative modes"
+        for ends, shell in found.items()
+        if not shell.report.stable
+    )
+    return (*unstable, *_rolled(found))
+
+
+def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+    """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
+    for ends, shell in popped.items():
+        angles = roll(shell)
+        if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
+            return (
+                f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "
+                f"{degrees(angles.max()):.0f} ({ends} ends), and bend the easy way, since nothing holds them: bolted "
+                'laths stay as they are laid and are stressed more; set joint.kind = "pin", or swap the width and the '
+                "height of the section",
+            )
+    return ()

@@ -1,0 +1,257 @@
+"""Pop up: the rod ends go from the footprint to the boundary, and the free grid finds its shape.
+
+No target, no load and no contact: only rods, joints and the ends. Pinned ends hold positions; clamped ends
+hold the direction of the draped rods as well. The end condition decides the shape (numerics.md, section 4a).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.formfinding.carried import carried_edges, carried_nodes
+from rodshell.formfinding.draped import node_normals
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.trim import Boundary, Footprint
+from rodshell.geometry.vectors import dot, unit
+from rodshell.joints import Ball, Joint
+from rodshell.model import Shell
+from rodshell.rods.section import Rod
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import Equilibrium, find_stable
+from rodshell.solve.path import follow
+from rodshell.solve.problem import Problem
+from rodshell.solve.report import SolveReport
+
+Floats = NDArray[np.float64]
+Ends = Literal["pinned", "clamped"]
+Start = Literal["draped", "flat"]
+
+UP = np.array([0.0, 0.0, 1.0])
+FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
+CLAMP_STEP = 0.25
+MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
+MOST_AGAIN = 8  # iterations from the last form before starting afresh
+NEARBY = 0.1  # of the length: a state further from the guess may be another one
+
+
+@dataclass(frozen=True)
+class Popped:
+    """The popped-up shell, how it was reached, and figures.
+
+    Parameters
+    ----------
+    positions : (n, 3) of the footprint's nodes [m].
+    footprint, boundary : as they were given.
+    shell : the mechanical model; state : (N, 3) its state in equilibrium, its source frames being there.
+    forces : (e,) axial forces of the edges [N].
+    """
+
+    ends: Ends
+    start: Start
+    footprint: Footprint
+    boundary: Boundary
+    positions: Floats
+    report: SolveReport
+    shell: Shell
+    state: Floats
+    forces: Floats
+
+
+def pop_up(
+    footprint: Footprint,
+    boundary: Boundary,
+    rod: Rod,
+    *,
+    ends: Ends = "clamped",
+    start: "Start | Popped" = "draped",
+    joint: Joint | Sequence[Joint] | None = None,
+    progress: Progress = silent,
+) -> Popped:
+    """Move the rod ends of `footprint` to `boundary` and find the equilibrium of the free grid.
+
+    Parameters
+    ----------
+    ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp).
+    start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
+        flat grid, which leaves its plane to the side that the boundary's directions point away from (without
+        directions to that of +z), then turns the clamps. A shell popped up before, with the same ends: as "draped",
+        but the displacements and axial forces that it had on the same rods are the first guess. Where that does
+        not lead to a stable state nearby, the draped state does.
+    joint : what the rods do to each other where they cross: one for all, or one for each crossing; ball joints
+        without. Eccentric rods end half their distance above or below the boundary.
+
+    Raises
+    ------
+    InputError : `start` is "draped" and the boundary has no draped state; the joints do not fit the grid.
+    """
+    job = _PopUp(footprint, boundary, rod, joint or Ball(), progress)
+    if start == "draped" or isinstance(start, Popped):
+        shell, found = (job.again(start) if isinstance(start, Popped) else None) or job.release(ends)
+        start = "draped"
+    else:
+        shell, found = job.rise()
+        if ends == "clamped" and found.report.converged:
+            shell, found = job.turn_clamps(shell, found)
+    shell = shell.with_elements(found.elements)
+    positions = shell.positions(found.state)
+    return Popped(ends, start, footprint, boundary, positions, found.report, shell, found.state, found.forces)
+
+
+@dataclass(frozen=True)
+class _PopUp:
+    footprint: Footprint
+    boundary: Boundary
+    rod: Rod
+    joint: Joint | Sequence[Joint]
+    progress: Progress
+
+    def shell(self, ends: Ends) -> Shell:
+        return Shell.of(self.footprint.mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
+
+    @property
+    def length(self) -> float:
+        """Characteristic length: half the boundary's width [m]."""
+        return 0.5 * float(np.ptp(self.boundary.points, axis=0).max())
+
+    def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
+        """Ends (and ghosts) held, or on their way to `goals`."""
+        free = shell.held_ends()
+        moved = np.append(shell.ends, shell.ghosts)
+        supports = Supports(free) if goals is None else Supports(free, moved, goals)
+        return Problem(shell.elements, shell.stretch, supports, self.length, places=shell.places)
+
+    def upright(self, shell: Shell, positions: Floats, tangents: Floats | None = None) -> Floats:
+        """The state at these node positions (n, 3), the rods' first directors along the normals of the surface."""
+        normals = node_normals(self.footprint.mesh, positions) if shell.angles else None
+        return shell.state(positions, tangents, normals)
+
+    def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
+        """Let go of the draped state: the ends stay, the target's forces vanish. At once, or down the energy."""
+        if self.boundary.draped is None:
+            raise InputError('this boundary has no draped state to start from: use start="flat"')
+        shell = self.shell(ends)
+        state = self.upright(shell, self.boundary.draped, self.boundary.tangents)
+        forces = np.zeros(len(self.footprint.mesh.edges))
+        at_once = find_stable(
+            self.problem(shell),
+            state,
+            forces,
+            cut=True,
+            most_iterations=MOST_AT_ONCE,
+            progress=lambda k, step: self.progress("pop-up", f"{ends}, iteration {k}", step),
+        )
+        if at_once.report.stable:
+            return shell, at_once
+        from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
+
+        slid = relax(
+            self.problem(shell),
+            state,
+            progress=lambda k, step: self.progress("pop-up", f"{ends}, sliding down, step {k}", step),
+        )
+        return shell, replace(slid, report=slid.report.after(at_once.report))
+
+    def again(self, last: Popped) -> tuple[Shell, Equilibrium] | None:
+        """From where a shell popped up before went from its draped state; None where that leads nowhere near.
+
+        Not for rods with twist angles: these are not carried, and without them the draped state is a better guess.
+        """
+        here, there = self.boundary.draped, last.boundary.draped
+        if here is None or there is None or last.shell.angles:
+            return None
+        shell, mesh, before = self.shell(last.ends), self.footprint.mesh, last.footprint.mesh
+        moved = carried_nodes(last.positions - there, before, mesh)
+        moved[mesh.ends] = 0.0
+        state = self.upright(shell, here + moved, self.boundary.tangents)
+        stiffer = shell.stretch.stiffness.mean() / last.shell.stretch.stiffness.mean()
+        found = find_stable(
+            self.problem(shell),
+            state,
+            stiffer * carried_edges(last.forces, before, mesh),
+            most_iterations=MOST_AGAIN,
+            progress=lambda k, step: self.progress("pop-up", f"{last.ends}, again, iteration {k}", step),
+        )
+        strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
+        return None if strayed or not found.report.stable else (shell, found)
+
+    def rise(self) -> tuple[Shell, Equilibrium]:
+        """Pinned, from the flat grid: the ends go straight to the boundary while the grid rises."""
+        mesh, boundary = self.footprint.mesh, self.boundary
+        shell = self.shell("pinned")
+        flat = aligned(mesh.flat, mesh.flat[mesh.ends.ravel()], boundary.points)
+        first, up = flat[mesh.ends.ravel()], UP
+        if boundary.draped is not None:
+            up = node_normals(mesh, boundary.draped)[mesh.ends.ravel()]
+        last = boundary.points + shell.lift[shell.ends] * up
+        found = follow(
+            lambda t: self.problem(shell, (1 - t) * (first + shell.lift[shell.ends] * UP) + t * last),
+            self.upright(shell, arched(self.footprint, flat, first, boundary)),
+            np.zeros(len(mesh.edges)),
+            first_step=FIRST_RISE,
+            progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
+        )
+        return shell, found
+
+    def turn_clamps(self, free: Shell, pinned: Equilibrium) -> tuple[Shell, Equilibrium]:
+        """From the pinned state, turn the end directions to those of the boundary."""
+        mesh, outward = self.footprint.mesh, self.boundary.tangents
+        shell, positions = self.shell("clamped"), free.positions(pinned.state)
+        inner = np.column_stack([mesh.rod_nodes[mesh.rod_start + 1], mesh.rod_nodes[mesh.rod_stop - 2]]).ravel()
+        now = unit(positions[mesh.ends.ravel()] - positions[inner])
+        angle = np.arccos(np.clip(dot(now, outward), -1, 1))[:, None]
+        sine = np.maximum(np.sin(angle), 1e-12)
+        start = self.upright(shell, positions, now)
+
+        def goals(t: float) -> Floats:
+            turned = np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * outward) / sine, now)
+            there = shell.state(positions, unit(turned))[shell.ghosts] - positions[mesh.ends.ravel()]
+            return np.vstack([start[shell.ends], start[shell.ends] + there])
+
+        found = follow(
+            lambda t: self.problem(shell, goals(t)),
+            start,
+            pinned.forces,
+            first_step=CLAMP_STEP,
+            progress=lambda t, k, step: self.progress(
+                "pop-up", f"turning clamps, {100 * t:.0f} %, iteration {k}", step
+            ),
+        )
+        return shell, replace(found, report=found.report.after(pinned.report))
+
+
+def aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
+    """The flat grid (n, 3) turned and moved in its plane, and lifted, to lie best over the boundary."""
+    centre, there = ends.mean(axis=0), points.mean(axis=0)
+    a, b = (ends - centre)[:, :2], (points - there)[:, :2]
+    angle = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    result = np.empty_like(flat)
+    result[:, :2] = (flat - centre)[:, :2] @ turn.T + there[:2]
+    result[:, 2] = there[2]
+    return result
+
+
+def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:
+    """The flat grid raised to arches of about the rods' lengths over their ends at the first step.
+
+    A flat grid under compression is in equilibrium, only not a stable one: the arch chooses the side. A rod
+    whose ends are to rise outwards sags; without directions all rods rise.
+    """
+    mesh = footprint.mesh
+    ends = (1 - FIRST_RISE) * first + FIRST_RISE * boundary.points
+    side = np.where(boundary.tangents[::2, 2] + boundary.tangents[1::2, 2] > 0, -1.0, 1.0)
+    raised, weight = np.zeros_like(flat), np.zeros(len(flat))
+    for k, rod in enumerate(mesh.grid.rods):
+        nodes, s = mesh.nodes_of(k), mesh.stations[mesh.rod_slice(k)]
+        share = ((s - s[0]) / rod.length)[:, None]
+        chord = (1 - share) * ends[2 * k] + share * ends[2 * k + 1]
+        short = max(rod.length**2 - float(np.sum((ends[2 * k + 1] - ends[2 * k]) ** 2)), 0.0)
+        height = side[k] * 2 / np.pi * np.sqrt(short)  # a sine arch of this height has about the rod's length
+        chord[:, 2] += height * np.sin(np.pi * share[:, 0])
+        raised[nodes] += chord
+        weight[nodes] += 1
+    return raised / weight[:, None]

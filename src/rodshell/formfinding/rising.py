@@ -1,0 +1,151 @@
+"""The paper's pop-up: the rod ends move from G0 to G in time, and the grid comes to rest [HQK 2.2, 3.2].
+
+Implicit Euler with the coupling that is asked for, drag, and no load. Pinned ends only: the paper moves nodes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.formfinding.popup import FIRST_RISE, aligned, arched
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
+from rodshell.formfinding.trim import Boundary, Footprint
+from rodshell.geometry.vectors import dot
+from rodshell.joints import Coupling, Joint, SharedDofs
+from rodshell.model import Shell
+from rodshell.rods.section import Rod
+from rodshell.solve.constraint import Supports
+from rodshell.solve.forces import Damping
+from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.simulate import simulate
+from rodshell.solve.step_limit import step_limit
+from rodshell.solve.summed import narrow_or_dissected
+from rodshell.solve.time_series import Moment
+
+Floats = NDArray[np.float64]
+
+BALANCED = 1e-3  # out-of-balance force on a node, of EI over the square of the shell's half-width
+STILL = 1e-6  # kinetic energy, of the elastic energy
+OF_LIMIT = 0.9  # share of the explicit ties' step limit that is taken
+CHECKS = 10  # moments between two looks at the rest
+
+
+@dataclass(frozen=True)
+class Rise:
+    """How the ends move.
+
+    Parameters
+    ----------
+    coupling : how the rods hold together.
+    time_step : [s]; explicit ties take at most nine tenths of their limit.
+    moving : time [s] in which the ends reach the boundary, on straight paths, starting and stopping smoothly.
+    duration : of the whole motion [s], which ends earlier when the grid is at rest.
+    drags : rates at which velocities decay [1/s], while the ends move and after. A lively start can swing through
+        the plane and pop up to the other side.
+    """
+
+    coupling: Coupling = field(default_factory=SharedDofs)
+    time_step: float = 0.01
+    moving: float = 1.0
+    duration: float = 10.0
+    drags: tuple[float, float] = (20.0, 3.0)
+
+    def __post_init__(self) -> None:
+        for name in ("time_step", "moving", "duration"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value > 0):
+                raise InputError(f"the rise's {name} must be positive, not {value} s")
+
+
+@dataclass(frozen=True)
+class Risen:
+    """The shell that popped up in time: positions (n, 3) of the footprint's nodes [m], and how they rest."""
+
+    positions: Floats
+    rest: Rest
+
+
+def pop_up_in_time(
+    footprint: Footprint,
+    boundary: Boundary,
+    rod: Rod,
+    *,
+    joint: Joint | None = None,
+    rise: Rise | None = None,
+    progress: Progress = silent,
+) -> Risen:
+    """Move the rod ends from the footprint to the boundary in time, pinned, from (nearly) flat.
+
+    A flat grid stays flat, in unstable equilibrium: as in `pop_up`, the start is a low arch with its ends a
+    twentieth of their way on.
+
+    Raises
+    ------
+    StabilityError, ConvergenceError : explicit ties that are too stiff for any step; a step that fails.
+    """
+    rise = rise or Rise()
+    mesh = footprint.mesh
+    shell = Shell.of(mesh, rod, joint=joint, coupling=rise.coupling)
+    ends = mesh.ends.ravel()
+    flat = aligned(mesh.flat, mesh.flat[ends], boundary.points)
+    state = shell.state(arched(footprint, flat, flat[ends], boundary))
+
+    def supports(time: float) -> Supports:
+        way = min(1.0, time / rise.moving)
+        share = FIRST_RISE + (1 - FIRST_RISE) * way * way * (3 - 2 * way)
+        return Supports(shell.held_ends(), shell.ends, (1 - share) * flat[ends] + share * boundary.points)
+
+    motion = Motion.of(shell, constraint=supports)
+    step = min(rise.time_step, OF_LIMIT * step_limit(motion, state))
+    unit_force = rod.bend_stiffness / (0.5 * float(np.ptp(boundary.points, axis=0).max())) ** 2
+    stop = _looking(shell, rise.moving, BALANCED * unit_force, progress)
+    matrix, steps, refused = narrow_or_dissected(shell.places), 0, 0
+    last = Moment(0.0, state, np.zeros_like(state), motion)
+    for rate, until in zip(rise.drags, (rise.moving, rise.duration), strict=True):
+        if until <= last.time:
+            break
+        series = simulate(
+            replace(last.motion, forces=(Damping(rate=rate),)), last.state, last.velocity,
+            start=last.time, until=until, step=step, every=int(until / step) + 2, stop=stop, matrix=matrix,
+        )  # fmt: skip
+        assert series.last is not None
+        assert series.report is not None
+        last = series.last
+        steps, refused = steps + series.report.steps, refused + series.report.refused_steps
+    energy, force = _activity(shell, last)
+    resting = last.time >= rise.moving and _rests(last, energy, force, BALANCED * unit_force)
+    gap = joint_gap(shell, last.state)
+    rest = Rest(resting, last.time, energy, force, gap, (), steps, refused)
+    return Risen(shell.positions(last.state), rest)
+
+
+def _activity(shell: Shell, moment: Moment) -> tuple[float, float]:
+    """Kinetic energy [J] and largest out-of-balance force on a free node [N]."""
+    force = out_of_balance(moment.motion, moment.state, np.zeros_like(moment.state))
+    free = np.delete(np.arange(shell.node_count), shell.ends)
+    return moment.motion.kinetic_energy(moment.velocity), float(np.sqrt(dot(force[free], force[free]).max()))
+
+
+def _rests(moment: Moment, energy: float, force: float, least: float) -> bool:
+    return force < least and energy < STILL * moment.motion.elastic_energy(moment.state)
+
+
+def _looking(shell: Shell, moving: float, least: float, progress: Progress) -> Callable[[Moment], bool]:
+    """Asked at each step: tells where it is, and from time to time whether it rests."""
+    count = 0
+
+    def look(moment: Moment) -> bool:
+        nonlocal count
+        count += 1
+        if count % CHECKS:
+            return False
+        energy, force = _activity(shell, moment)
+        progress("pop-up", f"rising, t = {moment.time:.3f} s, kinetic energy {energy:.1e} J", force)
+        return moment.time >= moving and _rests(moment, energy, force, least)
+
+    return look

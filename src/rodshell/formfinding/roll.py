@@ -1,0 +1,27 @@
+"""How far laths turn about their own axes: what lies flat on the target need not do so when it is let go."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.formfinding.draped import node_normals
+from rodshell.formfinding.popup import Popped
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.rods.bend_twist import BendTwist
+
+Floats = NDArray[np.float64]
+
+
+def roll(popped: Popped) -> Floats | None:
+    """(b,) angle [rad] of each bend of the mesh, from 0 to pi/2, between a rod's first material director and the
+    shell's normal, both seen along the rod; None where rods have no directors, because they bend alike all ways."""
+    shell, mesh = popped.shell, popped.shell.mesh
+    frames = next((one for one in shell.within if isinstance(one, BendTwist)), None)
+    if frames is None or not shell.angles:
+        return None
+    edges = frames.blocks[: len(mesh.bends), 1]
+    tangents, directors = (part[: len(edges), 0] for part in (frames.source_tangents, frames.source_directors))
+    turn = popped.state[edges, :1]
+    m1 = np.cos(turn) * directors + np.sin(turn) * cross(tangents, directors)
+    normals = node_normals(mesh, popped.positions)[mesh.bends[:, 1]]
+    seen = unit(normals - dot(normals, tangents)[:, None] * tangents)
+    return np.asarray(np.arccos(np.clip(np.abs(dot(m1, seen)), 0.0, 1.0)))

@@ -1,0 +1,199 @@
+"""Seams: the rods of all patches, chosen such that where one ends on a seam, one of the next patch does too."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError, RodshellError
+from rodshell.formfinding.matching import Point, Wanted, match_net, rod_ends
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.trim import NEAREST_JOINT
+from rodshell.geometry.vectors import unit
+from rodshell.layout import FlatGrid, FlatRod, GridLayout
+from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.targets.patch import Patch
+
+Floats = NDArray[np.float64]
+
+REMEDY = "turn the layout (layout.rotate), so that its rods cross the seams, or use a smaller spacing"
+FEWEST = 2  # joints of a rod: one that is left out takes those with it that it meets
+SWINGS = f"it has fewer than {FEWEST} joints and would swing"
+ALONE = "it ends on a seam where no rod of the next patch can meet it"
+
+
+@dataclass(frozen=True, order=True)
+class End:
+    """An end of a rod of a patch: side 0 is its start, 1 its end."""
+
+    patch: str
+    rod: str
+    side: int
+
+    def __str__(self) -> str:
+        return f"{self.patch}-{self.rod}.{self.side}"
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A point (3,) of a seam at which two rods of different patches end [m]."""
+
+    seam: int
+    point: Floats
+    ends: tuple[End, End]
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A patch with its own rods; `dropped` names those that its layout leaves out, with the reason."""
+
+    patch: Patch
+    layout: GridLayout
+    anchor: Point
+    net: ChebyshevNet
+    dropped: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def rods(self) -> tuple[FlatRod, ...]:
+        """Those that are to be built."""
+        return tuple(rod for rod in self.net.rods if not rod.virtual and rod.name not in self.layout.left_out)
+
+
+@dataclass(frozen=True)
+class _Open:
+    """An end on a seam, and the sides on which the patch beyond lies; its tangent, mirrored in the seam."""
+
+    end: End
+    seam: int
+    beyond: tuple[int, ...]
+    point: Floats
+    mirrored: Floats
+
+
+def lay_patches(
+    patches: Mapping[str, Patch],
+    layouts: Mapping[str, GridLayout],
+    anchors: Mapping[str, Point | None],
+    *,
+    progress: Progress = silent,
+) -> tuple[dict[str, Laid], tuple[Meeting, ...]]:
+    """The rods of each patch, in turn: each takes up the rods of those before it.
+
+    Rods that no other meets at a seam are left out, and so are those that would swing without these.
+    """
+    laid, waiting, meetings = dict[str, Laid](), list[_Open](), list[Meeting]()
+    for name, patch in patches.items():
+        progress("seams", f"laying patch {name}", 0.0)
+        layout, anchor = layouts[name], anchors[name] or patch.middle
+        mine = [end for end in waiting if end.beyond == patch.sides]
+        try:
+            if mine:
+                wanted = _wanted(patch, mine, [one.patch for one in laid.values()])
+                found = match_net(patch, layout, anchor, wanted)
+                laid[name] = Laid(patch, found.layout, found.anchor, found.net)
+                for met in found.met:
+                    other = mine[met.point]
+                    meetings.append(Meeting(other.seam, other.point, (other.end, End(name, met.rod, met.side))))
+            else:
+                laid[name] = Laid(patch, layout, anchor, chebyshev_net(patch, layout, anchor=anchor))
+        except RodshellError as reason:
+            raise type(reason)(f"patch {name}: {reason}") from None
+        done = {end for meeting in meetings for end in meeting.ends}
+        waiting = [end for end in (*waiting, *_ends_on_seams(name, laid[name])) if end.end not in done]
+    return _without_lonely(laid, {end.end for end in waiting}, meetings)
+
+
+def _wanted(patch: Patch, ends: list[_Open], others: list[Patch]) -> Wanted:
+    """Where a patch's rods should end: at these ends of the others' rods."""
+    taken = [k for k in range(len(patch.seams)) if any(_across(patch, k) == other.sides for other in others)]
+    points = np.array([end.point for end in ends])
+    return Wanted(
+        points,
+        np.array([end.mirrored for end in ends]),
+        _rows(np.array([end.seam for end in ends]), points),
+        lambda x: np.isin(_cut_by(patch, x), taken),
+    )
+
+
+def _in_order(meetings: list[Meeting]) -> tuple[Meeting, ...]:
+    """Seam by seam, along each."""
+    seams, points = np.array([one.seam for one in meetings]), np.array([one.point for one in meetings])
+    return tuple(meetings[k] for row in _rows(seams, points) for k in row.tolist())
+
+
+def _rows(seams: NDArray[np.intp], points: Floats) -> list[NDArray[np.intp]]:
+    """Indices of the points (n, 3) on each of the seams (n,) that there are, in their order along it."""
+    here = [np.flatnonzero(seams == seam) for seam in np.unique(seams)]
+    return [row[in_a_row(points[row])] for row in here]
+
+
+def in_a_row(points: Floats) -> NDArray[np.intp]:
+    """The order (n,) of points (n, 3) along a curve through them, from one of its ends: that of their shortest tree."""
+    from scipy.sparse.csgraph import minimum_spanning_tree, shortest_path
+    from scipy.spatial.distance import cdist
+
+    tree = minimum_spanning_tree(cdist(points, points) + 1e-300)
+    first = int(np.argmax(shortest_path(tree, directed=False, indices=0)))
+    return np.argsort(shortest_path(tree, directed=False, indices=first), kind="stable")
+
+
+def _across(patch: Patch, seam: int) -> tuple[int, ...]:
+    """Sides of the patch beyond a seam."""
+    return tuple(-side if k == seam else side for k, side in enumerate(patch.sides))
+
+
+def _cut_by(patch: Patch, points: Floats) -> NDArray[np.intp]:
+    """(n,) the seam on which points (n, 3) of a patch's end lie; -1: on the end of the whole."""
+    off = np.array([patch.whole.margin(points), *(seam.distance(points) for seam in patch.seams)])
+    return np.asarray(np.argmin(np.abs(off), axis=0) - 1)
+
+
+def _ends_on_seams(name: str, laid: Laid) -> list[_Open]:
+    """The ends of a patch's rods that a seam cuts off, at their points of the seam."""
+    patch, rods = laid.patch, laid.rods
+    points = rod_ends(laid.net, rods)
+    cut_by = _cut_by(patch, points)
+    result = []
+    for k in np.flatnonzero(cut_by >= 0).tolist():
+        seam = int(cut_by[k])
+        on_seam = patch.on_seam(points[k], seam)
+        rod, tiny = rods[k // 2], 0.1 * laid.layout.edge
+        at = rod.end - tiny if k % 2 else rod.start + tiny
+        out = unit(points[k] - laid.net.positions(rod, np.array([at]))[0])
+        across = patch.across(on_seam, seam)
+        mirrored = out - 2 * (out @ across) * across
+        result.append(_Open(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, mirrored))
+    return result
+
+
+def _without_lonely(
+    laid: dict[str, Laid], lonely: set[End], meetings: list[Meeting]
+) -> tuple[dict[str, Laid], tuple[Meeting, ...]]:
+    """Leave out rods with a lonely end, rods that would swing, and those that they met, until all is in order."""
+    out = {(end.patch, end.rod): ALONE for end in sorted(lonely)}
+    while True:
+        before = len(out)
+        for name, one in laid.items():
+            out |= {(name, rod): SWINGS for rod in _swinging(name, one, [rod for patch, rod in out if patch == name])}
+        for meeting in meetings:
+            for end, other in (meeting.ends, meeting.ends[::-1]):
+                if (end.patch, end.rod) in out and (other.patch, other.rod) not in out:
+                    out[other.patch, other.rod] = f"it meets {end.patch}-{end.rod}, which is left out"
+        if len(out) == before:
+            break
+    for name, one in laid.items():
+        dropped = tuple((rod, why) for (patch, rod), why in out.items() if patch == name)
+        laid[name] = replace(
+            one, layout=replace(one.layout, left_out=tuple(rod for rod, _ in dropped)), dropped=dropped
+        )
+    return laid, _in_order([one for one in meetings if not any((end.patch, end.rod) in out for end in one.ends)])
+
+
+def _swinging(name: str, laid: Laid, out: list[str]) -> list[str]:
+    """Names of the rods that would have too few joints without those that are out."""
+    rods = [rod for rod in laid.rods if rod.name not in out]
+    if not rods:
+        raise InputError(f"no rod of patch {name} meets others at its seams: {REMEDY}")
+    margin = NEAREST_JOINT * min(laid.layout.spacing)
+    return FlatGrid.of(rods, margin=margin).without(lambda grid: grid.joint_counts() < FEWEST)[1]

@@ -1,0 +1,269 @@
+"""Several simple gridshells sewn together: a target is cut into patches, each is formed alone, and on the seams the
+rod ends of both sides share their places [HQK 3.4, the outlook]."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property, partial
+from math import degrees
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError, RodshellError
+from rodshell.formfinding.agreement import Agreement
+from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.joined import joined_agreement, joined_report
+from rodshell.formfinding.matching import Point
+from rodshell.formfinding.patches import carried_heading, patches_of
+from rodshell.formfinding.pipeline import FoundForm, find_stages
+from rodshell.formfinding.popup import Ends
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.seams import FEWEST, Laid, Meeting, lay_patches
+from rodshell.formfinding.search import HEADINGS
+from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
+from rodshell.joints import Ball, Joint
+from rodshell.layout import GridLayout
+from rodshell.layout.side_by_side import SideBySide, side_by_side
+from rodshell.rods.section import Rod
+from rodshell.solve.report import SolveReport
+from rodshell.targets import Target
+from rodshell.targets.patch import Patch
+from rodshell.targets.seam import Seam
+from rodshell.units import shown
+
+Floats = NDArray[np.float64]
+
+MANY = 0.1  # of the rods: a share left out that is worth a word
+ASTRAY = 0.005  # of the size: ends that are moved further are worth a word
+GAP = 2.0  # spacings between the flat grids of neighbouring patches
+
+
+@dataclass(frozen=True)
+class PatchLayout:
+    """What a patch has of its own; None: as the others.
+
+    Parameters
+    ----------
+    anchor : x, y of the point where its axes cross [m]; default: its middle.
+    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the whole's heading at its
+        summit, carried to the anchor.
+    spacing : between its rods, of families u and v [m].
+    """
+
+    anchor: Point | None = None
+    rotate: float | None = None
+    spacing: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class SewnForm:
+    """A form in patches.
+
+    Parameters
+    ----------
+    laid, found : of each patch by its name: its rods, and every stage of its form.
+    meetings : where rods of two patches end at one point.
+    moved : of each patch how far rod ends were moved to these points [m]: what its mesh missed them by.
+    """
+
+    target: Target
+    seams: tuple[Seam, ...]
+    layout: GridLayout
+    rod: Rod
+    joint: Joint
+    own: Mapping[str, PatchLayout]
+    laid: dict[str, Laid]
+    found: dict[str, FoundForm]
+    meetings: tuple[Meeting, ...]
+    moved: dict[str, float]
+
+    @property
+    def status(self) -> str:
+        """ "converged", or which patch stopped and what to do."""
+        stopped = (f"patch {name}: {form.status}" for name, form in self.found.items() if form.status != "converged")
+        return next(stopped, "converged")
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        own = set(self.target.warnings)
+        words = [f"patch {k}: {word}" for k, form in self.found.items() for word in form.warnings if word not in own]
+        words += [
+            f"patch {k}: rod ends were moved by up to {by:.3g} m to where they meet others: its net does not hold them "
+            "well there, another heading or anchor may"
+            for k, by in self.moved.items()
+            if by > ASTRAY * self.target.size
+        ]
+        share = left_out(self.laid)
+        if share > MANY:
+            words.append(
+                f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
+                "seam: another heading may leave out fewer (layout.rotate, or seams.patches for one patch alone)"
+            )
+        return (*self.target.warnings, *words)
+
+    def parameters(self) -> dict[str, object]:
+        """Seams and what patches have of their own, as they stand in a case file."""
+        own = [{"name": name, **_given(one)} for name, one in self.own.items()]
+        return {"lines": [seam.points.tolist() for seam in self.seams], "patches": own}
+
+    @cached_property
+    def flat(self) -> SideBySide:
+        """The flat grids of all patches in a row."""
+        gap = GAP * max(max(one.layout.spacing) for one in self.laid.values())
+        return side_by_side({name: form.footprint.mesh for name, form in self.found.items()}, gap)
+
+    @property
+    def footprint(self) -> Footprint:
+        return Footprint(self.flat.mesh)
+
+    @cached_property
+    def draped(self) -> Floats:
+        """(n, 3) all patches on the target [m]."""
+        return np.concatenate([form.trimmed.positions for form in self.found.values()])
+
+    @cached_property
+    def boundary(self) -> Boundary:
+        """Of all patches, rod by rod."""
+        parts = [form.trimmed.boundary for form in self.found.values()]
+        points, tangents = (np.concatenate([getattr(part, what) for part in parts]) for what in ("points", "tangents"))
+        return Boundary(points, tangents, self.draped)
+
+    @property
+    def popped(self) -> dict[Ends, tuple[Floats, SolveReport]]:
+        """Shape (n, 3) [m] and joined figures of all patches, for each kind of ends that all were popped up with."""
+        forms = list(self.found.values())
+        return {
+            ends: (
+                np.concatenate([form.popped[ends].positions for form in forms]),
+                joined_report([form.popped[ends].report for form in forms]),
+            )
+            for ends in forms[0].popped
+            if all(ends in form.popped for form in forms)
+        }
+
+    @property
+    def agreement(self) -> dict[Ends, Agreement]:
+        forms = list(self.found.values())
+        return {
+            ends: joined_agreement([form.agreement[ends] for form in forms])
+            for ends in forms[0].agreement
+            if all(ends in form.agreement for form in forms)
+        }
+
+    @property
+    def dropped(self) -> tuple[tuple[str, str], ...]:
+        """Rods that are not built, with the reason."""
+        return tuple(
+            (f"{name}-{rod}", why)
+            for name, form in self.found.items()
+            for rod, why in (*self.laid[name].dropped, *form.trimmed.dropped)
+        )
+
+
+def find_sewn_stages(
+    target: Target,
+    seams: Sequence[Seam],
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    own: Mapping[str, PatchLayout] | None = None,
+    joint: Joint | None = None,
+    ends: Sequence[Ends] = ("pinned", "clamped"),
+    search: bool = False,
+    progress: Progress = silent,
+) -> SewnForm:
+    """Cut a target into patches, lay their rods such that they meet, and form each; see `rodshell.sew`."""
+    own, joint = dict(own or {}), joint or Ball()
+    if search:
+        layout = replace(layout, rotate=best_heading(target, seams, layout, own, progress=progress))
+    laid, meetings = _lay(target, seams, layout, own, progress)
+    found, moved = dict[str, FoundForm](), dict[str, float]()
+    for name, one in laid.items():
+        places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
+
+        def told(stage: str, detail: str, residual: float, name: str = name) -> None:
+            progress(stage, f"patch {name}, {detail}", residual)
+
+        found[name] = find_stages(
+            one.patch, one.layout, rod,
+            anchor=one.anchor, joint=joint, ends=ends, cut=partial(cut_with_ends, places=places), progress=told,
+        )  # fmt: skip
+        moved[name] = _moved(found[name])
+    return SewnForm(target, tuple(seams), layout, rod, joint, own, laid, found, meetings, moved)
+
+
+def best_heading(
+    target: Target,
+    seams: Sequence[Seam],
+    layout: GridLayout,
+    own: Mapping[str, PatchLayout],
+    *,
+    progress: Progress = silent,
+) -> float:
+    """The heading at the target's summit [rad] that leaves out the smallest share of the rods, of a few tried.
+
+    Raises
+    ------
+    RodshellError : none will do; the reason is the first one's.
+    """
+    shares, reasons = dict[float, float](), list[RodshellError]()
+    for heading in HEADINGS:
+        progress("seams", f"trying {degrees(heading):.0f} deg", 0.0)
+        try:
+            laid, _ = _lay(target, seams, replace(layout, rotate=heading), own, silent)
+            shares[heading] = left_out(laid)
+        except RodshellError as reason:
+            reasons.append(reason)
+    if not shares:
+        raise reasons[0]
+    return min(shares, key=lambda heading: round(shares[heading], 2))
+
+
+def left_out(laid: Mapping[str, Laid]) -> float:
+    """The share of the rods that is left out for want of another at a seam."""
+    missing = sum(len(one.layout.left_out) for one in laid.values())
+    return missing / (missing + sum(len(one.rods) for one in laid.values()))
+
+
+def _lay(
+    target: Target, seams: Sequence[Seam], layout: GridLayout, own: Mapping[str, PatchLayout], progress: Progress
+) -> tuple[dict[str, Laid], tuple[Meeting, ...]]:
+    if layout.rods != "auto" or layout.length != "auto":
+        raise InputError('a target cut by seams counts its rods itself: leave layout rods and length at "auto"')
+    progress("seams", "cutting", 0.0)
+    patches = patches_of(target, tuple(seams))
+    for name in own:
+        if name not in patches:
+            raise InputError(f"there is no patch {shown(name)}: the seams make the patches {', '.join(patches)}")
+    layouts = {name: _own_layout(patch, layout, own.get(name, PatchLayout())) for name, patch in patches.items()}
+    anchors = {name: own[name].anchor if name in own else None for name in patches}
+    return lay_patches(patches, layouts, anchors, progress=progress)
+
+
+def _own_layout(patch: Patch, layout: GridLayout, own: PatchLayout) -> GridLayout:
+    spacing, rotate = own.spacing or layout.spacing, own.rotate
+    if rotate is None:
+        rotate = carried_heading(patch.whole, own.anchor or patch.middle, layout.rotate)
+    return replace(layout, spacing=spacing, edge=min(layout.edge, *spacing), rotate=rotate)
+
+
+def cut_with_ends(draped: Draped, places: Mapping[tuple[str, int], Floats]) -> Trimmed:
+    """The trimmed shell, some rod ends, by rod and side, put where their seams have them."""
+    trimmed = trim(draped, fewest=FEWEST)
+    mesh, positions = trimmed.mesh, trimmed.positions.copy()
+    for k, rod in enumerate(mesh.grid.rods):
+        for side in (0, 1):
+            if (rod.name, side) in places:
+                positions[mesh.ends[k, side]] = places[rod.name, side]
+    boundary = replace(trimmed.boundary, points=positions[mesh.ends.ravel()], draped=positions)
+    return replace(trimmed, positions=positions, boundary=boundary)
+
+
+def _moved(form: FoundForm) -> float:
+    """How far the ends of a patch's rods were moved from where its own drape has them, at most [m]."""
+    own, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
+    return float(np.linalg.norm(own.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0))
+
+
+def _given(own: PatchLayout) -> dict[str, object]:
+    return {key: value for key, value in asdict(own).items() if value is not None}

@@ -1,0 +1,156 @@
+"""Trim what hangs below the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.formfinding.draped import Draped
+from rodshell.geometry.vectors import unit
+from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout.mesh import cut_mesh
+
+Floats = NDArray[np.float64]
+
+NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
+FEWEST_JOINTS = 3  # a rod with fewer swings about the line through them
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The final boundary G: where the rod ends go.
+
+    Parameters
+    ----------
+    points : (2m, 3), start and end of each rod in turn [m].
+    tangents : (2m, 3) outward unit tangents of the draped rods there: the directions of clamps.
+    draped : (n, 3) the state of the whole trimmed shell that has these ends, or None [m].
+    """
+
+    points: Floats
+    tangents: Floats
+    draped: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """The trimmed grid, flat: its rods end on the footprint G0."""
+
+    mesh: GridMesh
+
+    @property
+    def rods(self) -> tuple[FlatRod, ...]:
+        return self.mesh.grid.rods
+
+    @property
+    def points(self) -> Floats:
+        """(2m, 2) start and end of each rod in turn: the curve G0 [m]."""
+        return self.mesh.flat[self.mesh.ends.ravel(), :2]
+
+
+@dataclass(frozen=True)
+class Trimmed:
+    """The draped grid without what hangs over: `positions` (n, 3) of the nodes of `mesh`, and its boundary."""
+
+    draped: Draped
+    mesh: GridMesh
+    positions: Floats
+    boundary: Boundary
+    dropped: tuple[tuple[str, str], ...]
+
+
+def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
+    """Cut every rod at the target's end and drop the rods that cannot be built or would swing.
+
+    fewest : joints of a rod that does not swing.
+
+    Raises
+    ------
+    InputError : no rod is left.
+    """
+    margin = NEAREST_JOINT * min(draped.layout.spacing)
+    rods, positions, dropped = draped.rods, draped.positions, list(draped.dropped)
+    if draped.method == "bound":
+        source = draped.mesh
+    else:
+        rods, lost = _cut_rods(draped)
+        dropped += lost
+        source, positions = _recut(draped, rods)
+    kept, swinging = FlatGrid.of(rods, margin=margin).without(lambda grid: grid.joint_counts() < fewest)
+    dropped += [(name, f"it has fewer than {fewest} joints and would swing") for name in swinging]
+    if not kept.rods:
+        raise InputError(
+            f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
+        )
+    mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
+    positions = positions[nodes]
+    boundary = Boundary(positions[mesh.ends.ravel()], end_tangents(mesh, positions), positions)
+    return Trimmed(draped, mesh, positions, boundary, tuple(dropped))
+
+
+def untrimmed(draped: Draped) -> Trimmed:
+    """A draped grid as it is, for keeping the partial result of a drape that did not converge."""
+    mesh, x = draped.mesh, draped.positions
+    return Trimmed(draped, mesh, x, Boundary(x[mesh.ends.ravel()], end_tangents(mesh, x), x), draped.dropped)
+
+
+def map_back(trimmed: Trimmed) -> Footprint:
+    """The same cuts on the flat grid: the footprint G0."""
+    return Footprint(trimmed.mesh)
+
+
+def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
+    """(2m, 3) outward unit tangents at both ends of each rod, to second order from the last two edges."""
+    first, last = mesh.rod_start, mesh.rod_stop - 1
+    inwards = np.minimum(np.arange(3)[:, None], last - first)  # a rod of one edge counts it twice
+    rows = np.stack([first + inwards, last - inwards], axis=2).reshape(3, -1)
+    x, at = positions[mesh.rod_nodes[rows]], mesh.stations[rows]
+    h, h_before = np.abs(at[0] - at[1]), np.abs(at[1] - at[2])
+    tangents = unit(x[0] - x[1])
+    bent = h_before > 0
+    change = tangents[bent] - unit((x[1] - x[2])[bent])
+    tangents[bent] += change * (h / (h + h_before))[bent, None]
+    return unit(tangents)
+
+
+def _cut_rods(draped: Draped) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]]]:
+    """Cut hanging rods by interpolation between nodes (a cubic along each rod, not the nearest node)."""
+    kept, dropped = list[FlatRod](), list[tuple[str, str]]()
+    for k, rod in enumerate(draped.rods):
+        s = draped.mesh.stations[draped.mesh.rod_slice(k)]
+        inside = draped.target.margin(draped.positions[draped.mesh.nodes_of(k)]) > 0
+        if not inside.any():
+            dropped.append((rod.name, "it never touches the target"))
+            continue
+        first, last = np.flatnonzero(inside)[[0, -1]]
+        if first == 0 or last == len(s) - 1:
+            raise InputError(f"rod {rod.name} is too short to reach the end of the target: use a longer layout length")
+        ends = [_crossing(draped, k, first - 1), _crossing(draped, k, last)]
+        kept.append(rod.cut(ends[0], ends[1]))
+    return tuple(kept), dropped
+
+
+def _crossing(draped: Draped, rod: int, before: int) -> float:
+    """Material coordinate where a rod crosses the target's end, between its nodes `before` and the next."""
+    nodes, s = draped.mesh.nodes_of(rod), draped.mesh.stations[draped.mesh.rod_slice(rod)]
+    first = int(np.clip(before - 1, 0, len(s) - 4))
+    window = slice(first, first + 4)
+    margin = draped.target.margin(draped.positions[nodes[window]])
+    fit = np.polyfit(s[window] - s[before], margin, 3)
+    low, high = 0.0, s[before + 1] - s[before]
+    rising = np.polyval(fit, low) < 0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if (np.polyval(fit, middle) < 0) == rising else (low, middle)
+    return float(s[before] + 0.5 * (low + high))
+
+
+def _recut(draped: Draped, rods: tuple[FlatRod, ...]) -> tuple[GridMesh, Floats]:
+    """A mesh of the cut rods with their draped positions, its end nodes put on the target."""
+    mesh = mesh_grid(FlatGrid.of(rods), draped.layout.edge)
+    names = {rod.name: k for k, rod in enumerate(draped.mesh.grid.rods)}
+    positions = draped.mesh.prolong(draped.positions, mesh, rods=[names[rod.name] for rod in rods])
+    ends = np.unique(mesh.ends)
+    positions[ends] = draped.target.retract(positions[ends])
+    return mesh, positions

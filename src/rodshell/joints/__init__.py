@@ -1,0 +1,19 @@
+"""What a crossing does, and how the rods that meet there share their degrees of freedom."""
+
+from rodshell.joints.coupling import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs, Ties
+from rodshell.joints.joint import Ball, Joint, Linker, Pin, Rigid, Spring, joint_parameters
+
+__all__ = [
+    "Ball",
+    "Coupling",
+    "ExplicitPenalty",
+    "ImplicitPenalty",
+    "Joint",
+    "Linker",
+    "Pin",
+    "Rigid",
+    "SharedDofs",
+    "Spring",
+    "Ties",
+    "joint_parameters",
+]

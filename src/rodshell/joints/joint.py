@@ -1,0 +1,170 @@
+"""Joint kinds: what a crossing does beyond holding its rods together.
+
+One concept spans them all: three stiffnesses [N m/rad] against the turning of the rods' sections relative to each
+other, about the joint's normal (the shear of the grid), out of a corner's plane, and about a corner's bisector (its
+twist). A ball joint has none, a pin (the scissor joint of X-shells) is free about the normal and rigid in the other
+two, a rigid joint is rigid in all. The paper's linker rods are the exception: bends from edge to edge (`Linker`).
+"""
+
+from dataclasses import asdict, dataclass
+from math import inf, isfinite, pi
+from typing import Literal, Protocol
+
+from rodshell.errors import InputError
+from rodshell.rods.section import Rod
+
+
+class Joint(Protocol):
+    """What holds two rods together where they cross.
+
+    Attributes
+    ----------
+    name : the kind, as in a case file.
+    eccentricity : distance of the two centre lines along the normal [m]; 0 where they meet.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def eccentricity(self) -> float: ...
+    @property
+    def turns_frames(self) -> bool:
+        """Whether it carries moments between the frames of its rods, so that their twist matters."""
+        ...
+
+    @property
+    def holds_normals(self) -> bool:
+        """Whether it keeps its rods from spinning about themselves, as a spring in shear alone does not."""
+        ...
+
+
+@dataclass(frozen=True)
+class Ball:
+    """Holds the rods' centre lines together and leaves every rotation free [Baek et al., cited in HQK section 1].
+
+    It has no eccentricity: rods a distance apart would roll over each other.
+    """
+
+    name = "ball"
+    shear = out_of_plane = twist = eccentricity = 0.0
+    rest_angle = None
+    turns_frames = holds_normals = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pin:
+    """An axis along the normal of both rods: they scissor freely, and share their normal [Panetta et al. 2019]."""
+
+    eccentricity: float = 0.0
+    name = "pin"
+    shear, out_of_plane, twist = 0.0, inf, inf
+    rest_angle = None
+    turns_frames = holds_normals = True
+
+    def __post_init__(self) -> None:
+        _check_eccentricity(self.eccentricity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rigid:
+    """Welded: the rods keep the angle at which they were joined.
+
+    rest_angle : see `Spring`.
+    """
+
+    rest_angle: float | None = None
+    eccentricity: float = 0.0
+    name = "rigid"
+    shear = out_of_plane = twist = inf
+    turns_frames = holds_normals = True
+
+    def __post_init__(self) -> None:
+        _check_rest_angle(self.rest_angle)
+        _check_eccentricity(self.eccentricity)
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Elastic in all three rotations. The stiffnesses are of the joint: they do not depend on the mesh.
+
+    Parameters
+    ----------
+    shear : about the normal [N m/rad]; `inf` is rigid.
+    out_of_plane, twist : of a corner, about the axis in the plane across the corner's bisector, and about it
+        [N m/rad]. Where rods cross, what is twist to one corner is out of plane to the next: the four corners give
+        the mean of both in every direction. They act apart only where two rods end in one corner. The bisector is
+        that of the directions of a path around the corner, in along one rod and out along the other.
+    rest_angle : angle from the first rod's direction to the second's about the normal at rest [rad]; None: as in the
+        flat grid.
+    """
+
+    shear: float = 0.0
+    out_of_plane: float = 0.0
+    twist: float = 0.0
+    rest_angle: float | None = None
+    eccentricity: float = 0.0
+    name = "spring"
+
+    def __post_init__(self) -> None:
+        for name in ("shear", "out_of_plane", "twist"):
+            if not getattr(self, name) >= 0:
+                raise InputError(
+                    f"the joint's {name} stiffness must not be negative, not {getattr(self, name)} N m/rad"
+                )
+        _check_rest_angle(self.rest_angle)
+        _check_eccentricity(self.eccentricity)
+
+    @property
+    def turns_frames(self) -> bool:
+        return self.shear > 0 or self.holds_normals
+
+    @property
+    def holds_normals(self) -> bool:
+        return self.out_of_plane + self.twist > 0 or self.eccentricity != 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linker:
+    """The paper's joint: 3-node linker rods from an edge of one rod to an edge of the other [HQK 2.2, Eq 6].
+
+    A linker bends and twists but neither stretches nor weighs anything, and is at rest on the flat grid.
+    ERRATA: with the paper's two linkers, in opposite corners, the joint is chiral, and its stiffness depends on
+    the mesh: about the normal 8 EI over the edge length at a right angle.
+
+    Parameters
+    ----------
+    rod : section and material of the linkers; None: those of the rods.
+    corners : 2 as in the paper, or 4, which is symmetric.
+    """
+
+    rod: Rod | None = None
+    corners: Literal[2, 4] = 2
+    name = "linker"
+    eccentricity = 0.0
+    turns_frames = holds_normals = True
+
+    def __post_init__(self) -> None:
+        if self.corners not in (2, 4):
+            raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {self.corners}")
+
+
+def joint_parameters(joint: Joint) -> dict[str, object]:
+    """The joint's kind and numbers, as they stand in a case file; SI."""
+    given = {"kind": joint.name, **asdict(joint)}  # type: ignore[call-overload]
+    linker = given.pop("rod", None)
+    if linker is not None:
+        given["rod"] = joint.rod.parameters()  # type: ignore[attr-defined]
+    return {name: "rigid" if value == inf else value for name, value in given.items() if value is not None}
+
+
+Elastic = Ball | Pin | Rigid | Spring
+
+
+def _check_eccentricity(value: float) -> None:
+    if not (isfinite(value) and value >= 0):
+        raise InputError(f"the joint's eccentricity must not be negative, not {value} m")
+
+
+def _check_rest_angle(value: float | None) -> None:
+    if value is not None and not -pi <= value <= pi:
+        raise InputError(f"the joint's rest angle must lie between -pi and pi, not {value} rad")

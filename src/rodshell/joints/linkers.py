@@ -1,0 +1,128 @@
+"""The paper's linkers: 3-node rods that turn the corner from an edge of one rod to an edge of another [HQK 2.2].
+
+A linker in the corner (x_e, joint, x_f) is a bend and a twist between the edge e, which runs to the joint, and the
+edge f, which leaves it, at rest in the flat corner. It has no stretch energy, and no mass but its share of what it is
+tied to. In two opposite corners both edges run as they do in their rods; in the other two one of them is reversed:
+its tangent, its second director and its twist angle change sign.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from rodshell.joints.crossings import Places
+from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+
+UP = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Where linkers go.
+
+    Parameters
+    ----------
+    blocks : (n, 5) outer node and twist angle of e, joint (on the rod of e), twist angle and outer node of f.
+    joints : (n, 2) block of the joint on the rod of e and on that of f: the same where they share it.
+    signs : (n, 2) -1 for an edge that is taken backwards.
+    lengths : (n,) Voronoi length of the corner: half of both edges [m].
+    rods : (n, 2) rod of e and of f.
+    """
+
+    blocks: Ints
+    joints: Ints
+    signs: Floats
+    lengths: Floats
+    rods: Ints
+
+    @staticmethod
+    def of(places: Places, crossings: Ints, wanted: int) -> "Corners":
+        """The corners of these crossings: 2 opposite ones or all 4; where a rod ends, all that there are."""
+        met = places.of_crossings[crossings]
+        rows = []
+        full = np.ones(len(met), dtype=bool)
+        for rod_of in range(2):
+            full &= places.has(met[:, rod_of], 0) & places.has(met[:, rod_of], 1)
+        # the rod and side of e and of f; the paper's two come first
+        for number, (e, f) in enumerate((((0, 0), (1, 1)), ((1, 0), (0, 1)), ((0, 0), (1, 0)), ((0, 1), (1, 1)))):
+            (rod_e, side_e), (rod_f, side_f) = e, f
+            there = places.has(met[:, rod_e], side_e) & places.has(met[:, rod_f], side_f)
+            if wanted == 2 and number >= 2:
+                there &= ~full
+            a, b = met[there, rod_e], met[there, rod_f]
+            lengths = places.mesh.edge_lengths
+            far_e, angle_e = places.neighbour(a, side_e), places.angle(a, side_e)
+            far_f, angle_f = places.neighbour(b, side_f), places.angle(b, side_f)
+            rows.append(
+                (
+                    np.column_stack([far_e, angle_e, places.blocks[a], angle_f, far_f]),
+                    np.column_stack([places.blocks[a], places.blocks[b]]),
+                    np.tile([-1.0 if side_e else 1.0, 1.0 if side_f else -1.0], (len(a), 1)),
+                    0.5 * (lengths[places.edge(a, side_e)] + lengths[places.edge(b, side_f)]),
+                    np.column_stack([places.rods[a], places.rods[b]]),
+                )
+            )
+        return Corners(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+
+
+@dataclass(frozen=True)
+class LinkerBend:
+    """Bends and twists of linkers. Build them with `of`.
+
+    Parameters
+    ----------
+    blocks : (n, 5) as in `BendTwist`.
+    signs : (n, 2) -1 where the twist angle belongs to the reversed edge.
+    bends : the same elements on rows of their own, five each, with the angles of the edges as the linkers take them.
+    """
+
+    blocks: Ints
+    signs: Floats
+    bends: BendTwist
+
+    @staticmethod
+    def of(corners: Corners, blocks: Ints, flat: Floats, stiffness: Floats) -> "LinkerBend":
+        """Linkers at rest in `flat` (N, 3), on blocks (n, 5) that lie where those of the corners do.
+
+        stiffness : (n, 3) EI1, EI2 and GJ [N m2].
+        """
+        own = np.arange(5 * len(blocks)).reshape(-1, 5)
+        per_length = stiffness / corners.lengths[:, None]
+        local = _taken(flat, blocks, corners.signs)
+        bends = BendTwist.starting_at(
+            own, local, UP, bend_stiffness=per_length[:, :2], twist_stiffness=per_length[:, 2]
+        ).relaxed(local)  # fmt: skip
+        return LinkerBend(np.ascontiguousarray(blocks), corners.signs, bends)
+
+    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        local = _taken(state, self.blocks, self.signs)
+        by_local = np.zeros_like(local)
+        energy = self.bends.evaluate(local, by_local, hessians)
+        by_local[1::5] *= self.signs[:, :1]
+        by_local[3::5] *= self.signs[:, 1:]
+        np.add.at(gradient, self.blocks.ravel(), by_local)
+        if len(hessians):
+            for column, sign in ((3, self.signs[:, :1]), (9, self.signs[:, 1:])):
+                hessians[:, column, :] *= sign
+                hessians[:, :, column] *= sign
+        return energy
+
+    def refreshed(self, state: Floats) -> Self:
+        return replace(self, bends=self.bends.refreshed(_taken(state, self.blocks, self.signs)))
+
+    def moments(self, state: Floats) -> Floats:
+        """(n, 3) moments of the two bends and of the twist of each linker [N m]."""
+        bends = self.bends
+        strains = bends.strains(_taken(state, self.blocks, self.signs))
+        natural = np.column_stack([bends.natural_curvature, bends.natural_twist])
+        return np.asarray(np.column_stack([bends.bend_stiffness, bends.twist_stiffness]) * (strains - natural))
+
+
+def _taken(state: Floats, blocks: Ints, signs: Floats) -> Floats:
+    """(5n, 3) the blocks of each linker, its angles as it takes its edges."""
+    local = state[blocks]
+    local[:, 1] *= signs[:, :1]
+    local[:, 3] *= signs[:, 1:]
+    return local.reshape(-1, 3)

@@ -1,0 +1,7 @@
+"""The flat grid: straight rods, their crossings, and the mesh of nodes and edges on them."""
+
+from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, straight_rods
+from rodshell.layout.gridlayout import GridLayout
+from rodshell.layout.mesh import GridMesh, mesh_grid
+
+__all__ = ["Crossings", "FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"]

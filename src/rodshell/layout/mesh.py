@@ -1,0 +1,246 @@
+"""Nodes and edges on a flat grid: a node at every joint and rod end, and equal edges between them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.geometry.curves import on_curve
+from rodshell.layout.flatgrid import FlatGrid, FlatRod, whole_rods
+
+Ints = NDArray[np.intp]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GridMesh:
+    """A flat grid divided into edges; rods share one node at a joint.
+
+    Parameters
+    ----------
+    grid : the rods and joints that were meshed.
+    flat : (n, 3) node positions in the flat, unstressed state, z = 0 [m].
+    rod_nodes : (k,) nodes of all rods in a row, in the order of `grid.rods`.
+    rod_start : (m,) where each rod begins in `rod_nodes`.
+    stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
+    joint_nodes : (c,) node of each of the grid's crossings.
+    """
+
+    grid: FlatGrid
+    flat: Floats
+    rod_nodes: Ints
+    rod_start: Ints
+    stations: Floats
+    joint_nodes: Ints
+
+    @property
+    def node_count(self) -> int:
+        return len(self.flat)
+
+    def rod_slice(self, rod: int) -> slice:
+        stop = self.rod_start[rod + 1] if rod + 1 < len(self.rod_start) else len(self.rod_nodes)
+        return slice(int(self.rod_start[rod]), int(stop))
+
+    def nodes_of(self, rod: int) -> Ints:
+        """Nodes along one rod, from its start to its end."""
+        return self.rod_nodes[self.rod_slice(rod)]
+
+    @cached_property
+    def _rod_of(self) -> Ints:
+        lengths = np.diff(np.append(self.rod_start, len(self.rod_nodes)))
+        return np.repeat(np.arange(len(self.rod_start)), lengths)
+
+    @cached_property
+    def edges(self) -> Ints:
+        """(e, 2) nodes of each edge, rod by rod."""
+        return self._windows(2)
+
+    @cached_property
+    def edge_rods(self) -> Ints:
+        """(e,) rod of each edge."""
+        return self._rod_of[:-1][self._rod_of[1:] == self._rod_of[:-1]]
+
+    @cached_property
+    def edge_lengths(self) -> Floats:
+        """(e,) rest lengths [m]."""
+        return np.diff(self.stations)[self._rod_of[1:] == self._rod_of[:-1]]
+
+    @cached_property
+    def bends(self) -> Ints:
+        """(b, 3) nodes of each pair of consecutive edges of a rod."""
+        return self._windows(3)
+
+    @cached_property
+    def bend_rods(self) -> Ints:
+        """(b,) rod of each bend."""
+        return self._rod_of[:-2][self._rod_of[2:] == self._rod_of[:-2]]
+
+    @cached_property
+    def voronoi_lengths(self) -> Floats:
+        """(b,) half the rest length of the two edges of each bend [m] (HQK Eq 1b, of the rest state: ERRATA)."""
+        whole = (self.stations[2:] - self.stations[:-2])[self._rod_of[2:] == self._rod_of[:-2]]
+        return 0.5 * whole
+
+    @cached_property
+    def ends(self) -> Ints:
+        """(m, 2) first and last node of each rod."""
+        return np.column_stack([self.rod_nodes[self.rod_start], self.rod_nodes[self.rod_stop - 1]])
+
+    @property
+    def rod_stop(self) -> Ints:
+        return np.append(self.rod_start[1:], len(self.rod_nodes))
+
+    def _windows(self, width: int) -> Ints:
+        last = len(self.rod_nodes) - width + 1
+        inside = self._rod_of[width - 1 :] == self._rod_of[:last]
+        columns = [self.rod_nodes[k : k + last][inside] for k in range(width)]
+        return np.column_stack(columns)
+
+    def tributary_lengths(self) -> Floats:
+        """(n,) rod length that each node stands for: half of every edge that meets there [m]."""
+        total = np.zeros(self.node_count)
+        np.add.at(total, self.edges, 0.5 * self.edge_lengths[:, None])
+        return total
+
+    def prolong(self, positions: Floats, fine: "GridMesh", *, rods: Sequence[int] | None = None) -> Floats:
+        """Positions (n, 3) of the nodes of `fine`, by local cubics along each rod of this mesh [m].
+
+        `rods` names, for each rod of `fine`, the rod of this mesh that it is a part of; default: the same.
+        """
+        result = np.empty((fine.node_count, 3))
+        for k, rod in enumerate(rods if rods is not None else range(len(self.rod_start))):
+            here, there = self.rod_slice(rod), fine.rod_slice(k)
+            curve = on_curve(self.stations[here], positions[self.rod_nodes[here]], fine.stations[there])
+            result[fine.rod_nodes[there]] = curve
+        return result
+
+
+CROWDED = 0.01  # of the usual edge: a node that near to a rod's end is left out; round-off in forces goes with its cube
+
+
+def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
+    """Divide a flat grid: every span between joints and every tail into the fewest equal edges of at most `edge` [m].
+
+    `marks`, for each rod the material coordinates [m] of further points that must be nodes.
+    """
+    merged = _merge_joints(grid)
+    rod_of, s, nodes, count = _fixed_points(grid, merged, marks)
+    edges = np.ones(len(s), dtype=np.intp)  # from each fixed point to the next of its rod, and one place for the last
+    spans = np.flatnonzero(rod_of[1:] == rod_of[:-1])
+    edges[spans] = edge_counts(s[spans + 1] - s[spans], edge)
+    after = np.repeat(np.arange(len(s)), edges)
+    first = np.cumsum(edges) - edges
+    step = np.arange(len(after)) - first[after]
+    following = np.minimum(after + 1, len(s) - 1)
+    stations = s[after] + (s[following] - s[after]) * step / edges[after]
+    rod_nodes = np.where(step > 0, count - 1 + np.cumsum(step > 0), nodes[after])
+    flat = np.zeros((count + int(np.count_nonzero(step)), 3))
+    origin, direction = np.array([rod.origin for rod in grid.rods]), np.array([rod.direction for rod in grid.rods])
+    line = rod_of[after]
+    flat[rod_nodes, :2] = origin[line] + stations[:, None] * direction[line]
+    starts = np.searchsorted(rod_of, np.arange(len(grid.rods)))
+    return GridMesh(grid, flat, rod_nodes, first[starts], stations, merged)
+
+
+def _fixed_points(
+    grid: FlatGrid, merged: Ints, marks: Sequence[Sequence[float]] | None
+) -> tuple[Ints, Floats, Ints, int]:
+    """What must be a node, along one rod after the other: rod, material coordinate [m] and node; and how many nodes.
+
+    Joints of nodes `merged`, each once; then ends and marks, each a node of its own unless one is there already.
+    """
+    given = [[rod.start, *(marks[k] if marks is not None else ()), rod.end] for k, rod in enumerate(grid.rods)]
+    own_rod = np.repeat(np.arange(len(given)), [len(places) for places in given])
+    own = np.array([s for places in given for s in places])
+    # a joint comes once on each of its rods: three rods make three crossings
+    rod, s, nodes = grid.crossings.rods.ravel(), grid.crossings.at.ravel(), np.repeat(merged, 2)
+    order = np.lexsort((s, nodes, rod))
+    once = order[np.diff(rod[order] * len(rod) + nodes[order], prepend=-1) > 0]
+    rod, s = np.concatenate([rod[once], own_rod]), np.concatenate([s[once], own])
+    nodes = np.concatenate([nodes[once], np.full(len(own), -1)])
+    turn = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(own))])  # who comes first
+    order = np.lexsort((turn, s, rod))
+    rod, s, nodes, turn = rod[order], s[order], nodes[order], turn[order]
+    tiny = 1e-9 * np.array([rod.length for rod in grid.rods])
+    near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
+    place = np.cumsum(np.append(0, ~near))  # points of a rod in one place: the first to come stays, and every joint
+    first = np.full(place[-1] + 1, len(turn))
+    np.minimum.at(first, place, turn)
+    out = turn > first[place]
+    joints, fresh = int(merged.max(initial=-1)) + 1, np.flatnonzero(~out & (nodes < 0))
+    nodes[fresh[np.argsort(turn[fresh])]] = joints + np.arange(len(fresh))
+    return rod[~out], s[~out], nodes[~out], joints + len(fresh)
+
+
+def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
+    """The part of a mesh that belongs to `rods`: pieces of its rods, cut at nodes; and its nodes (n,) in `mesh`.
+
+    Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own, unless
+    it would crowd the end, where it would make an edge far shorter and stiffer than the others.
+    """
+    index, count = np.array(whole_rods(mesh.grid.rods, rods)), len(mesh.grid.rods)
+    grid = FlatGrid.of(rods, margin=margin)
+    pairs = np.sort(index[grid.crossings.rods], axis=1) @ [count, 1]
+    known = np.append(mesh.grid.crossings.rods @ [count, 1], -1)  # the last is no pair: there may be none
+    order = np.argsort(known, kind="stable")
+    found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
+    kept = known[found] == pairs
+    grid = FlatGrid(grid.rods, grid.crossings.select(kept))
+    _, first, joint = np.unique(mesh.joint_nodes[found[kept]], return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))  # joints keep the order of the crossings
+    joint = rank[joint]
+    shared = mesh.joint_nodes[found[kept]][np.sort(first)]
+    piece, s, node = nodes_along(mesh, rods, index)
+    place = np.full(len(mesh.flat), -1)
+    place[shared] = np.arange(len(shared))
+    joined = np.isin(piece * mesh.node_count + node, (grid.crossings.rods * mesh.node_count + shared[joint][:, None]))
+    starts = np.searchsorted(piece, np.arange(len(rods) + 1))
+    from_end = np.minimum(s - s[starts[piece]], s[starts[piece + 1] - 1] - s)
+    own = ~joined & ~((from_end > 0.0) & (from_end < CROWDED * _usual_edges(mesh)[index][piece]))
+    nodes = np.where(joined, place[node], len(shared) - 1 + np.cumsum(own))
+    made = joined | own
+    chosen = np.concatenate([shared, node[own]])
+    starts = np.searchsorted(piece[made], np.arange(len(rods)))
+    return GridMesh(grid, mesh.flat[chosen], nodes[made], starts, s[made], joint), chosen
+
+
+def nodes_along(mesh: GridMesh, rods: Sequence[FlatRod], whole: Ints) -> tuple[Ints, Floats, Ints]:
+    """All nodes on pieces of the rods `whole` of a mesh: piece, material coordinate [m] and node."""
+    begin, length = mesh.rod_start[whole], (mesh.rod_stop - mesh.rod_start)[whole]
+    piece = np.repeat(np.arange(len(rods)), length)
+    entry = np.arange(len(piece)) + np.repeat(begin - (np.cumsum(length) - length), length)
+    s = mesh.stations[entry]
+    start, end = np.array([(rod.start - 1e-9 * rod.length, rod.end + 1e-9 * rod.length) for rod in rods]).T
+    on = (s >= start[piece]) & (s <= end[piece])
+    return piece[on], s[on], mesh.rod_nodes[entry[on]]
+
+
+def _usual_edges(mesh: GridMesh) -> Floats:
+    """(m,) median length of the edges of each rod [m]."""
+    order = np.lexsort((mesh.edge_lengths, mesh.edge_rods))
+    count = np.bincount(mesh.edge_rods, minlength=len(mesh.grid.rods))
+    low, high = (np.cumsum(count) - count + half for half in ((count - 1) // 2, count // 2))
+    return 0.5 * (mesh.edge_lengths[order[low]] + mesh.edge_lengths[order[high]])
+
+
+def edge_counts(lengths: Floats, edge: float) -> Ints:
+    """(n,) fewest equal edges of at most `edge` that make up each of `lengths` (an edge may be 1e-6 too long)."""
+    return np.maximum(1, np.ceil(lengths / edge - 1e-6)).astype(np.intp)
+
+
+def _merge_joints(grid: FlatGrid) -> Ints:
+    """Node of each crossing: crossings at one point (three rods or more) share their node.
+
+    They are neighbours along each of their rods, no further apart than round-off takes them.
+    """
+    rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
+    order = np.lexsort((at, rods))
+    tiny = 1e-7 * max((rod.length for rod in grid.rods), default=0.0)
+    together = (np.diff(rods[order]) == 0) & (np.diff(at[order]) < tiny)
+    joint = order // 2
+    node = np.arange(len(grid.crossings))
+    for a, b in zip(joint[:-1][together], joint[1:][together], strict=True):
+        node[node == node[b]] = node[a]
+    return np.unique(node, return_inverse=True)[1].astype(np.intp)

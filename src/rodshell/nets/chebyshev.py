@@ -1,0 +1,283 @@
+"""The inextensible net of a layout on a target, and the footprint that it cuts out of the flat grid.
+
+Two crossing geodesics through the anchor determine the net (`compass`). It is marched at two steps, cut at
+the target's end and extrapolated (Richardson), so that each rod end is known far better than the mesh of any
+mechanical model; the difference of the two marches estimates the error. Lines of the lattice that are not
+built still shape the net: they are kept as virtual rods.
+"""
+
+from dataclasses import dataclass
+from math import cos, degrees, sin
+from string import ascii_lowercase
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError, NetLimitError
+from rodshell.geometry.curves import on_curve
+from rodshell.layout import FlatRod, GridLayout
+from rodshell.layout.flatgrid import Family
+from rodshell.layout.gridlayout import rod_name
+from rodshell.nets.cuts import Cut, Lines, cut_lines, extrapolated
+from rodshell.nets.lines import LatticeLines, find_lines, march_lines
+from rodshell.nets.reach import Covering
+from rodshell.targets import Target
+
+Floats = NDArray[np.float64]
+
+SMALLEST_ANGLE = 10.0  # degrees; no rodshell can be built beyond
+SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further
+LOOSE = 0.05  # spacings: ends known no better than that are warned of
+GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count
+
+
+@dataclass(frozen=True)
+class ChebyshevNet:
+    """The net of a layout on a target.
+
+    Parameters
+    ----------
+    rods : rods and virtual rods, each from end to end of the target: the footprint G0.
+    lines : (u, v) offsets of all lines of the lattice near the target: `lines[0]` are the u at which lines of
+        family v lie, `lines[1]` the v of family u [m].
+    net : the finer march, from which positions are taken.
+    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all rod ends [m]: the error before extrapolation.
+    min_angle : smallest angle between the families on the target [rad], at the point `min_angle_at` (3,) [m].
+    dropped : rods of the layout that are not in `rods`, with the reason.
+    warnings : sentences.
+    """
+
+    target: Target
+    layout: GridLayout
+    rods: tuple[FlatRod, ...]
+    lines: tuple[Floats, Floats]
+    net: Covering
+    error_estimate: float
+    min_angle: float
+    min_angle_at: tuple[float, float, float]
+    dropped: tuple[tuple[str, str], ...]
+    warnings: tuple[str, ...]
+
+    def positions(self, rod: FlatRod, s: Floats) -> Floats:
+        """Points (n, 3) of the net at material coordinates `s` (n,) of a rod, by local cubics [m]."""
+        if rod.family == "u":
+            knots, points = self.net.u, self.net.points[:, int(np.argmin(np.abs(self.net.v - rod.offset)))]
+        else:
+            knots, points = self.net.v, self.net.points[int(np.argmin(np.abs(self.net.u - rod.offset)))]
+        known = np.flatnonzero(np.isfinite(points[:, 0]))
+        return on_curve(knots[known], points[known], s)
+
+
+def chebyshev_net(
+    target: Target,
+    layout: GridLayout,
+    *,
+    anchor: tuple[float, float] | None = None,
+    near: ChebyshevNet | None = None,
+) -> ChebyshevNet:
+    """March the net of `layout` over `target` and cut it at the target's end.
+
+    Parameters
+    ----------
+    anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+    near : a net that may be similar, from which this one is found sooner; it is the same without.
+
+    Raises
+    ------
+    NetLimitError : the crossing angle falls to 10 degrees or the march fails inside the target; names the place.
+    InputError : the anchor lies outside, the spacing is too large, or a rod is too short to reach the end.
+    """
+    start, heading = _start(target, layout, anchor)
+    if max(layout.spacing) >= 2 * target.size:
+        raise InputError(
+            f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
+            "use a smaller spacing"
+        )
+    for parts in SEARCHES:
+        lines, rough = find_lines(target, layout, start, heading, near.net if near else None, parts)
+        coarse = march_lines(target, layout, lines, start, heading, 2, rough)
+        fine = march_lines(target, layout, lines, start, heading, 1, coarse, rough)
+        if not (fine.inside[[0, -1]].any() or fine.inside[:, [0, -1]].any()):
+            break
+    else:
+        raise InputError(
+            f"the target bends too sharply for a spacing of {max(layout.spacing):g} m: use a smaller spacing"
+        )
+    angle, where = _smallest_angle(fine)
+    if degrees(angle) < SMALLEST_ANGLE:
+        raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
+    ends, error, loosest = _extrapolate(target, lines, (coarse, fine), GRAZING * min(layout.spacing))
+    rods, dropped, warnings = _name_rods(layout, lines, ends)
+    if all(rod.virtual for rod in rods):
+        raise InputError(
+            "none of the layout's rods touches the target: move the layout (offset, anchor), or give more rods"
+        )
+    if error > LOOSE * min(layout.spacing):
+        x, y, z = np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest)
+        warnings.append(
+            f"rod ends on the line through ({x:.4g}, {y:.4g}, {z:.4g}) m are known within {error:.3g} m only: the "
+            "target bends too sharply for the steps of the march, or the line runs along its end; use a smaller "
+            "spacing or shorter edges"
+        )
+    _require_length(layout, rods)
+    return ChebyshevNet(
+        target, layout, rods, (lines.u, lines.v), fine, error, angle, where, tuple(dropped), tuple(warnings)
+    )
+
+
+def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
+    """The anchor lifted vertically onto the target, and the tangent that points along the heading in plan."""
+    x, y = anchor if anchor is not None else target.summit
+    other = "leave it out for the highest point, or let a search choose (--anchor auto)"
+    try:
+        point = target.lift(np.array([[x, y]]))
+    except InputError as reason:
+        raise InputError(f"the anchor: {reason}, {other}") from None
+    if not target.carries(point)[0]:
+        raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim, {other}")
+    n = target.on_surface(point).normal[0]
+    plan = np.array([cos(layout.rotate), sin(layout.rotate)])
+    return point[0], np.array([*plan * n[2], -plan @ n[:2]])
+
+
+def _hole(net: Covering) -> NetLimitError:
+    """The net ends at a node that the march could not find beside one inside the target: of these at the nearest."""
+    lost = np.pad(np.isnan(net.points[:, :, 0]), 1)
+    beside = lost[:-2, 1:-1] | lost[2:, 1:-1] | lost[1:-1, :-2] | lost[1:-1, 2:]
+    holes = np.argwhere(beside & net.inside)
+    i, j = holes[np.argmin(np.abs(net.u[holes[:, 0]]) + np.abs(net.v[holes[:, 1]]))]
+    return _net_limit(tuple(net.points[i, j].tolist()), "the rods of the two families become parallel")
+
+
+def _net_limit(where: tuple[float, float, float], what: str) -> NetLimitError:
+    x, y, z = where
+    return NetLimitError(
+        f"no inextensible net covers this target: near ({x:.4g}, {y:.4g}, {z:.4g}) m {what}; "
+        "use a smaller part of the target (a higher base, or seams), or another anchor or heading; a larger spacing "
+        "does not help"
+    )
+
+
+def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
+    """Smallest angle between the families over the inside nodes [rad], from central differences, and its place.
+
+    Raises
+    ------
+    NetLimitError : a node beside an inside one is missing.
+    """
+    i, j, whole = _sharpest(net.points, net.inside)
+    if not whole:
+        raise _hole(net)
+    along, across = net.points[i + 1, j] - net.points[i - 1, j], net.points[i, j + 1] - net.points[i, j - 1]
+    x, y, z = net.points[i, j].tolist()
+    return float(np.arctan2(np.linalg.norm(np.cross(along, across)), abs(along @ across))), (x, y, z)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _sharpest(points, inside):  # type: ignore[no-untyped-def]
+    """Indices of the inside node with the smallest angle, which has the largest cosine; and whether the net has all
+    nodes beside the inside ones."""
+    i_found, j_found, largest, whole = 0, 0, -1.0, True
+    for i in range(1, len(inside) - 1):
+        for j in range(1, inside.shape[1] - 1):
+            if inside[i, j]:
+                aa, ab, bb = 0.0, 0.0, 0.0
+                for k in range(3):
+                    a, b = points[i + 1, j, k] - points[i - 1, j, k], points[i, j + 1, k] - points[i, j - 1, k]
+                    aa, ab, bb = aa + a * a, ab + a * b, bb + b * b
+                whole &= not np.isnan(aa + bb)
+                if ab * ab > largest * aa * bb:
+                    i_found, j_found, largest = i, j, ab * ab / (aa * bb)
+    return i_found, j_found, whole
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """Pieces of the lines of both families, extrapolated."""
+
+    u: list[list[Cut]]
+    v: list[list[Cut]]
+
+
+def _extrapolate(
+    target: Target, lines: LatticeLines, nets: tuple[Covering, Covering], depth: float
+) -> tuple[_Ends, float, Floats]:
+    """The pieces of all lines, the largest error of an end before extrapolation [m], and a point of that line."""
+    sets = list[Lines]()
+    for net in nets:
+        row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
+        sets.append(Lines(net.u, net.points[:, column].transpose(1, 0, 2), net.inside[:, column].T))
+        sets.append(Lines(net.v, net.points[row], net.inside[row]))
+    cuts = cut_lines(target, sets, depth=depth)
+    step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
+    error, where = 0.0, nets[1].points[nets[1].origin]
+    families = list[list[list[Cut]]]()
+    for coarse, fine, (_, points, _) in zip(cuts[:2], cuts[2:], sets[2:], strict=True):
+        both = [extrapolated(rough, exact, step) for rough, exact in zip(coarse, fine, strict=True)]
+        families.append([pieces for pieces, _ in both])
+        worst = int(np.argmax([missed for _, missed in both]))
+        if both[worst][1] > error:
+            error, known = both[worst][1], points[worst][np.isfinite(points[worst][:, 0])]
+            where = known[np.argmin(np.abs(target.margin(known)))]
+    return _Ends(*families), error, where
+
+
+def _name_rods(
+    layout: GridLayout, lines: LatticeLines, ends: _Ends
+) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
+    """Rods from the lines: those of the layout get their labels, all other lines are virtual."""
+    rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), list[str]()
+    families: tuple[tuple[Family, Floats, list[list[Cut]]], ...] = (("u", lines.v, ends.u), ("v", lines.u, ends.v))
+    for family, offsets, cuts in families:
+        make = FlatRod.u if family == "u" else FlatRod.v
+        touching = {float(c): cut for c, cut in zip(offsets, cuts, strict=True) if cut}
+        built = layout.offsets(family)
+        if built is None:
+            near = np.array(list(touching))
+            lattice = layout.lattice(family, near.min(initial=0.0), near.max(initial=0.0))
+            built = near[(np.abs(near[:, None] - lattice) < 1e-6 * max(layout.spacing)).any(axis=1)]
+        for k, c in enumerate(built):
+            name = rod_name(family, k, len(built))
+            here = min(touching, key=lambda offset: abs(offset - c), default=np.inf)
+            if abs(here - c) > 1e-9 * max(layout.spacing):
+                dropped.append((name, "it never touches the target"))
+                continue
+            pieces = touching.pop(here)
+            for label, cut in zip(piece_names(name, len(pieces)), pieces, strict=True):
+                rods.append(make(label, here, *cut, virtual=label in layout.left_out))
+            if len(pieces) > 1:
+                broken.append(name)
+        for c, pieces in touching.items():
+            labels = piece_names(f"virtual {family.upper()} {c:+.4f}", len(pieces))
+            rods += [make(label, c, *cut, virtual=True) for label, cut in zip(labels, pieces, strict=True)]
+    return tuple(rods), dropped, [_in_pieces(broken)] if broken else []
+
+
+def _in_pieces(names: list[str]) -> str:
+    """That some rods do not go from rim to rim."""
+    return (
+        f"{len(names)} rods meet the target in several pieces, each with ends of its own: {', '.join(names)}; an "
+        "opening where they end needs a ring that carries their reactions; where they only run out over the edge and "
+        "in again another offset of the layout may help"
+    )
+
+
+def piece_names(rod: str, count: int) -> list[str]:
+    """U07, or U07a, U07b, ... where a line meets the target more than once."""
+    return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
+
+
+def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:
+    """Refuse a layout whose rods end above the end of the target."""
+
+    def needed(rod: FlatRod) -> float:
+        middle = layout.middle(rod.family)
+        return 2 * max(rod.end - middle, middle - rod.start)
+
+    longest = max((rod for rod in rods if not rod.virtual), key=needed, default=None)
+    if longest is not None and layout.length != "auto" and needed(longest) > layout.length:
+        raise InputError(
+            f"rod {longest.name} is too short to reach the end of the target: it needs {needed(longest):.4g} m, "
+            f'the layout gives {layout.length:.4g} m: use a longer length, or "auto"'
+        )

@@ -1,0 +1,241 @@
+"""The compass net: an inextensible net marched over a surface from two crossing geodesics.
+
+A net of inextensible rods is a Chebyshev net; two geodesics through the anchor determine it. Between the two
+axes every new node P lies at one step from its neighbours A and B and on the surface: the compass rule,
+second order in the step, with an error expansion in even powers when every interval is halved.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.targets import Target
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SMALLEST_SINE = 0.02  # of a crossing angle: beyond it the two circles of the compass hardly cut (1.1 degrees)
+NEWTON_STEPS = 12
+TOLERANCE = 1e-7  # of the step: Newton doubles its digits, so that the change that is below it leaves 1e-14
+
+
+@dataclass(frozen=True)
+class Net:
+    """Nodes of a net on a surface.
+
+    Parameters
+    ----------
+    u, v : (nu,), (nv,) ascending material coordinates of the net's lines, both containing 0 [m].
+    points : (nu, nv, 3) positions [m]; NaN where the march could not go.
+    """
+
+    u: Floats
+    v: Floats
+    points: Floats
+
+    @cached_property
+    def origin(self) -> tuple[int, int]:
+        """Indices of the anchor, (u, v) = (0, 0)."""
+        return int(np.argmin(np.abs(self.u))), int(np.argmin(np.abs(self.v)))
+
+
+def march(target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats) -> Net:
+    """March the net from its two axes.
+
+    Parameters
+    ----------
+    u, v : ascending material coordinates of the lines, both containing 0 [m].
+    anchor : (3,) point of the surface where the axes cross [m].
+    heading : (3,) direction of the u axis there; its part in the tangent plane counts.
+    """
+    points = np.full((len(u), len(v), 3), np.nan)
+    net = Net(u, v, points)
+    lay_axes(target, net, anchor, heading)
+    fill_quadrants(target, net)
+    return net
+
+
+def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
+    """Two discrete geodesics through the anchor: equal chords, straightest at every node."""
+    i0, j0 = net.origin
+    net.points[i0, j0] = anchor
+    steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
+    arms = geodesics(target, np.tile(anchor, (4, 1)), axes(target, anchor, heading), steps)
+    net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
+    net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
+
+
+def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
+    """(4, 3) unit tangents at the anchor towards +u, -u, +v and -v; see `march`."""
+    normal = target.on_surface(anchor[None]).normal[0]
+    along = unit(heading - (heading @ normal) * normal)
+    across = cross(normal, along)
+    return np.stack([along, -along, across, -across])
+
+
+def geodesics(target: Target, start: Floats, direction: Floats, steps: list[Floats]) -> list[Floats]:
+    """Discrete geodesics, several at once, by given chord lengths; second order.
+
+    The next chord lies in the plane of the last chord's direction and the surface normal at the node, so that
+    the curve turns about nothing but the tangent plane.
+
+    Parameters
+    ----------
+    start : (k, 3) points of the surface [m]; direction : (k, 3) unit tangents.
+    steps : k arrays of chord lengths [m].
+
+    Returns
+    -------
+    k arrays (len(steps), 3) of points; NaN from where a chord finds no surface.
+    """
+    count = len(steps)
+    longest = max((len(s) for s in steps), default=0)
+    chords = np.zeros((longest, count))
+    for k, s in enumerate(steps):
+        chords[: len(s), k] = s
+    path = np.full((longest, count, 3), np.nan)
+    point, tangent = start.copy(), direction.copy()
+    for step in range(longest):
+        going = np.flatnonzero((chords[step] > 0) & np.isfinite(point[:, 0]))
+        if len(going) == 0:
+            break
+        here, h = point[going], chords[step, going]
+        normal = unit(target.level(here)[1])
+        flat = unit(tangent[going] - dot(tangent[going], normal)[:, None] * normal)
+        turn, change = np.zeros(len(going)), np.full(len(going), np.inf)  # angle of the chord out of the tangent plane
+        chord, swing = flat.copy(), normal.copy()
+        for _ in range(NEWTON_STEPS):
+            value, gradient = target.level(here + h[:, None] * chord)
+            if not _turned(flat, normal, value, gradient, h, turn, change, chord, swing):
+                break
+        lost = ~(np.abs(turn) < 1.2) | ~(np.abs(change) < TOLERANCE)
+        point[going] = here + h[:, None] * chord
+        point[going[lost]] = np.nan
+        tangent[going] = chord
+        path[step, going] = point[going]
+    return [path[: len(s), k] for k, s in enumerate(steps)]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # type: ignore[no-untyped-def]
+    """One Newton step of all chords, in place; `swing` is the derivative of `chord` by `turn`. Whether to go on."""
+    going = False
+    for m in range(len(turn)):
+        slope = 0.0
+        for k in range(3):
+            slope += gradient[m, k] * swing[m, k]
+        change[m] = value[m] / (h[m] * slope)
+        turn[m] -= change[m]
+        cos, sin = np.cos(turn[m]), np.sin(turn[m])
+        for k in range(3):
+            chord[m, k] = cos * flat[m, k] + sin * normal[m, k]
+            swing[m, k] = cos * normal[m, k] - sin * flat[m, k]
+        if not abs(change[m]) < TOLERANCE:
+            going = True
+    return going
+
+
+def fill_quadrants(target: Target, net: Net, wanted: Mask | None = None) -> None:
+    """What is not known of all four quadrants, all nodes or those `wanted` (nu, nv): again and again those whose
+    neighbours are known. Of a net of which only the axes are known these lie on one anti-diagonal after the other."""
+    tried = np.zeros(net.points.shape[:2], dtype=bool) if wanted is None else ~wanted
+    diagonal = 2
+    while True:
+        diagonal, i, j, *rest = _next_nodes(net.points, tried, net.u, net.v, *net.origin, diagonal)
+        if len(i) == 0:
+            return
+        tried[i, j] = True
+        net.points[i, j] = _compass(target, *rest)
+
+
+@nb.njit(cache=True)
+def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
+    """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
+    The anti-diagonal to go on from; their indices; the neighbours A towards the u axis, B towards the v axis, and D
+    across; the two chords; and the side of the net's quadrant."""
+    nodes, count, first = np.empty((tried.size, 4), dtype=np.intp), 0, len(u) + len(v)
+    for quadrant in range(4):
+        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
+        rows, columns = (len(u) - 1 - i0 if i_side > 0 else i0), (len(v) - 1 - j0 if j_side > 0 else j0)
+        for along in range(1, rows + 1):
+            for across in range(max(1, diagonal - along), columns + 1):
+                i, j = i0 + i_side * along, j0 + j_side * across
+                if tried[i, j] or np.isfinite(points[i, j, 0]):
+                    continue
+                p, q = i - i_side, j - j_side
+                if np.isfinite(points[i, q, 0] + points[p, j, 0] + points[p, q, 0]):
+                    nodes[count, 0], nodes[count, 1], nodes[count, 2], nodes[count, 3] = i, j, p, q
+                    count, first = count + 1, min(first, along + across)
+    a, b, d = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    from_a, from_b, side = np.empty(count), np.empty(count), np.empty(count)
+    for n in range(count):
+        i, j, p, q = nodes[n]
+        a[n], b[n], d[n] = points[i, q], points[p, j], points[p, q]
+        from_a[n], from_b[n], side[n] = abs(v[j] - v[q]), abs(u[i] - u[p]), (i - p) * (j - q)
+    return first + 1, nodes[:count, 0], nodes[:count, 1], a, b, d, from_a, from_b, side
+
+
+def _compass(target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: Floats) -> Floats:
+    """Points P (n, 3) of the surface with |P - A| = from_a and |P - B| = from_b, across from D.
+
+    NaN where there is none, or where the net folds: (P - B) x (P - A) no longer points along the normal.
+    """
+    p = a + b - d
+    change, sine = np.empty(len(p)), np.empty(len(p))
+    for _ in range(NEWTON_STEPS):
+        value, gradient = target.level(p)
+        if not _towards(p, a, b, from_a, from_b, value, gradient, change, sine):
+            break
+    p[~(change < TOLERANCE) | ~(sine * side > SMALLEST_SINE)] = np.nan
+    return p
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _towards(p, a, b, from_a, from_b, value, gradient, change, sine):  # type: ignore[no-untyped-def]
+    """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
+    the crossing angle's before it. Whether to go on, as long as there is hope for any."""
+    going = False
+    for m in range(len(p)):
+        x = (p[m, 0] - a[m, 0], p[m, 1] - a[m, 1], p[m, 2] - a[m, 2])
+        y = (p[m, 0] - b[m, 0], p[m, 1] - b[m, 1], p[m, 2] - b[m, 2])
+        slope = (gradient[m, 0], gradient[m, 1], gradient[m, 2])
+        step, sine[m] = compass_step(x, y, slope, from_a[m], from_b[m], value[m])
+        for k in range(3):
+            p[m, k] -= step[k]
+        change[m] = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a[m], from_b[m])
+        if change[m] >= TOLERANCE:
+            going = True
+    return going
+
+
+@nb.njit(cache=True, error_model="numpy")
+def compass_step(x, y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
+    """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
+    gradient g, to be taken away from P; and the sine of the crossing angle, y x x along the normal.
+
+    The three equations have the gradients x, y and g, whose inverse is made of their cross products.
+    """
+    normal, along, across = _cross(x, y), _cross(y, g), _cross(g, x)
+    volume = _dot(normal, g)
+    ra, rb = 0.5 * (_dot(x, x) - from_a * from_a) / volume, 0.5 * (_dot(y, y) - from_b * from_b) / volume
+    rest = level / volume
+    step = (
+        ra * along[0] + rb * across[0] + rest * normal[0],
+        ra * along[1] + rb * across[1] + rest * normal[1],
+        ra * along[2] + rb * across[2] + rest * normal[2],
+    )
+    return step, -volume / (np.sqrt(_dot(g, g)) * from_a * from_b)
+
+
+@nb.njit(cache=True)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@nb.njit(cache=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,0 +1,223 @@
+"""Where the lines of a net leave a target: runs of inside nodes, and cuts between nodes."""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from math import inf
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.geometry.curves import lagrange
+from rodshell.nets.compass import Net
+from rodshell.targets import Target
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+
+SQUARE = 5  # nodes each way
+
+
+class Cut(NamedTuple):
+    """A part of one line that lies on the target: material coordinates of its two ends [m]."""
+
+    start: float
+    end: float
+
+
+def inside_nodes(target: Target, net: Net) -> Mask:
+    """(nu, nv) nodes inside the target's end and connected with the anchor through inside nodes.
+
+    Where the anchor lies in an opening, with the first inside nodes along the axes.
+    """
+    region = _region(target, net)
+    reached = np.zeros_like(region)
+    i, j = net.origin
+    reached[i, j] = region[i, j]
+    if not region[i, j]:
+        for axis, seeds in ((region[i:, j], reached[i:, j]), (region[i::-1, j], reached[i::-1, j]),
+                            (region[i, j:], reached[i, j:]), (region[i, j::-1], reached[i, j::-1])):  # fmt: skip
+            seeds[np.argmax(axis)] = axis.any()
+    _connect(region, reached)
+    return reached
+
+
+@nb.njit(cache=True)
+def _connect(region, reached):  # type: ignore[no-untyped-def]
+    """Extend the nodes `reached` (nu, nv) to all of the `region` (nu, nv) that hang together with them."""
+    nu, nv = region.shape
+    stack, top = np.empty((region.size, 2), dtype=np.intp), 0
+    for i in range(nu):
+        for j in range(nv):
+            if reached[i, j]:
+                stack[top, 0], stack[top, 1] = i, j
+                top += 1
+    while top > 0:
+        top -= 1
+        i, j = stack[top, 0], stack[top, 1]
+        for p, q in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+            if 0 <= p < nu and 0 <= q < nv and region[p, q] and not reached[p, q]:
+                reached[p, q] = True
+                stack[top, 0], stack[top, 1] = p, q
+                top += 1
+
+
+def _region(target: Target, net: Net) -> Mask:
+    """(nu, nv) nodes inside the target's end.
+
+    A square of nodes in whose middle the end is further away than the way to its corners is asked about but once.
+    """
+    middles, way = _squares(net.points, net.u, net.v)
+    margin = target.margin(net.points[middles[:, 0], middles[:, 1]])
+    inside, asked = _by_squares(net.points, middles, np.where(np.abs(margin) > way, margin, 0.0))
+    inside[asked[:, 0], asked[:, 1]] = target.margin(net.points[asked[:, 0], asked[:, 1]]) > 0
+    return np.asarray(inside)
+
+
+@nb.njit(cache=True)
+def _squares(points, u, v):  # type: ignore[no-untyped-def]
+    """Indices (n, 2) of the middle of each square of nodes that are all known, and the ways (n,) to its corners."""
+    half, count = SQUARE // 2, 0
+    middles = np.empty(((len(u) // SQUARE) * (len(v) // SQUARE), 2), dtype=np.intp)
+    way = np.empty(len(middles))
+    for i in range(half, len(u) - half, SQUARE):
+        for j in range(half, len(v) - half, SQUARE):
+            if not np.isnan(points[i - half : i + half + 1, j - half : j + half + 1, 0]).any():
+                middles[count, 0], middles[count, 1] = i, j
+                way[count] = max(u[i + half] - u[i], u[i] - u[i - half]) + max(v[j + half] - v[j], v[j] - v[j - half])
+                count += 1
+    return middles[:count], way[:count]
+
+
+@nb.njit(cache=True)
+def _by_squares(points, middles, margin):  # type: ignore[no-untyped-def]
+    """Which nodes (nu, nv) lie in squares with a positive `margin` (n,), and indices (m, 2) of the known ones that lie
+    in none with a margin other than 0."""
+    nu, nv = points.shape[:2]
+    half, count = SQUARE // 2, 0
+    inside, asked = np.zeros((nu, nv), dtype=np.bool_), np.empty((nu * nv, 2), dtype=np.intp)
+    clear = np.zeros((nu, nv), dtype=np.bool_)
+    for n in range(len(middles)):
+        i, j = middles[n]
+        clear[i - half : i + half + 1, j - half : j + half + 1] = margin[n] != 0.0
+        inside[i - half : i + half + 1, j - half : j + half + 1] = margin[n] > 0.0
+    for i in range(nu):
+        for j in range(nv):
+            if not clear[i, j] and not np.isnan(points[i, j, 0]):
+                asked[count, 0], asked[count, 1] = i, j
+                count += 1
+    return inside, asked[:count]
+
+
+class Lines(NamedTuple):
+    """Lines of a net: material coordinates `s` (n,) along them [m], `points` (m, n, 3) of each, NaN where there are
+    none, and which are `inside` (m, n)."""
+
+    s: Floats
+    points: Floats
+    inside: Mask
+
+
+def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[list[list[Cut]]]:
+    """Cut lines of nets at the target's end, to fourth order between nodes.
+
+    Parameters
+    ----------
+    sets : lines of one family of one net each.
+    depth : pieces that lie nowhere further inside than this [m] only graze the end and do not count.
+
+    Returns
+    -------
+    For each set and each of its lines the pieces, in its direction; none for a line without inside nodes.
+    """
+    runs = [_runs(target, lines, depth) for lines in sets]
+    ends = _roots(target, sets, runs).reshape(-1, 2).tolist()
+    result, done = list[list[list[Cut]]](), 0
+    for lines, (row, _, _) in zip(sets, runs, strict=True):
+        cuts: list[list[Cut]] = [[] for _ in lines.points]
+        for k, (start, end) in zip(row.tolist(), ends[done : done + len(row)], strict=True):
+            cuts[k].append(Cut(start, end))
+        result.append(cuts)
+        done += len(row)
+    return result
+
+
+def _runs(target: Target, lines: Lines, depth: float) -> tuple[Ints, Ints, Ints]:
+    """The line, and the first and the last node, of each run of inside nodes that is `depth` [m] inside somewhere."""
+    change = np.diff(lines.inside.astype(np.int8), axis=1, prepend=0, append=0)
+    (row, first), last = np.nonzero(change == 1), np.nonzero(change == -1)[1] - 1
+    deep = target.margin(lines.points[row, (first + last) // 2]) > depth
+    for k in np.flatnonzero(~deep):  # not in the middle, but elsewhere?
+        deep[k] = (target.margin(lines.points[row[k], first[k] : last[k] + 1]) > depth).any()
+    return row[deep], first[deep], last[deep]
+
+
+def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[Cut], float]:
+    """The cuts of one line from two marches, by Richardson; and a bound of the finer one's error [m].
+
+    Each end is matched with the nearest of its kind in the coarse march, within a `step` [m]: where a line grazes
+    the end, the marches may find different pieces. An end that only one of them finds stays where it is; its
+    error is at most about half the gap or piece that the other march does not see, or the way to its nearest end.
+    """
+    ends, error = [end for cut in fine for end in cut], 0.0
+    better = list[float]()
+    for k, end in enumerate(ends):
+        change = min((end - cut[k % 2] for cut in coarse), key=abs, default=inf)
+        if abs(change) <= step:
+            better.append(end + change / 3)
+            error = max(error, abs(change) / 3)
+        else:
+            better.append(end)
+            error = max(error, min(abs(change), 0.5 * min(abs(other - end) for other in ends[:k] + ends[k + 1 :])))
+    if any(after <= before for before, after in pairwise(better)):
+        return fine, max(error, step)
+    return [Cut(start, end) for start, end in zip(better[::2], better[1::2], strict=True)], error
+
+
+def _roots(target: Target, sets: Sequence[Lines], runs: Sequence[tuple[Ints, Ints, Ints]]) -> Floats:
+    """Where each run's line crosses the end before and after it, by a cubic through four nodes."""
+    gathered = list[tuple[Floats, Floats, Floats, Floats]]()
+    for (s, points, _), (line, first, last) in zip(sets, runs, strict=True):
+        row = np.repeat(line, 2)
+        i = np.column_stack([first - 1, last]).ravel()  # the cut is between nodes i and i + 1
+        side = np.tile([-1, 1], len(line))
+        window = np.clip(i - 1, 0, len(s) - 4)
+        for shift in (-1, 1):  # next to the net's limit, four nodes further in
+            lost = ~np.isfinite(points[row[:, None], window[:, None] + np.arange(4), 0]).all(axis=1)
+            window = np.where(lost, np.clip(i - 1 + shift, 0, len(s) - 4), window)
+        nodes = window[:, None] + np.arange(4)
+        gathered.append((s[nodes], points[row[:, None], nodes], s[i + (side > 0)], s[i + (side < 0)]))
+    knots, points, outer, inner = (np.concatenate(part) for part in zip(*gathered, strict=True))
+    return _bracketed(lambda at, which: target.margin(lagrange(knots[which], points[which], at)), outer, inner)
+
+
+def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: Floats) -> Floats:
+    """Roots (n,) of functions that are positive at `inner` (n,) and not at `outer`, to their rounding.
+
+    `margin(at, which)` takes places (k,) and whose functions they are asked of. By false position (Illinois): an end
+    that stays twice counts half at the next step. Each root is left alone once it is found.
+    """
+    which = np.arange(len(inner))
+    below, above = np.minimum(margin(outer, which), 0.0), margin(inner, which)
+    tiny = 1e-15 * (np.abs(outer) + np.abs(inner))
+    side = np.zeros(len(inner))  # which end moved last: 1 the inner, -1 the outer one
+    found, at = inner.copy(), inner
+    for _ in range(100):
+        share = above / (above - below)
+        before, at = at, inner + np.where(np.isfinite(share), share, 0.5) * (outer - inner)
+        value = margin(at, which)
+        found[which] = at
+        inside = value > 0
+        below = np.where(inside, np.where(side > 0, 0.5, 1.0) * below, value)
+        above = np.where(inside, value, np.where(side < 0, 0.5, 1.0) * above)
+        outer, inner, side = np.where(inside, outer, at), np.where(inside, at, inner), np.where(inside, 1.0, -1.0)
+        left = (np.abs(at - before) > tiny) & (np.abs(outer - inner) > tiny) & (value != 0.0)
+        if not left.any():
+            break
+        which, at, outer, inner, below, above, side, tiny = (
+            array[left] for array in (which, at, outer, inner, below, above, side, tiny)
+        )
+    return found

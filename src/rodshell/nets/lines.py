@@ -1,0 +1,138 @@
+"""The lines of a net: those of the lattice that can touch the target, and the nodes that a march has along them.
+
+They are found by rough marches over the target, each near the one before: the first in a few long steps, the second in
+parts of the spacing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.layout import GridLayout
+from rodshell.layout.flatgrid import Family
+from rodshell.layout.gridlayout import auto_edge
+from rodshell.layout.mesh import edge_counts
+from rodshell.nets.compass import Net, fill_quadrants, lay_axes
+from rodshell.nets.cuts import inside_nodes
+from rodshell.nets.reach import Covering, march_covering
+from rodshell.targets import Target
+from rodshell.units import length_text
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `apron`
+STRIDE = 0.2  # of the target's size: the steps of the first march of all
+STRIDES = 10  # from the anchor, each way
+FEWEST_STEPS = 6  # from line to line
+MOST_NODES = 4_000_000
+
+
+@dataclass(frozen=True)
+class LatticeLines:
+    """Offsets of the lines of a net: `u` are those of family v (they cross the u axis), `v` those of u; and `nodes`,
+    the u and the v of all nodes that the finer march has [m]."""
+
+    u: Floats
+    v: Floats
+    nodes: tuple[Floats, Floats]
+
+
+def find_lines(
+    target: Target, layout: GridLayout, start: Floats, heading: Floats, near: Covering | None, parts: int
+) -> tuple[LatticeLines, Covering]:
+    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them, in
+    so many parts of a spacing."""
+    step, margin = _across(layout) / parts, MARGIN * _across(layout)
+    spare = np.repeat(margin, 2)
+    near = near or _stride(target, start, heading)
+    reach = np.minimum(near.reach(1) + spare, 4 * target.size)
+    for _ in range(12):
+        u, v = (
+            np.arange(-np.ceil(reach[2 * k] / step[k]), np.ceil(reach[2 * k + 1] / step[k]) + 1) * step[k]
+            for k in (0, 1)
+        )
+        if len(u) * len(v) > MOST_NODES / 10:
+            raise InputError(
+                f"the net needs more than {len(u) // parts} x {len(v) // parts} lines, "
+                f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
+                f"unit, or use {_coarser(target)}"
+            )
+        near = march_covering(target, u, v, start, heading, margin, near)
+        if not near.inside.any():
+            raise InputError("no node of the net lies inside the target: move the anchor away from the rim")
+        needed = near.reach(0) + spare
+        if np.all(needed <= reach + 1e-12):
+            break
+        reach = np.where(needed > reach, np.maximum(needed, 1.5 * reach), reach)
+    u, v = _lattice(layout, "v", needed[0], needed[1]), _lattice(layout, "u", needed[2], needed[3])
+    lines = LatticeLines(u, v, (_subdivided(u, layout.edge), _subdivided(v, layout.edge)))
+    _refuse_too_many(target, layout, lines)
+    return lines, near
+
+
+def _across(layout: GridLayout) -> Floats:
+    """(2,) distance of the lines that are met along u, which are those of family v, and along v [m]."""
+    return np.array(layout.spacing[::-1])
+
+
+def _stride(target: Target, start: Floats, heading: Floats) -> Covering:
+    """The first net of all, in long steps: its axes, and what lies between those parts of them that are inside."""
+    s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
+    net = Net(s, s, np.full((len(s), len(s), 3), np.nan))
+    lay_axes(target, net, start, heading)
+    inside = target.margin(np.concatenate([net.points[:, STRIDES], net.points[STRIDES]])).reshape(2, -1) > 0
+    rows, columns = (_around(axis) for axis in inside)
+    fill_quadrants(target, net, rows[:, None] & columns)
+    return Covering(s, s, net.points, inside_nodes(target, net))
+
+
+def _around(inside: Mask) -> Mask:
+    """Nodes of an axis from the one before the first inside, or the anchor, to one past the last; all where none is."""
+    on = np.append(np.flatnonzero(inside), STRIDES) if inside.any() else np.array([0, len(inside)])
+    k = np.arange(len(inside))
+    return np.asarray((k >= on.min() - 1) & (k <= on.max() + 1))
+
+
+def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
+    """Offsets of the lattice lines of a family between -below and above, with the axis."""
+    spacing = layout.spacing[0 if family == "u" else 1]
+    offsets = layout.lattice(family, -below, above)
+    offsets[np.abs(offsets) < 1e-9 * spacing] = 0.0
+    return offsets if (offsets == 0.0).any() else np.sort(np.append(offsets, 0.0))
+
+
+def march_lines(
+    target: Target, layout: GridLayout, lines: LatticeLines, start: Floats, heading: Floats, every: int, *near: Covering
+) -> Covering:
+    """The net at all of its nodes or at `every` second one, from one or two nets in longer steps."""
+    u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
+    return march_covering(target, u, v, start, heading, MARGIN * _across(layout), *near)
+
+
+def _refuse_too_many(target: Target, layout: GridLayout, lines: LatticeLines) -> None:
+    """Before the finer march takes memory for nodes that are too many."""
+    counts = [len(nodes) for nodes in lines.nodes]
+    if counts[0] * counts[1] > MOST_NODES:
+        auto = auto_edge(layout.spacing)
+        fine = layout.edge < 0.99 * auto
+        remedy = f'set layout.edge = "auto" ({length_text(auto)} here)' if fine else f"use {_coarser(target)}"
+        raise InputError(
+            f"the net would have {counts[0]} x {counts[1]} nodes, with edges of {length_text(layout.edge)} on a target "
+            f"{length_text(2 * target.size)} wide: check its unit, or {remedy}"
+        )
+
+
+def _coarser(target: Target) -> str:
+    return f"a larger spacing, such as {length_text(target.size / 8)}"
+
+
+def _subdivided(offsets: Floats, edge: float) -> Floats:
+    """Six steps or more from line to line, an even number: as many as edges, or twice as many where these are few."""
+    edges, gaps = edge_counts(np.diff(offsets), edge), np.diff(offsets)
+    steps = 2 * np.where(edges < FEWEST_STEPS, np.maximum(FEWEST_STEPS // 2, edges), (edges + 1) // 2)
+    span = np.repeat(np.arange(len(edges)), steps)
+    along = np.arange(len(span)) - np.repeat(np.cumsum(steps) - steps, steps)
+    return np.append(offsets[span] + gaps[span] * along / steps[span], offsets[-1])

@@ -1,0 +1,182 @@
+"""A result with its states, and the folder that holds it; every file in it is made from the archive."""
+
+import json
+import os
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import wraps
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import OutputError
+from rodshell.output.beside import beside
+from rodshell.output.folder import put, read_json, replacing
+
+SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
+T = TypeVar("T")
+GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
+
+
+@dataclass(frozen=True)
+class Archive:
+    """A result as it is kept on disk.
+
+    Parameters
+    ----------
+    result : the content of result.json, SI units.
+    states : the content of states.npz: "flat", "draped", "popped_pinned", "popped_clamped" (n, 3) node
+        positions [m]; "gap_draped", "gap_pinned", "gap_clamped" (n,) signed distances to the target [m];
+        "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
+        missing.
+    case_toml : the full resolved input; empty if there was none.
+    """
+
+    result: dict[str, Any]
+    states: dict[str, NDArray[Any]]
+    case_toml: str = ""
+    _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def as_stored(self) -> "Archive":
+        """The archive as a reader will see it: the result in JSON's own types."""
+        return replace(self, result=json.loads(json_text(self.result)))
+
+    def summary(self) -> str:
+        """One screen of text."""
+        from rodshell.output.summary import summary_text
+
+        return summary_text(self.result)
+
+    def save(self, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:
+        """As `write`."""
+        return write(self, folder, kinds)
+
+    @property
+    def name(self) -> str:
+        """What the result is called: its own name, else its target's kind."""
+        name = self.result.get("name") or (self.result.get("target") or {}).get("kind")
+        return printable(str(name or "rodshell"))
+
+    @property
+    def final(self) -> str | None:
+        """The best state in space that there is: clamped, else pinned, else draped."""
+        return next((state for state in reversed(SHELLS) if state in self.states), None)
+
+
+def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
+    """`make`, its result kept with the archive, and not to be changed: many files are made from the same rods."""
+
+    @wraps(make)
+    def kept(archive: Archive) -> T:
+        if make not in archive._made:
+            archive._made[make] = make(archive)
+        found: T = archive._made[make]
+        return found
+
+    return kept
+
+
+def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:
+    """Write the whole result folder, replacing an older result; returns its absolute path.
+
+    kinds : of files beside the archive (see `files.KINDS`); default: all that every installation can.
+
+    Raises
+    ------
+    OutputError : the folder cannot be written, or holds something that is not a rodshell result.
+    """
+    from rodshell.output.files import ASIDE, DEFAULT, files_of
+
+    text = json_text(archive.result)
+    archive = replace(archive, result=json.loads(text))
+    wanted = list(DEFAULT if kinds is None else kinds)
+
+    def make(aside: bool) -> None:
+        for name, content in files_of(archive, [kind for kind in wanted if (kind in ASIDE) == aside]):
+            put(temporary / name, content)
+
+    def make_aside() -> None:
+        make(aside=True)
+        with open(temporary / "states.npz", "wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **archive.states)
+
+    with replacing(folder) as temporary, beside(make_aside):
+        put(temporary / "result.json", text)
+        if archive.case_toml:
+            put(temporary / "case.toml", archive.case_toml)
+        make(aside=False)
+    return Path(folder).expanduser().resolve()
+
+
+def export(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> list[str]:
+    """Write files of some kinds (see `files.KINDS`) into `folder`, each replaced as a whole; returns their names.
+
+    Raises
+    ------
+    InputError : a kind needs a package that is not installed. OutputError : the folder cannot be written.
+    """
+    from rodshell.output.files import files_of
+
+    names = []
+    for name, content in files_of(archive.as_stored(), kinds):
+        put(Path(folder) / name, content)
+        names.append(name)
+    return names
+
+
+def read(folder: str | os.PathLike[str]) -> Archive:
+    """The archive of a result folder.
+
+    Raises
+    ------
+    OutputError : there is no result, or it cannot be read.
+    """
+    path = Path(folder).expanduser()
+    result = read_json(path / "result.json")
+    try:
+        with np.load(path / "states.npz", allow_pickle=False) as stored:
+            states = {name: stored[name] for name in stored.files}
+        case = path / "case.toml"
+        case_toml = case.read_text(encoding="utf-8") if case.exists() else ""
+    except Exception as error:  # numpy and zipfile have many ways to say that a file is broken
+        raise OutputError(f"cannot read the result in {path}: {error}") from error
+    return Archive(result, states, case_toml)
+
+
+def json_text(result: Mapping[str, Any]) -> str:
+    """`result` as strict JSON, a key or a rod on each line; what is not a finite number becomes null."""
+    lines = []
+    for key, value in _plain(result).items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            text = "[\n  " + ",\n  ".join(map(_dumps, value)) + "\n ]"
+        else:
+            text = _dumps(value)
+        lines.append(f" {_dumps(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def printable(text: str) -> str:
+    """`text` on one line, without the control characters that drawings and models cannot hold."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def _dumps(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    """`value` in JSON's own types; NumPy's arrays and numbers are converted."""
+    if isinstance(value, float):  # most are; NumPy's float64 is one
+        return float(value) if isfinite(value) else None
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value

@@ -1,0 +1,77 @@
+"""The drawing set: each drawing at 1:1 for DXF and SVG, and all of them on sheets of paper for the PDF."""
+
+from rodshell.output.archive import Archive
+from rodshell.output.drawing import Drawing
+from rodshell.output.drawings.bracing import bracing_drawing
+from rodshell.output.drawings.final import elevations_drawing, erection_drawing
+from rodshell.output.drawings.flat import flat_drawing
+from rodshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, room, table, tiled
+from rodshell.output.drawings.strips import per_sheet, strips_drawing
+from rodshell.output.drawings.supports import supports_drawing
+from rodshell.output.drawings.titleblock import title_block, with_title
+from rodshell.output.plan import FlatPlan
+from rodshell.output.schedules import bracing_table, joints_table, rods_table, seams_table, stock_table, supports_table
+from rodshell.output.takeaway import PAPERS
+
+__all__ = ["drawing_set", "sheet_set"]
+
+
+def drawing_set(archive: Archive, plan: FlatPlan) -> dict[str, Drawing]:
+    """Every drawing that the archive has content for, at 1:1 with a title block, by name."""
+    block = title_block(archive, plan.summary)
+    makers = {"plan": lambda text: flat_drawing(plan, text), "strips": lambda text: strips_drawing(plan, text)}
+    makers |= _of_the_shell(archive, plan)
+    return {name: with_title(make(plan.text), block) for name, make in makers.items()}
+
+
+def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[float, float]]:
+    """All sheets in mm of paper, and the paper's size."""
+    paper = PAPERS[(archive.result.get("drawings") or {}).get("paper", "A3")]
+    sheets = [fitted(lambda text: flat_drawing(plan, text), paper)]
+    sheets += tiled(lambda text: flat_drawing(plan, text), paper)
+    sheets += _strips(plan, paper)
+    for name, make in _of_the_shell(archive, plan).items():
+        sheets.append(fitted(make, paper))
+        if name == "supports":
+            sheets += table("Supports", *supports_table(archive, brief=True), paper)
+        elif name == "bracing":
+            sheets += table("Bracing", *bracing_table(archive), paper)
+    sheets += table("Rods", *rods_table(archive, brief=True), paper)
+    sheets += table("Joints", *joints_table(archive, brief=True), paper)
+    if archive.result.get("seams"):
+        sheets += table("Seams", *seams_table(archive), paper)
+    if (archive.result.get("fabrication") or {}).get("stock"):
+        sheets += table("Stock", *stock_table(archive), paper)
+    return bound(sheets, title_block(archive, plan.summary), paper), paper
+
+
+def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, Compose]:
+    """Drawings that need a shape in space."""
+    makers: dict[str, Compose] = {}
+    if archive.final is None or "rod_nodes" not in archive.states:
+        return makers
+    makers["supports"] = lambda text: supports_drawing(archive, plan, text)
+    makers["elevations"] = lambda text: elevations_drawing(archive, text)
+    if (archive.result.get("fabrication") or {}).get("bracing"):
+        makers["bracing"] = lambda text: bracing_drawing(archive, text)
+    if "history" in archive.states and archive.result.get("deployment"):
+        makers["erection"] = lambda text: erection_drawing(archive, text)
+    return makers
+
+
+def _strips(plan: FlatPlan, paper: tuple[float, float]) -> list[Sheet]:
+    """The strips at the largest scale at which the longest rod fits, as many to a sheet as find room."""
+    low, high = room(paper)
+    width, height = high - low
+    longest = max((1e3 * rod.cut_length for rod in plan.rods), default=1.0)
+    scale = next((one for one in SCALES if (longest + 12 * one * TEXT) / one <= width), SCALES[-1])
+    count = per_sheet(height, TEXT)
+    groups = [plan.rods[k : k + count] for k in range(0, len(plan.rods), count)]
+    sheets = []
+    for k, rods in enumerate(groups):
+        drawing = strips_drawing(plan, scale * TEXT, rods)
+        top = drawing.box()[1][1]
+        placed = drawing.placed(1 / scale, low + (4.0, height - top / scale))
+        many = f", {k + 1} of {len(groups)}" if len(groups) > 1 else ""
+        sheets.append(Sheet(drawing.title + many, placed, scale))
+    return sheets

@@ -1,0 +1,181 @@
+"""Flat plan: both families as cut, their joints, labels, the footprint, and what it is set out by."""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from rodshell.layout.outline import opens
+from rodshell.output.callouts import callouts, outward
+from rodshell.output.drawing import INK, LETTER, LINE, Drawing, Pen, Pencil
+from rodshell.output.labels import Label, Room, closed_segments, lines_meet, place, take
+from rodshell.output.plan import FlatPlan, nice_ticks
+from rodshell.output.rods import outlines_of
+
+Floats = NDArray[np.float64]
+
+FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
+TITLE = "Flat plan"
+ROD = 0.18  # width of a rod's line, in text sizes
+LARGEST, SMALLEST = 0.6, 0.5  # of a joint's id, in text sizes: 1.2 and 1 mm on a sheet
+GAP = 0.06  # from an id to a rod, in text sizes
+CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
+
+
+def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
+    """The flat plan [mm], its rods labelled in the size `text` [mm]."""
+    pencil = Pencil()
+    for outline in plan.footprint:
+        pencil.line(outline, "BOUNDARY-FLAT", closed=True)
+    for outline in plan.boundary:
+        pencil.line(outline, "BOUNDARY-FINAL", closed=True)
+    _rods(pencil, plan, text)
+    lines, across = np.concatenate([plan.cuts, *map(closed_segments, plan.footprint)]), diagonals(plan)
+    _labels(pencil, plan, text, lines)
+    _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
+    for a, b in across:
+        _dimension(pencil, plan, a, b, text)
+    _axes(pencil, plan, text)
+    return pencil.done("plan", TITLE, text)
+
+
+def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
+    """Each rod as cut; a dot at the end from which its joints are measured, a tick where it is held."""
+    for rod, cut, line in zip(plan.rods, plan.cuts, plan.lines, strict=True):
+        pen = Pen(FAMILY.get(rod.family, INK), ROD * text)
+        pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {1e3 * rod.cut_length:.3f} mm")
+        pencil.mark(line[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))
+        if rod.allowance > 0:
+            along = line[1] - line[0]
+            across = 0.3 * text * np.array([-along[1], along[0]]) / np.linalg.norm(along)
+            for end in line:
+                pencil.line([end - across, end + across], "DIM")
+
+
+def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: Floats) -> None:
+    """A mark at each joint, and its id in a corner of the mesh beside it, nearer to it than to the next joint.
+
+    It is clear of all `lines` (m, 2, 2), and of those `across` (d, 2, 2) if it can be.
+    An id that finds no room, or only in letters too small to read, is left to the mark's note and the schedule.
+    """
+    radius = min(0.25 * text, 0.04 * plan.spacing, 1.0)
+    clear = max(radius, 0.5 * ROD * text) + GAP * text
+    room, both = Room(plan.spacing), np.concatenate([lines, across])
+    for written in pencil.texts:
+        room.take(written.box())
+    for joint, mark in zip(plan.joints, plan.marks, strict=True):
+        a, b = (f"{plan.rods[k].id} at {1e3 * at:.2f} mm" for k, at in zip(joint.rods, joint.at, strict=True))
+        pencil.mark(mark, radius, "MARK", note=f"{joint.id}: {a}, {b}")
+        size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
+        for clear_of, corner in product((both, lines), CORNERS if size >= SMALLEST * text else ()):
+            off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
+            label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
+            if not lines_meet(label.box(size), clear_of) and room.claim(label.box(size)):
+                pencil.texts.append(label.written(size))
+                break
+
+
+def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
+    """Each rod's at its ends, on its own line; in an opening, around it."""
+    names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
+    inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
+    outside = np.ones(2 * len(names), dtype=bool)
+    outside[[end for loop in inside for end in loop]] = False
+    labels, room = place(names, plan.cuts, text, at=outside.reshape(-1, 2)), Room(4 * text)
+    for label in labels:
+        pencil.texts.append(label.written(text))
+        take(label, text, room)
+        if label.moved:
+            pencil.line(label.leader(text), "DIM")
+    for loop in inside:
+        places = plan.cuts.reshape(-1, 2)[loop]
+        away = outward(places)
+        for callout in callouts([names[end // 2] for end in loop], places, away, text, room, lines):
+            pencil.texts.append(callout.written)
+            pencil.line(callout.line, "DIM")
+
+
+def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
+    """The two diagonals of each grid's largest rectangle with a joint at every crossing: by them it is set out square.
+
+    No diagonal runs over an opening; grids that do not touch each other, the patches of a sewn shell, have two each.
+    """
+    found = []
+    for patch in _patches(plan):
+        x, y = (np.unique(np.round([float(plan.rods[pair[k]].offset or 0.0) for pair in patch], 9)) for k in (1, 0))
+        met = np.zeros((len(y), len(x)), dtype=bool)
+        for u, v in patch:
+            row, column = (
+                int(np.abs(offsets - float(plan.rods[k].offset or 0.0)).argmin()) for offsets, k in ((y, u), (x, v))
+            )
+            met[row, column] = True
+        best = _largest_full(met, x, y)
+        if best is not None:
+            left, right, low, high = (1e3 * value for value in best)
+            found.append((np.array([left, low]), np.array([right, high])))
+            found.append((np.array([left, high]), np.array([right, low])))
+    return found
+
+
+def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
+    """The rods u and v of each joint of two families, grid by grid."""
+    pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
+    if not pairs:
+        return []
+    first, second = np.array(pairs).T
+    graph = coo_array((np.ones(len(pairs)), (first, second)), shape=(len(plan.rods),) * 2)
+    patch = connected_components(graph, directed=False)[1][first]
+    return [[pair for pair, own in zip(pairs, patch, strict=True) if own == one] for one in dict.fromkeys(patch)]
+
+
+def _largest_full(met: NDArray[np.bool_], x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
+    """Lowest and highest x, then y, of the largest rectangle of a lattice within which all of it is there."""
+    best: tuple[float, tuple[float, float, float, float] | None] = (0.0, None)
+    for low in range(len(y)):
+        full = met[low].copy()
+        for high in range(low + 1, len(y)):
+            full &= met[high]
+            steps = np.diff(np.concatenate([[False], full, [False]]).astype(int))
+            begin, end = np.flatnonzero(steps > 0), np.flatnonzero(steps < 0) - 1
+            for left, right in zip(x[begin], x[end], strict=True):
+                area = float((right - left) * (y[high] - y[low]))
+                if area > best[0]:
+                    best = (area, (float(left), float(right), float(y[low]), float(y[high])))
+    return best[1]
+
+
+def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float) -> None:
+    """A thin line with its length, written off the labels, a third of the way along if it can be."""
+    along = b - a
+    pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.05 * text, (1.5 * text, 0.5 * text, 0.3 * text, 0.5 * text)))
+    words, angle = f"{np.linalg.norm(along):.1f}", float(np.arctan2(along[1], along[0]))
+    room = Room(plan.spacing)
+    for other in pencil.texts:
+        room.take(other.box())
+    shares = sorted(np.linspace(0.1, 0.9, 81).tolist(), key=lambda share: abs(share - 0.33))
+    for size, share in ((size, share) for size in (0.7 * text, 0.5 * text) for share in shares):
+        pencil.write(words, a + share * along, size, "DIM", anchor="middle", angle=angle, colour="#8a6a1c")
+        if room.free(pencil.texts[-1].box()):
+            return
+        pencil.texts.pop()
+
+
+def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
+    """A frame with millimetre ticks along its lower and left side, and a scale bar of one tick."""
+    corners = np.concatenate([plan.cuts.reshape(-1, 2), *(one.box() for one in pencil.texts), np.zeros((1, 2))])
+    low, high = corners.min(axis=0) - text, corners.max(axis=0) + text
+    frame = [low, (high[0], low[1]), high, (low[0], high[1])]
+    pencil.line(frame, "DIM", closed=True)
+    for axis, name in enumerate("xy"):
+        out = np.array([0.0, -1.0]) if axis == 0 else np.array([-1.0, 0.0])
+        ticks = nice_ticks(low[axis], high[axis] - 2 * text, 8)
+        for value in ticks:
+            foot = np.array([value, low[1]]) if axis == 0 else np.array([low[0], value])
+            pencil.line([foot, foot - 0.4 * text * out], "DIM")
+            shift = np.array([0.0, -1.1 * text]) if axis == 0 else np.array([-0.4 * text, -0.3 * text])
+            anchor = "middle" if axis == 0 else "end"
+            pencil.write(f"{value:g}", foot + shift, 0.8 * text, "DIM", anchor=anchor)
+        end = np.array([high[0], low[1] - 1.1 * text]) if axis == 0 else np.array([low[0] - 0.4 * text, high[1] - text])
+        pencil.write(name, end, 0.8 * text, "DIM", anchor="end")

@@ -1,0 +1,253 @@
+"""Labels that never cover each other."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rodshell.output.drawing import BELOW, LETTER, LINE, Text
+
+Floats = NDArray[np.float64]
+Extent = tuple[float, float, float, float]
+
+LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
+CLOSE = 5  # places that are tried on a label's own line
+STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # beside it
+THIN = 0.1  # what a line takes, over the size of its text
+
+
+@dataclass(frozen=True)
+class Label:
+    """A rod's label at one of its ends.
+
+    Parameters
+    ----------
+    centre : (2,) middle of the text.
+    angle : of the text against x [rad].
+    end : (2,) the rod's end that it belongs to.
+    moved : whether it stands so far off that it needs a line to its rod.
+    """
+
+    text: str
+    centre: Floats
+    angle: float
+    end: Floats
+    moved: bool
+
+    def written(self, size: float) -> Text:
+        """The text itself, its box about the centre."""
+        across = np.array([-np.sin(self.angle), np.cos(self.angle)])
+        baseline = self.centre - (0.5 * LINE - BELOW) * size * across
+        return Text(self.text, baseline, size, "LABEL", anchor="middle", angle=self.angle)
+
+    def box(self, size: float) -> Floats:
+        """Corners (4, 2) of the text's box for this text size."""
+        return self.written(size).box()
+
+    def leader(self, size: float) -> Floats:
+        """Line (2, 2) from the end to the nearest place of the text's box."""
+        along = np.array([np.cos(self.angle), np.sin(self.angle)])
+        axes = np.array([along, [-along[1], along[0]]])
+        half = 0.5 * size * np.array([LETTER * len(self.text) + 0.2, LINE])
+        return np.array([self.end, self.centre + np.clip(axes @ (self.end - self.centre), -half, half) @ axes])
+
+
+class Room:
+    """The boxes (4, 2) that are taken, found by the square of the plane that they lie in.
+
+    within : another, in which all that is taken is taken here too.
+    """
+
+    def __init__(self, square: float, within: "Room | None" = None) -> None:
+        self._square = square
+        self._taken: dict[tuple[int, int], list[tuple[Extent, Floats]]] = {}
+        self._own = list[Floats]()
+        self._within = within
+
+    def free(self, box: Floats) -> bool:
+        """Whether no box that was taken is met."""
+        if self._within is not None and not self._within.free(box):
+            return False
+        extent = left, low, right, high = _extent(box)
+        near = [
+            other
+            for square in self._squares(extent)
+            for (x0, y0, x1, y1), other in self._taken.get(square, ())
+            if x0 < right and left < x1 and y0 < high and low < y1
+        ]
+        return not near or not boxes_meet(box, np.array(near))
+
+    def take(self, box: Floats) -> None:
+        self._own.append(box)
+        extent = _extent(box)
+        for square in self._squares(extent):
+            self._taken.setdefault(square, []).append((extent, box))
+
+    def claim(self, box: Floats) -> bool:
+        """Take the box if it is free; whether it was."""
+        free = self.free(box)
+        if free:
+            self.take(box)
+        return free
+
+    def join(self, other: "Room") -> None:
+        """Take all that the other has taken."""
+        for box in other._own:
+            self.take(box)
+
+    def _squares(self, extent: Extent) -> list[tuple[int, int]]:
+        left, low, right, high = (int(value // self._square) for value in extent)
+        return [(x, y) for x in range(left, right + 1) for y in range(low, high + 1)]
+
+
+def _extent(box: Floats) -> Extent:
+    """Lowest x and y, highest x and y."""
+    (a, b, c, d), (e, f, g, h) = box.T.tolist()
+    return min(a, b, c, d), min(e, f, g, h), max(a, b, c, d), max(e, f, g, h)
+
+
+def place(texts: Sequence[str], rods: Floats, size: float, *, at: NDArray[np.bool_] | None = None) -> list[Label]:
+    """Labels at both ends of the rods (m, 2, 2), each on its rod's own line.
+
+    A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
+
+    size : of the text, in the unit of `rods`.
+    at : (m, 2) whether an end is to have one; default: all.
+    """
+    placed: list[Label] = []
+    room, labelled = Room(4 * size), np.zeros(len(rods), dtype=bool)
+    wanted = np.ones((len(rods), 2), dtype=bool) if at is None else at
+    for end in (0, 1):
+        for k in np.flatnonzero(wanted[:, end]).tolist():
+            places = _on_own_line(texts[k], rods[k, end], rods[k, 1 - end], size)
+            label = next((one for one in places if fits(one, size, room, rods)), None)
+            if label is not None:
+                placed.append(label)
+                take(label, size, room)
+                labelled[k] = True
+    for k in np.flatnonzero(wanted.any(axis=1) & ~labelled).tolist():
+        end = int(np.argmax(wanted[k]))
+        label = nearby(texts[k], rods[k, end], rods[k, end] - rods[k, 1 - end], size, room, rods)
+        if label is not None:
+            placed.append(label)
+            take(label, size, room)
+    return placed
+
+
+def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: Floats) -> Label | None:
+    """The nearest place to an end for a level text, and for a line to it, clear of all that is taken.
+
+    The text covers none of the lines (m, 2, 2) either, the line to it may cross them.
+
+    way : (2,) to the side that is tried first.
+    """
+    first = float(np.arctan2(way[1], way[0]))
+    half = 0.5 * size * np.array([LETTER * len(text), LINE])
+    for step, turn in ((step, turn) for step in range(STEPS) for turn in TURNS):
+        ray = np.array([np.cos(first + turn), np.sin(first + turn)])
+        to_side = float(np.min(half / np.maximum(np.abs(ray), 1e-12)))  # from the box's middle to its rim
+        label = Label(text, end + ((0.8 + 0.5 * step) * size + to_side) * ray, 0.0, end, moved=True)
+        if fits(label, size, room, lines):
+            return label
+    return None
+
+
+def take(label: Label, size: float, room: Room) -> None:
+    """Take the label's room, and that of the line to it."""
+    room.take(label.box(size))
+    if label.moved:
+        room.take(thin(label.leader(size), THIN * size))
+
+
+def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
+    """Whether a label, which is to cover none of the lines, and the line to it find room."""
+    return (
+        room.free(label.box(size))
+        and not lines_meet(label.box(size), lines)
+        and (not label.moved or room.free(off_its_mark(label.leader(size), size)))
+    )
+
+
+def off_its_mark(line: Floats, size: float) -> Floats:
+    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is."""
+    a, b = line
+    share = min(0.5 * size / max(float(np.linalg.norm(b - a)), 1e-12), 0.9)
+    return thin(np.array([a + share * (b - a), b]), THIN * size)
+
+
+def thin(line: Floats, width: float) -> Floats:
+    """(4, 2) corners of the room of a line (2, 2)."""
+    a, b = line
+    along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+    side = 0.5 * width * np.array([-along[1], along[0]])
+    return np.array([a - side, b - side, b + side, a + side])
+
+
+def spread(places: ArrayLike, gap: float) -> Floats:
+    """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
+
+    Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
+    """
+    asked = np.asarray(places, dtype=float)
+    order = np.argsort(asked, kind="stable")
+    wanted = asked[order] - gap * np.arange(len(asked))  # now they need only be ascending
+    groups: list[tuple[float, int]] = []
+    for value in wanted.tolist():
+        group = (value, 1)
+        while groups and groups[-1][0] > group[0]:
+            mean, count = groups.pop()
+            group = ((mean * count + group[0] * group[1]) / (count + group[1]), count + group[1])
+        groups.append(group)
+    result = np.empty_like(asked)
+    result[order] = np.concatenate([np.full(n, mean) for mean, n in groups] or [np.empty(0)]) + gap * np.arange(
+        len(asked)
+    )
+    return result
+
+
+def _on_own_line(text: str, end: Floats, other: Floats, size: float) -> Iterable[Label]:
+    """Places on the rod's own line, from its end outwards."""
+    outward = (end - other) / np.linalg.norm(end - other)
+    angle = upright(float(np.arctan2(outward[1], outward[0])))
+    first = (0.55 + 0.5 * LETTER * len(text)) * size
+    for step in range(CLOSE):
+        yield Label(text, end + (first + 0.5 * step * size) * outward, angle, end, step > 2)
+
+
+def closed_segments(outline: Floats) -> Floats:
+    """(k, 2, 2) the lines of a closed curve (k, 2)."""
+    return np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+
+
+def upright(angle: float) -> float:
+    """The angle [rad] of a text along a line, turned by pi where it would stand on its head."""
+    if LOWEST < angle <= LOWEST + np.pi:
+        return angle
+    return angle + (np.pi if angle < 0 else -np.pi)
+
+
+def boxes_meet(box: Floats, others: Floats) -> bool:
+    """Whether the rectangle (4, 2) covers a part of one of `others` (m, 4, 2): no axis separates them."""
+    if not len(others):
+        return False
+    mine = np.broadcast_to(box[[1, 3]] - box[0], (len(others), 2, 2))
+    sides = np.concatenate([mine, others[:, [1, 3]] - others[:, :1]], axis=1)
+    p, q = np.einsum("mac,pc->map", sides, box), np.einsum("mac,mpc->map", sides, others)
+    apart = (p.max(-1) <= q.min(-1)) | (q.max(-1) <= p.min(-1))
+    return bool(np.any(~apart.any(axis=1)))
+
+
+def lines_meet(box: Floats, lines: Floats) -> bool:
+    """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2): no axis separates them."""
+    sides = box[[1, 3]] - box[0]
+    axes = (2.0 * sides / np.sum(sides**2, axis=1)[:, None]).T
+    return bool(runs_through((lines - box.mean(axis=0)) @ axes).any())
+
+
+def runs_through(lines: Floats) -> NDArray[np.bool_]:
+    """(...) whether each of the lines (..., 2, 2) runs through the square from -1 to 1: no axis separates them."""
+    low, high = lines.min(axis=-2), lines.max(axis=-2)
+    off = lines[..., 0, 0] * lines[..., 1, 1] - lines[..., 0, 1] * lines[..., 1, 0]
+    apart = (low >= 1.0).any(axis=-1) | (high <= -1.0).any(axis=-1) | (np.abs(off) > (high - low).sum(axis=-1))
+    return np.asarray(~apart)

@@ -1,0 +1,117 @@
+"""The report: one page that needs nothing else, neither files nor a network."""
+
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
+from rodshell.output.archive import SHELLS, Archive
+from rodshell.output.drawing import Drawing
+from rodshell.output.figures import checks_table, key_figures, levels_table, supports_table
+from rodshell.output.pictures import picture_svg
+from rodshell.output.plan import NOTE, FlatPlan
+from rodshell.output.schedules import Table, rods_table, seams_table, stock_table
+from rodshell.output.schedules import joints_table as joints
+from rodshell.output.schedules import supports_table as supports
+from rodshell.output.shapes import CAPTIONS
+from rodshell.output.svg import drawing_svg, inline
+from rodshell.output.verdict import unknown_below, verdict
+from rodshell.output.viewer import viewer_json
+from rodshell.output.wording import percent, stage
+
+IN_PAGE = ("supports", "elevations", "erection")
+FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
+PARTLY = (
+    "Below {share} of the way up from flat no stage could be found: nothing is known there. Above, every one is an "
+)
+PARTLY += "equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
+NOT_FOLLOWED = "The way up from flat was not followed: nothing is known between these shapes."
+
+
+def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing]) -> str:
+    """The whole page; `plan` and `drawings` are the archive's."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("rodshell.output", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+    def shown(svg: str) -> Markup:
+        return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
+
+    result = archive.result
+    states = [state for state in CAPTIONS if state in archive.states and "rod_nodes" in archive.states]
+    return environment.get_template("report.html.j2").render(
+        name=archive.name,
+        note=NOTE,
+        summary=plan.summary,
+        warnings=[str(word) for word in result.get("warnings") or []],
+        verdict=verdict(archive),
+        dropped=result.get("dropped") or [],
+        view=_view(archive),
+        supports=supports_table(result),
+        checks=checks_table(result),
+        pictures=[(CAPTIONS[state], shown(picture_svg(archive, state))) for state in states],
+        one_scale=sum(state in SHELLS for state in states) > 1,
+        figures=key_figures(result, plan),
+        levels=levels_table(result),
+        plan=shown(drawing_svg(drawings["plan"])),
+        drawings=[(drawings[name].title, shown(drawing_svg(drawings[name]))) for name in IN_PAGE if name in drawings],
+        tables=_tables(archive),
+        case=archive.case_toml,
+        version=str(result.get("version_rodshell") or "unknown"),
+        versions=", ".join(f"{name} {number}" for name, number in (result.get("versions") or {}).items()),
+        format_version=str(result.get("version") or "unknown"),
+    )
+
+
+def _view(archive: Archive) -> dict[str, Any] | None:
+    """The 3D view's data and script; what they hold cannot end a script element."""
+    from markupsafe import Markup
+
+    data = viewer_json(archive)
+    if data is None:
+        return None
+    script = files("rodshell.output").joinpath("templates/view.js").read_text(encoding="utf-8")
+    return {
+        "data": Markup(data),
+        "script": Markup(script),
+        "frames": data.count('"places":'),
+        "colours": [kind for kind in ("stress", "gap") if f'"{kind}":{{' in data],
+        "note": _note(archive),
+    }
+
+
+def _note(archive: Archive) -> str:
+    """What the stages of the view are."""
+    unknown = unknown_below(archive.result)
+    if "history" not in archive.states or unknown >= 1:
+        return NOT_FOLLOWED
+    return PARTLY.format(share=stage(unknown)) if unknown else FOLLOWED
+
+
+def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
+    """Title, table and note of the schedules in the page."""
+    tables = [
+        ("Rods", rods_table(archive, brief=True), "Where each joint is on its rods: schedule/rods.csv, joints.csv."),
+        ("Joints", joints(archive, brief=True), "Named by the rods that meet, a/b. Final: in the popped-up shell."),
+    ]
+    if archive.result.get("boundary"):
+        tables.append(("Supports", supports(archive, brief=True), "With reactions: schedule/supports.csv."))
+    if archive.result.get("seams"):
+        tables.append(("Seams", seams_table(archive), "Forces: what a seam carries there, both rods together."))
+    if stock := (archive.result.get("fabrication") or {}).get("stock"):
+        tables.append(("Stock", stock_table(archive), _plan_of(stock)))
+    return tables
+
+
+def _plan_of(stock: Mapping[str, Any]) -> str:
+    """How good a cutting plan is."""
+    return (
+        f"First fit decreasing: {len(stock['bars'])} bars, {percent(stock['waste'])} waste. By the pieces' total "
+        f"length alone it takes {stock['fewest']} bars; that is a bound, which no plan need reach."
+    )

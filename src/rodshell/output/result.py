@@ -1,0 +1,182 @@
+"""From the stages of a job to what is kept of it: result.json and states.npz."""
+
+from dataclasses import asdict
+from importlib.metadata import version
+from math import degrees
+from platform import python_version
+from typing import Any
+
+import numba
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from rodshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
+from rodshell.formfinding.bound import shape_of_net
+from rodshell.joints import joint_parameters
+from rodshell.rods.section import Rod
+from rodshell.solve.report import SolveReport
+
+States = dict[str, NDArray[Any]]
+
+
+def form_result(form: FoundForm) -> dict[str, Any]:
+    """result.json of a form, SI units; the keys are those of the documentation's page on files."""
+    return {
+        **head(form.target.name, form.status, form.warnings),
+        "target": {**form.target.parameters(), "reference_size": form.target.size},
+        "layout": form.layout.parameters(),
+        "rod": rod_table(form.rod),
+        "joint": joint_parameters(form.joint),
+        **({"net": shape_of_net(form.draped.net)} if form.draped.net is not None else {}),
+        **grid_table(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
+        "end_tangents": form.trimmed.boundary.tangents,
+        "agreement": {ends: agreement_table(gap) for ends, gap in form.agreement.items()},
+        "drape": drape_table(form.draped),
+        "pop_up": {ends: popped_table(shell.report, shell.start) for ends, shell in form.popped.items()},
+    }
+
+
+def drape_table(draped: Draped) -> dict[str, Any]:
+    """Figures of a drape."""
+    drape: dict[str, Any] = {
+        "method": draped.method,
+        "status": draped.report.status.value,
+        "dofs": draped.report.dofs,
+        "levels": [_level(level) for level in draped.levels],
+        "seconds": sum(level.seconds for level in draped.levels),
+        "force_residual": draped.report.force_residual,
+        "max_strain": draped.report.max_strain,
+        "max_gap": draped.max_gap,
+        "negative_modes": draped.report.negative_modes,
+        "min_angle_deg": degrees(draped.min_angle),
+        "min_angle_at": list(draped.min_angle_at),
+        "contact_pulls": draped.pulls,
+    }
+    if draped.rest is not None:
+        drape["fall"] = asdict(draped.rest)
+    if draped.own_ends is not None:
+        drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
+    return drape
+
+
+def form_states(form: FoundForm) -> States:
+    """states.npz of a form."""
+    target = form.target
+    states = _mesh_states(form.footprint)
+    states["draped"] = form.trimmed.positions
+    states["gap_draped"] = target.gap(form.trimmed.positions).distance
+    for ends, shell in form.popped.items():
+        states[f"popped_{ends}"] = shell.positions
+        if ends in form.agreement:
+            states[f"gap_{ends}"] = form.agreement[ends].gaps
+    return states
+
+
+def _mesh_states(footprint: Footprint) -> States:
+    mesh = footprint.mesh
+    return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
+
+
+def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
+    """result.json of a popped-up table of rods."""
+    return {
+        **head(name, table.status, table.warnings),
+        "rod": rod_table(table.rod),
+        **grid_table(table.footprint, table.boundary.points, table.dropped),
+        "pop_up": {ends: popped_table(shell.report, shell.start) for ends, shell in table.popped.items()},
+    }
+
+
+def table_states(table: PoppedTable) -> States:
+    """states.npz of a popped-up table of rods."""
+    return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
+
+
+def head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
+    """What every result begins with."""
+    return {
+        "format": "rodshell-result",
+        "version": 1,
+        "units": "SI",
+        "version_rodshell": version("rodshell"),
+        "versions": {"python": python_version()} | {one.__name__: one.__version__ for one in (np, scipy, numba)},
+        "name": name,
+        "status": status,
+        "warnings": list(warnings),
+    }
+
+
+def grid_table(
+    footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tuple[str, str], ...]
+) -> dict[str, Any]:
+    """Rods, joints and rod ends."""
+    rods: list[dict[str, Any]] = [
+        {
+            "id": rod.name,
+            "family": rod.family,
+            "offset": rod.offset,
+            "start": rod.start,
+            "end": rod.end,
+            "length": rod.length,
+            "joints": [],
+        }
+        for rod in footprint.rods
+    ]
+    crossings = footprint.mesh.grid.crossings
+    for (a, b), (at_a, at_b) in zip(crossings.rods.tolist(), crossings.at.tolist(), strict=True):
+        rods[a]["joints"].append({"with": footprint.rods[b].name, "at": at_a - footprint.rods[a].start})
+        rods[b]["joints"].append({"with": footprint.rods[a].name, "at": at_b - footprint.rods[b].start})
+    for rod in rods:
+        rod["joints"].sort(key=lambda joint: joint["at"])
+    return {
+        "rods": rods,
+        "dropped": [{"id": name, "reason": reason} for name, reason in dropped],
+        "footprint": footprint.points.tolist(),
+        "boundary": boundary.tolist(),
+    }
+
+
+def rod_table(rod: Rod) -> dict[str, Any]:
+    """Section, material and stiffnesses."""
+    first, second = rod.bend_stiffnesses
+    return {
+        **rod.parameters(),
+        "EA": rod.stretch_stiffness,
+        **({"EI": first} if first == second else {"EI1": first, "EI2": second}),
+        "GJ": rod.twist_stiffness,
+        "mass_per_length": rod.mass_per_length,
+    }
+
+
+def _level(report: SolveReport) -> dict[str, Any]:
+    return {
+        "dofs": report.dofs,
+        "status": report.status.value,
+        "iterations": report.iterations,
+        "factorizations": report.factorizations,
+        "seconds": report.seconds,
+    }
+
+
+def popped_table(report: SolveReport, start: str) -> dict[str, Any]:
+    """Figures of a pop-up that began from the shape `start`."""
+    return {
+        **_level(report),
+        "start": start,
+        "force_residual": report.force_residual,
+        "max_strain": report.max_strain,
+        "negative_modes": report.negative_modes,
+        "stable": report.stable,
+    }
+
+
+def agreement_table(gap: Agreement) -> dict[str, Any]:
+    """Gap to the target."""
+    return {
+        "max": gap.max,
+        "rms": gap.rms,
+        "max_relative": gap.max_relative,
+        "rms_relative": gap.rms_relative,
+        "where": list(gap.where),
+    }

@@ -1,0 +1,125 @@
+"""What a colour means in a picture: the gap to the target, the stress, or the height where there is no target."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.output.archive import Archive
+from rodshell.output.colours import HEIGHT, SIGNED, STRESS, hex_colours
+from rodshell.output.drawing import Pen, Pencil
+from rodshell.output.plan import nice_step, nice_ticks
+from rodshell.output.shapes import STAGE, Shape
+from rodshell.output.svg import number
+from rodshell.output.wording import MINUS, PRESSURES
+
+Floats = NDArray[np.float64]
+Colour = Literal["gap", "stress"]
+
+BINS = 33  # colours in use; odd, so that a gap of 0 has its own
+FINEST = 1e-3  # mm; smaller gaps are drawn like none
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Colours of a shell.
+
+    Parameters
+    ----------
+    values : (k,) at each entry of `rod_nodes`.
+    low, high : values at both ends of the map.
+    colours : control points of the map.
+    """
+
+    values: Floats
+    low: float
+    high: float
+    colours: tuple[str, ...]
+    caption: str
+
+    @property
+    def bins(self) -> NDArray[np.intp]:
+        """(k,) index in the palette of each value's colour."""
+        share = np.nan_to_num((self.values - self.low) / (self.high - self.low), nan=0.5)
+        return np.rint(np.clip(share, 0, 1) * (BINS - 1)).astype(np.intp)
+
+    @property
+    def palette(self) -> list[str]:
+        return hex_colours(self.colours, np.linspace(0, 1, BINS))
+
+
+def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
+    """The scale of a shape, by its own largest value; None where nothing is known to colour it by."""
+    nodes = archive.states["rod_nodes"]
+    if colour == "stress":
+        return None if shape.stress is None else _stress_scale(archive, shape)
+    if shape.gap is not None:
+        largest = abs(largest_gap(archive, shape)[0])
+        factor, unit = length_unit(largest)
+        limit = _rounded_up(max(largest, FINEST) / factor)
+        caption = f"gap to target in {unit}, + outside"
+        return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
+    if shape.flat or archive.result.get("target"):
+        return None
+    heights = 1e3 * shape.positions[nodes, 2]
+    factor, unit = length_unit(float(np.abs(heights).max()))
+    low, high = float(heights.min()) / factor, float(heights.max()) / factor
+    return Scale(heights / factor, low, max(high, low + FINEST), HEIGHT, f"height in {unit}")
+
+
+def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
+    """The largest gap [mm] with its sign, and where (3,) [m]: the agreement's own, which also looks between the nodes.
+
+    shape : one whose gaps are known.
+    """
+    assert shape.gap is not None
+    points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
+    worst = int(np.argmax(np.abs(gaps)))
+    found = (archive.result.get("agreement") or {}).get(shape.name.removeprefix("popped_")) or {}
+    if found.get("where") is None or found.get("max") is None:
+        return float(gaps[worst]), points[worst]
+    place = np.array(found["where"], dtype=float)
+    nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
+    return float(np.copysign(1e3 * found["max"], gaps[nearest])), place
+
+
+def length_unit(largest: float) -> tuple[float, str]:
+    """The unit that fits a length [mm]: how many mm it is, and its name."""
+    return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
+
+
+def _stress_scale(archive: Archive, shape: Shape) -> Scale:
+    """Utilisation where the strength is known, else the stress in a unit of its size; one for all stages."""
+    assert shape.stress is not None
+    strength = (archive.result.get("bending") or {}).get("strength")
+    top = float(np.max(archive.states["history_stress"] if shape.name.startswith(STAGE) else shape.stress))
+    if strength:
+        unit, caption = strength / 100, "utilisation in %"
+    else:
+        unit, name = next((one for one in PRESSURES if top >= one[0]), PRESSURES[-1])
+        caption = f"stress in {name}"
+    largest = float(np.max(shape.stress)) / unit
+    limit = _rounded_up(max(top / unit, FINEST))
+    return Scale(shape.stress / unit, 0.0, limit, STRESS, f"{caption}, here up to {largest:.3g}")
+
+
+def _rounded_up(largest: float) -> float:
+    """To a whole number of ticks."""
+    step = nice_step(largest, 4)
+    return float(step * np.ceil(largest / step - 1e-9))
+
+
+def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
+    """The map with its ticks and its caption, ending at x = `right`, ticks' baseline at `y`."""
+    length = 200.0
+    left, step = right - length, length / BINS
+    for k, colour in enumerate(scale.palette):  # each under the next: no seams
+        x, stop = left + k * step, min(left + (k + 2) * step, right)
+        corners = [(x, y + 14), (stop, y + 14), (stop, y + 22), (x, y + 22)]
+        pencil.line(corners, "TITLE", closed=True, pen=Pen(colour, 0.0, fill=colour))
+    for value in nice_ticks(scale.low, scale.high, 4):
+        x = left + length * (value - scale.low) / (scale.high - scale.low)
+        shown = number(value, 6).replace("-", MINUS)
+        pencil.write(shown, (x, y), 12.5, "DIM", anchor="middle")
+    pencil.write(scale.caption, (left - 12, y + 13), 13.0, "TITLE", anchor="end")

@@ -1,0 +1,141 @@
+"""Writing SVG: elements with escaped attributes and text, short numbers, and whole drawings."""
+
+import re
+from collections.abc import Iterator
+from html import escape
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Text
+
+ZEROS = re.compile(r"\.00(?!\d)|(\.\d)0(?!\d)")
+MINUS_ZERO = re.compile(r"-0(?![.\d])")
+FLIP = np.array([1.0, -1.0])
+SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
+
+
+def number(value: float, digits: int = 2) -> str:
+    """`value` with at most `digits` decimals, as short as can be."""
+    text = f"{value:.{digits}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def tag(name: str, *children: str, **attributes: Any) -> str:
+    """An element; `children` are markup, attribute names take - for _, and lose one at their end."""
+    words = [name]
+    for key, value in attributes.items():
+        shown = value if isinstance(value, str) else number(value, 3)
+        words.append(f'{key.rstrip("_").replace("_", "-")}="{escape(shown)}"')
+    opening = " ".join(words)
+    return f"<{opening}>{''.join(children)}</{name}>" if children else f"<{opening}/>"
+
+
+def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:
+    """One line of text with its baseline at (x, y)."""
+    return tag("text", escape(text), x=x, y=y, font_size=size, **attributes)
+
+
+def document(view: tuple[float, float, float, float], *children: str, unit: str = "") -> str:
+    """A complete SVG with the view box x, y, width, height; its size is the box's, in `unit`."""
+    x, y, width, height = (number(value, 3) for value in view)
+    body = "\n".join(child for child in children if child)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}{unit}" height="{height}{unit}" '
+        f'viewBox="{x} {y} {width} {height}" font-family="{SANS}">\n{body}\n</svg>\n'
+    )
+
+
+def inline(svg: str) -> str:
+    """A document as part of an HTML page, where the namespace is known and the size is the page's choice."""
+    head, rest = svg.split("viewBox", 1)
+    return f"<svg viewBox{rest}" if head.startswith("<svg") else svg
+
+
+def drawing_svg(drawing: Drawing) -> str:
+    """A drawing at true scale: one unit is one millimetre, y points up (drawn as -y). A group a layer and pen."""
+    margin = 2 * drawing.text
+    low, high = drawing.box()
+    width, height = high - low + 2 * margin
+    return document(
+        (low[0] - margin, -high[1] - margin, width, height),
+        tag("title", escape(f"{drawing.title}, 1:1 in mm")),
+        tag("rect", x=low[0] - margin, y=-high[1] - margin, width=width, height=height, fill=PAPER),
+        *_shapes(drawing),
+        *(_text(text) for text in drawing.texts),
+        unit="mm",
+    )
+
+
+def picture_document(drawing: Drawing) -> str:
+    """A picture: as large as its page likes."""
+    low, high = drawing.box()
+    view = (float(low[0]), float(-high[1]), *(high - low).tolist())
+    return document(view, *_shapes(drawing), *(_text(text) for text in drawing.texts))
+
+
+def _shapes(drawing: Drawing) -> Iterator[str]:
+    """Neighbours with one layer and one pen: as one path, or as a group where some have names or notes."""
+    items: list[Path | Mark] = [*(path for path in drawing.paths if path.flat), *drawing.marks]
+    for (layer, pen), group in groupby(items, key=lambda item: (item.layer, drawing.pen(item))):
+        members = list(group)
+        anonymous = [item for item in members if isinstance(item, Path) and not (item.name or item.note)]
+        if len(anonymous) == len(members):
+            yield tag("path", d=_short("".join(map(_data, anonymous))), class_=layer, **_look(pen))
+        else:
+            shapes = [_path(item) if isinstance(item, Path) else _mark(item) for item in members]
+            yield tag("g", *shapes, class_=layer, **_look(pen))
+
+
+def _data(path: Path) -> str:
+    """Data of an anonymous path, to 0.01 of a unit, not yet shortened."""
+    flipped = (path.points * FLIP).ravel().tolist()
+    words = "L".join(["%.2f %.2f"] * len(path.points)) % tuple(flipped)
+    return f"M{words}Z" if path.closed else f"M{words}"
+
+
+def _short(words: str) -> str:
+    """Numbers with two decimals as `number` has them."""
+    return MINUS_ZERO.sub("0", ZEROS.sub(r"\1", words))
+
+
+def _look(pen: Pen) -> dict[str, Any]:
+    look: dict[str, Any] = {"fill": pen.fill or "none"}
+    if pen.width:
+        look |= {"stroke": pen.colour, "stroke_width": number(pen.width, 4), "stroke_linejoin": "round"}
+        look["stroke_linecap"] = "butt" if pen.dash else "round"
+    if pen.dash:
+        look["stroke_dasharray"] = " ".join(number(dash, 3) for dash in pen.dash)
+    return look
+
+
+def _path(path: Path) -> str:
+    named = {"data_rod": path.name} if path.name else {}
+    inside = [tag("title", escape(path.note))] if path.note else []
+    if len(path.points) == 2:
+        (x1, y1), (x2, y2) = path.points
+        return tag("line", *inside, x1=x1, y1=-y1, x2=x2, y2=-y2, **named)
+    shape = " ".join(f"{number(x, 3)},{number(-y, 3)}" for x, y in path.points.tolist())
+    return tag("polygon" if path.closed else "polyline", *inside, points=shape, **named)
+
+
+def _mark(mark: Mark) -> str:
+    inside = [tag("title", escape(mark.note))] if mark.note else []
+    return tag("circle", *inside, cx=mark.at[0], cy=-mark.at[1], r=mark.radius)
+
+
+def _text(text: Text) -> str:
+    look: dict[str, Any] = {"fill": text.colour or LAYERS[text.layer].colour}
+    if text.anchor != "start":
+        look["text_anchor"] = text.anchor
+    if text.bold:
+        look["font_weight"] = "600"
+    if text.halo:
+        look |= {"stroke": text.halo, "stroke_width": "4", "stroke_linejoin": "round", "paint_order": "stroke"}
+    x, y = text.at[0], -text.at[1]
+    if text.angle:
+        look["transform"] = f"rotate({number(-np.degrees(text.angle), 3)} {number(x, 3)} {number(y, 3)})"
+    return label(text.text, x, y, text.size, **look)

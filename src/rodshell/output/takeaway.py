@@ -1,0 +1,80 @@
+"""What checks, workshop and drawings are told that does not decide the form."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from rodshell.errors import InputError
+from rodshell.fabrication import Fabrication
+from rodshell.output.drawing import LAYERS
+
+PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
+MOST_STAGES = 1000
+FORBIDDEN = '<>/\\\\":;?*|=`'  # in a layer's name, by the DXF reference
+
+
+@dataclass(frozen=True)
+class DrawingStyle:
+    """What the drawings of a set have in common.
+
+    Parameters
+    ----------
+    paper : of the PDF's sheets, landscape: A4 to A0.
+    project, revision : for the title block.
+    tolerance : to which lengths are to be kept [m]; None: the title block says that it is not given.
+    layers : for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name.
+    """
+
+    paper: str = "A3"
+    project: str = ""
+    revision: str = ""
+    tolerance: float | None = None
+    layers: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.paper not in PAPERS:
+            raise InputError(f'drawings cannot be on "{self.paper}": use {", ".join(PAPERS)}')
+        for layer, name in self.layers.items():
+            if layer not in LAYERS:
+                raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')
+            if not name.strip() or any(letter in FORBIDDEN or not letter.isprintable() for letter in name):
+                raise InputError(f'a layer cannot be called "{name}": a name has none of {FORBIDDEN}')
+        shown = [self.layers.get(layer, layer).upper() for layer in LAYERS]
+        if len(set(shown)) < len(shown):
+            twice = next(name for name in shown if shown.count(name) > 1)
+            raise InputError(f'two layers would be called "{twice}": give each its own name')
+
+    def parameters(self) -> dict[str, Any]:
+        """As it is kept in a result."""
+        return asdict(self) | {"layers": dict(self.layers)}
+
+
+@dataclass(frozen=True)
+class Takeaway:
+    """All that does not decide the form.
+
+    Parameters
+    ----------
+    strength : of the rods' material [Pa], by which utilisation is counted; None: it is not counted.
+    stages : equilibria of the way up from flat; 0: it is not followed.
+    """
+
+    strength: float | None = None
+    stages: int = 8
+    fabrication: Fabrication = field(default_factory=Fabrication)
+    drawings: DrawingStyle = field(default_factory=DrawingStyle)
+
+    def __post_init__(self) -> None:
+        if self.strength is not None and not self.strength > 0:
+            raise InputError(f"the strength must be positive, not {self.strength} Pa")
+        if not 0 <= self.stages <= MOST_STAGES:
+            raise InputError(f"the way up can have 0 to {MOST_STAGES} stages, not {self.stages}")
+
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """As it stands in a case file."""
+        layers = {name.lower().replace("-", "_"): shown for name, shown in self.drawings.layers.items()}
+        return {
+            "checks": {"strength": self.strength, "stages": self.stages},
+            "fabrication": asdict(self.fabrication),
+            "drawings": self.drawings.parameters() | {"layers": layers},
+        }

@@ -1,0 +1,163 @@
+"""What is kept of checks and fabrication in result.json and states.npz."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.checks import Bending, Checks, JointLoads, Reactions
+from rodshell.fabrication import Fabricated
+from rodshell.layout import GridMesh
+
+Floats = NDArray[np.float64]
+PREFERRED = ("clamped", "pinned")  # the shell that the schedules tell of
+
+
+def sharpest(checks: Checks) -> Floats | None:
+    """(k,) sharpest bend [1/m] of each entry of `rod_nodes` in any shell and on the way up; None: nothing checked."""
+    known = [bent.curvature for bent in (*checks.bending.values(), *checks.on_the_way)]
+    return np.max(known, axis=0) if known else None
+
+
+def workshop_result(
+    result: Mapping[str, Any], mesh: GridMesh, checks: Checks, made: Fabricated, strength: float | None
+) -> dict[str, Any]:
+    """`result` with all that was checked and made: more of each rod, and tables of their own."""
+    rods = [dict(entry) for entry in result["rods"]]
+    final = next((ends for ends in PREFERRED if ends in checks.bending), None)
+    for k, entry in enumerate(rods):
+        here = mesh.rod_slice(k)
+        entry |= {
+            "cut_length": made.cut_length[k],
+            "mass": made.mass[k],
+            "layer": made.layer[k],
+            "splices": list(made.splices[k]),
+        }
+        if final is not None:
+            entry |= _bent([checks.bending[final]], here, strength)
+            entry["pop_up"] = _bent([*checks.bending.values(), *checks.on_the_way], here, strength)
+    return {
+        **result,
+        "warnings": [*result["warnings"], *checks.overstress(strength, mesh), *checks.warnings, *made.warnings],
+        "rods": rods,
+        "bending": _bending(checks, strength),
+        "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
+        "joint_loads": {ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
+        **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
+        "fabrication": _fabrication(result, mesh, made),
+    }
+
+
+def workshop_states(checks: Checks) -> dict[str, NDArray[Any]]:
+    """States of the checks: curvature and stress at each entry of `rod_nodes`, and the way up from flat."""
+    states: dict[str, NDArray[Any]] = {}
+    for ends, bent in checks.bending.items():
+        states[f"curvature_{ends}"] = bent.curvature
+        if bent.stress is not None:
+            states[f"stress_{ends}"] = bent.stress
+    if checks.deployment is not None:
+        states["history_share"] = checks.deployment.share
+        states["history"] = checks.deployment.positions
+        states["history_curvature"] = _stacked([bent.curvature for bent in checks.on_the_way])
+        if all(bent.stress is not None for bent in checks.on_the_way):
+            states["history_stress"] = _stacked([bent.stress for bent in checks.on_the_way])
+    return states
+
+
+def _stacked(rows: list[Any]) -> NDArray[np.float32]:
+    return np.array(rows, dtype=np.float32)  # for colours: single precision is plenty
+
+
+def _bent(bent: list[Bending], where: slice, strength: float | None) -> dict[str, float | None]:
+    """Worst figures over a part of the rods' nodes, in any of the states."""
+    sharp = max(float(one.curvature[where].max()) for one in bent)
+    figures: dict[str, float | None] = {"min_radius": 1 / sharp if sharp > 0 else None}
+    strains = [float(one.strain[where].max()) for one in bent if one.strain is not None]
+    stresses = [float(one.stress[where].max()) for one in bent if one.stress is not None]
+    figures["max_strain"] = max(strains, default=None)
+    figures["max_stress"] = max(stresses, default=None)
+    if strength is not None and stresses:
+        figures["utilisation"] = max(stresses) / strength
+    return figures
+
+
+def _bending(checks: Checks, strength: float | None) -> dict[str, Any]:
+    everywhere = slice(None)
+    table: dict[str, Any] = {"strength": strength}
+    for ends, bent in checks.bending.items():
+        table[ends] = _bent([bent], everywhere, strength)
+    if checks.deployment is not None:
+        table["pop_up"] = _bent(list(checks.on_the_way), everywhere, strength)
+        sharpest_stage = int(np.argmax([bent.curvature.max() for bent in checks.on_the_way]))
+        table["pop_up"]["share"] = checks.deployment.share[sharpest_stage]
+    return table
+
+
+def _reactions(held: Reactions) -> dict[str, Any]:
+    return {
+        "force_sum": held.sum_of_forces,
+        "moment_sum": held.sum_of_moments,
+        "force_imbalance": held.force_imbalance,
+        "moment_imbalance": held.moment_imbalance,
+        "largest_force": float(np.linalg.norm(held.forces, axis=1).max(initial=0.0)),
+        "largest_moment": float(np.linalg.norm(held.moments, axis=1).max(initial=0.0)),
+        "forces": held.forces,
+        "moments": held.moments,
+    }
+
+
+def _joint_loads(mesh: GridMesh, loads: JointLoads) -> list[dict[str, Any]]:
+    """Of each joint, on its second rod: SI units, angles in degrees."""
+    names = [rod.name for rod in mesh.grid.rods]
+    forces, scissor = loads.forces[:, 1], np.degrees(loads.angles - loads.flat_angles)
+    return [
+        {
+            "rods": [names[a], names[b]],
+            "force": forces[k],
+            "normal_force": float(loads.normal_forces[k]),
+            "shear_moment": float(loads.shear_moments[k]),
+            "out_of_plane_moment": float(loads.out_of_plane_moments[k]),
+            "scissor_deg": float(scissor[k]),
+        }
+        for k, (a, b) in enumerate(mesh.grid.crossings.rods.tolist())
+    ]
+
+
+def _deployment(checks: Checks) -> dict[str, Any]:
+    way = checks.deployment
+    assert way is not None
+    stages = [
+        {"share": share, "height": float(np.ptp(positions[:, 2])), **_bent([bent], slice(None), None)}
+        for share, positions, bent in zip(way.share, way.positions, checks.on_the_way, strict=True)
+    ]
+    return {"ends": "pinned", "stages": stages, "snaps": [list(pair) for pair in way.snaps], "lost_at": way.lost_at}
+
+
+def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) -> dict[str, Any]:
+    names = [rod.name for rod in mesh.grid.rods]
+    joints = ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
+    table: dict[str, Any] = {
+        "end_allowance": made.options.end_allowance,
+        "stock_length": made.options.stock_length,
+        "kerf": made.options.kerf,
+        "total_mass": float(made.mass.sum()),
+        "bracing": [
+            {"from": joints[brace.joints[0]], "to": joints[brace.joints[1]], "flat": brace.flat, "final": brace.final}
+            for brace in made.bracing
+        ],
+    }
+    if made.nesting is not None:
+        label = [f"{names[rod]}.{number}" for rod, number, _ in made.pieces]
+        table["stock"] = {
+            "waste": made.nesting.waste,
+            "fewest": made.nesting.fewest,
+            "bars": [
+                {
+                    "pieces": [{"piece": label[k], "length": made.pieces[k][2]} for k in bar.pieces],
+                    "left": bar.left,
+                }
+                for bar in made.nesting.bars
+            ],
+        }
+    return table

@@ -1,0 +1,200 @@
+"""Pictures of two rods at one joint: instants in the paper's layout, an animation, and the lag against time."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.output.plan import nice_ticks
+from rodshell.output.svg import document, label, number, tag
+from rodshell.output.view import RIGHT, UP
+from rodshell.paper.two_rods import EDGE, LENGTH, RATE, Run
+
+Floats = NDArray[np.float64]
+
+PAPER, INK, SOFT, FAINT = "#fdfdfb", "#22282f", "#7b838a", "#c9cdd0"
+RODS = ("#1f5f8b", "#a8552a")
+PANEL = 190.0  # drawing units
+GAP, TEXT, HEAD, FOOT = 14.0, 12.0, 44.0, 30.0
+INSTANTS = 5  # from the start to half a revolution
+FRAMES = 73  # of the animation
+CHART, EDGE_OF_CHART = (380.0, 210.0), 56.0
+LOOKS = ((INK, "none"), ("#f28c3a", "5 4"), ("#39b5e6", "none"), ("#4cb873", "2 3"))  # colour and dashes of the lines
+TITLES = {
+    "twisting": "(a)  Rod 1 is twisted: \N{GREEK SMALL LETTER THETA}\u2081\u2081 = \N{GREEK SMALL LETTER OMEGA}t",
+    "bending": "(b)  Rod 1 is turned: x\u2081\u2081 goes round at \N{GREEK SMALL LETTER OMEGA}",
+}
+SCALE = 0.92 * PANEL / LENGTH  # drawing units per metre
+BIG = 1.4  # panels of the animation, against those of the instants
+
+
+def instants_svg(runs: Sequence[Run]) -> str:
+    """A row for each run: the rods at a few instants, side by side."""
+    width, down, rows = INSTANTS * PANEL + (INSTANTS + 1) * GAP, 0.0, list[str]()
+    for run in runs:
+        top, height = _extent(run)
+        rows.append(tag("g", *_title(run), transform=f"translate({number(GAP)} {number(down)})"))
+        last = min(np.pi / RATE, run.times[-1])
+        for across, time in enumerate(np.linspace(0, last, INSTANTS)):
+            k = int(np.abs(run.times - time).argmin())
+            turned = f"{np.degrees(run.prescribed[k]):.0f}\N{DEGREE SIGN}"
+            caption = f"t = {number(run.times[k], 3)} s, \N{GREEK SMALL LETTER OMEGA}t = {turned}"
+            panel = [
+                *_scene(run),
+                *(_polyline(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
+                *_directors(run, k),
+                *(_dots(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
+                *(_names(run) if across == 0 else ()),
+                label(caption, PANEL / 2, top + height + 18, TEXT, fill=INK, text_anchor="middle"),
+            ]
+            at = f"translate({number(GAP + across * (PANEL + GAP))} {number(down + HEAD - top)})"
+            rows.append(tag("g", *panel, transform=at))
+        down += HEAD + height + FOOT
+    return document((0, 0, width, down), _paper(width, down), *rows)
+
+
+def animation_svg(runs: Sequence[Run]) -> str:
+    """The runs side by side, moving for ever; a browser plays it."""
+    width, height = len(runs) * BIG * PANEL + (len(runs) + 1) * GAP, HEAD + BIG * PANEL
+    panels = []
+    for across, run in enumerate(runs):
+        frames = np.unique(np.linspace(0, len(run.times) - 1, FRAMES).round().astype(int))
+        seconds = f"{number(float(run.times[-1]), 3)}s"
+        lines = [([_projected(run.nodes[k, rod]) for k in frames], RODS[rod], 4.0) for rod in range(2)]
+        if run.demonstration == "twisting":
+            ticks = [[_tick(run, k, edge) for k in frames] for edge in range(run.twists.shape[1])]
+            lines += [(tick, RODS[0], 1.6) for tick in ticks]
+        moving = [_polyline(drawn[0], colour, _moves(drawn, seconds), width=wide) for drawn, colour, wide in lines]
+        left = GAP + across * (BIG * PANEL + GAP)
+        panels.append(tag("g", *_title(run), transform=f"translate({number(left)} 0)"))
+        at = f"translate({number(left)} {number(HEAD)}) scale({BIG})"
+        panels.append(tag("g", *_scene(run), *moving, transform=at))
+    return document((0, 0, width, height), _paper(width, height), *panels)
+
+
+def lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
+    """How far rod 2 is behind in the first moments, of the runs in time in which it follows at all."""
+    shown = [one for one in runs if one.step is not None and one.follows]
+    looks = dict(zip(dict.fromkeys(one.name for one in shown), LOOKS, strict=False))
+    lags = np.concatenate([np.degrees(one.lag[one.times <= until]) for one in shown])
+    low, high = float(lags.min()), 1.08 * float(lags.max())
+    demonstrations = list(dict.fromkeys(one.demonstration for one in shown))
+    width, height = EDGE_OF_CHART + len(demonstrations) * (CHART[0] + EDGE_OF_CHART), CHART[1] + HEAD + 66
+    parts = [_paper(width, height)]
+    for across, demonstration in enumerate(demonstrations):
+        mine = [one for one in shown if one.demonstration == demonstration]
+        left = EDGE_OF_CHART + across * (CHART[0] + EDGE_OF_CHART)
+        chart = _chart(mine, looks, until, low, high)
+        title = label(TITLES[demonstration], 0, 20 - HEAD, TEXT + 1, fill=INK)
+        parts.append(tag("g", title, *chart, transform=f"translate({number(left)} {number(HEAD)})"))
+    for k, (name, (colour, dash)) in enumerate(looks.items()):
+        x, y = EDGE_OF_CHART + 190 * k, height - 12
+        line = np.array([[x, y - 4], [x + 26, y - 4]])
+        parts += [_polyline(line, colour, width=1.8, dash=dash), label(name, x + 32, y, TEXT, fill=INK)]
+    return document((0, 0, width, height), *parts)
+
+
+def _chart(runs: Sequence[Run], looks: dict[str, tuple[str, str]], until: float, low: float, high: float) -> list[str]:
+    """Lag [degrees] against time [s]; the chart's corner is at (0, 0)."""
+    wide, tall = CHART
+
+    def height_of(value: float) -> float:
+        return tall * (high - value) / (high - low)
+
+    parts = [label("lag of rod 2, degrees", 0, 37 - HEAD, TEXT, fill=SOFT)]
+    for tick in nice_ticks(low, high, 5):
+        y, shown = height_of(tick), number(tick, 3).replace("-", "\N{MINUS SIGN}")
+        parts.append(tag("line", x1=0, y1=y, x2=wide, y2=y, stroke=FAINT, stroke_width=0.8))
+        parts.append(label(shown, -6, y + 4, TEXT, fill=SOFT, text_anchor="end"))
+    for tick in nice_ticks(0, until, 4):
+        x = wide * tick / until
+        parts.append(label(number(tick, 3), x, tall + 18, TEXT, fill=SOFT, text_anchor="middle"))
+    parts.append(label("time, s", wide, tall + 34, TEXT, fill=SOFT, text_anchor="end"))
+    for one in runs:
+        early, (colour, dash) = one.times <= until, looks[one.name]
+        heights = [height_of(value) for value in np.degrees(one.lag[early])]
+        line = np.column_stack([wide * one.times[early] / until, heights])
+        parts.append(_polyline(line, colour, width=1.8, dash=dash))
+    return parts
+
+
+def _title(run: Run) -> list[str]:
+    says = f"{run.joint}, {run.coupling}: rod 2 {'follows' if run.follows else 'stays behind'}"
+    return [
+        label(TITLES[run.demonstration], 0, 20, TEXT, fill=INK),
+        label(says, 0, 37, TEXT, fill=SOFT),
+    ]
+
+
+def _projected(points: Floats) -> Floats:
+    """(n, 2) drawing coordinates, y down, of points (n, 3) [m]; the joint is at the middle of a panel."""
+    return np.asarray(0.5 * PANEL + SCALE * np.column_stack([points @ RIGHT, -points @ UP]))
+
+
+def _paper(width: float, height: float) -> str:
+    return tag("rect", x=0, y=0, width=width, height=height, fill=PAPER)
+
+
+def _extent(run: Run) -> tuple[float, float]:
+    """Top and height of all that is drawn of a run."""
+    circle = _projected(_circle(run))[:, 1]
+    drawn = np.append(circle, _projected(run.nodes.reshape(-1, 3))[:, 1])
+    return float(drawn.min()) - 8, float(np.ptp(drawn)) + 16
+
+
+def _circle(run: Run) -> Floats:
+    """(n, 3) way of rod 2's ends."""
+    angle = np.linspace(0, 2 * np.pi, 73)
+    cos, sin, zero = 0.5 * LENGTH * np.cos(angle), 0.5 * LENGTH * np.sin(angle), np.zeros_like(angle)
+    return np.column_stack([zero, cos, sin] if run.demonstration == "twisting" else [cos, sin, zero])
+
+
+def _scene(run: Run) -> list[str]:
+    """What does not move: where the rods start, and the circle of their ends."""
+    still = [_polyline(_projected(_circle(run)), FAINT, width=1.0)]
+    moving = (0, 1) if run.demonstration == "bending" else (1,)
+    return still + [_polyline(_projected(run.nodes[0, rod]), FAINT, width=3.0) for rod in moving]
+
+
+def _tick(run: Run, k: int, edge: int) -> Floats:
+    """(2, 2) the first director of an edge of rod 1, which lies along -x as long as it is only twisted."""
+    middle = run.nodes[k, 0, edge : edge + 2].mean(axis=0)
+    angle = run.twists[k, edge]
+    director = np.array([0.0, np.sin(angle), np.cos(angle)])
+    return _projected(np.array([middle, middle + 0.55 * EDGE * director]))
+
+
+def _directors(run: Run, k: int) -> list[str]:
+    if run.demonstration != "twisting":
+        return []
+    return [_polyline(_tick(run, k, edge), RODS[0], width=1.6) for edge in range(run.twists.shape[1])]
+
+
+def _names(run: Run) -> list[str]:
+    """Labels of the first nodes of both rods."""
+    parts = []
+    for rod, name in enumerate(("x\u2081\u2081", "x\u2082\u2081")):
+        first, second = _projected(run.nodes[0, rod, :2])
+        out = first + 12 * (first - second) / np.linalg.norm(first - second)
+        parts.append(label(name, out[0], out[1] + 4, TEXT, fill=RODS[rod], text_anchor="middle"))
+    return parts
+
+
+def _points(points: Floats) -> str:
+    return " ".join(f"{number(x)},{number(y)}" for x, y in points)
+
+
+def _polyline(points: Floats, colour: str, *children: str, width: float = 4.0, dash: str = "none") -> str:
+    return tag(
+        "polyline", *children, points=_points(points), fill="none", stroke=colour, stroke_width=width,
+        stroke_linecap="round", stroke_linejoin="round", stroke_dasharray=dash,
+    )  # fmt: skip
+
+
+def _dots(points: Floats, colour: str) -> str:
+    return "".join(tag("circle", cx=x, cy=y, r=3.6, fill=PAPER, stroke=colour, stroke_width=1.5) for x, y in points)
+
+
+def _moves(drawn: Sequence[Floats], seconds: str) -> str:
+    values = ";".join(_points(points) for points in drawn)
+    return tag("animate", attributeName="points", values=values, dur=seconds, repeatCount="indefinite")

@@ -1,0 +1,140 @@
+"""Stretch of an edge [HQK Eq 1a]: E = (N0 eps + EA/2 eps^2) |e0|, eps = |e|/|e0| - 1.
+
+N0 = 0 is the paper's elastic edge. With a multiplier N0 it is the augmented Lagrangian of an inextensible
+edge: at the solution the strain vanishes and N0 is the axial force.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numba as nb
+import numpy as np
+
+from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Elastic edges.
+
+    Parameters
+    ----------
+    blocks : (e, 2) nodes of each edge.
+    rest_lengths : (e,) [m].
+    stiffness : (e,) EA [N].
+    multipliers : (e,) N0 [N].
+    forces : (e,) axial forces [N] of the geometric stiffness in the Hessian; None takes N0 + EA eps, which
+        makes the Hessian exact. A solver that carries the forces as unknowns gives its own.
+    """
+
+    blocks: Ints
+    rest_lengths: Floats
+    stiffness: Floats
+    multipliers: Floats
+    forces: Floats | None = None
+
+    @staticmethod
+    def elastic(blocks: Ints, rest_lengths: Floats, stiffness: Floats) -> "Stretch":
+        """The paper's elastic edges."""
+        return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
+
+    def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
+        return replace(self, forces=forces, multipliers=self.multipliers if multipliers is None else multipliers)
+
+    def strains(self, state: Floats) -> Floats:
+        """(e,) axial strains [-]."""
+        return _strains(state, self.blocks, self.rest_lengths)
+
+    def elongation(self, state: Floats, motion: Floats) -> Floats:
+        """(e,) change of the strains [-] to first order for displacements (N, 3) [m]."""
+        return _elongation(state, motion, self.blocks, self.rest_lengths)
+
+    def add_axial(self, state: Floats, forces: Floats, gradient: Floats) -> None:
+        """Add the gradient [N] of edges that carry the axial forces (e,) [N]."""
+        _add_axial(state, self.blocks, forces, gradient)
+
+    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        own = self.forces is None
+        forces = self.rest_lengths if self.forces is None else self.forces
+        return float(
+            _stretch(
+                state, self.blocks, self.rest_lengths, self.stiffness, self.multipliers, forces, own, gradient, hessians
+            )
+        )
+
+    def refreshed(self, state: Floats) -> Self:
+        return self
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _stretch(x, edges, rest, stiffness, multipliers, forces, own, gradient, hessians):  # type: ignore[no-untyped-def]
+    """Stencil (x_a, x_b) [m]; energies [J], from HQK Eq 1a."""
+    wanted = hessians.shape[0] > 0
+    energy = 0.0
+    for e in range(edges.shape[0]):
+        a, b = edges[e, 0], edges[e, 1]
+        d0, d1, d2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        strain = length / rest[e] - 1.0
+        energy += (multipliers[e] + 0.5 * stiffness[e] * strain) * strain * rest[e]
+        force = multipliers[e] + stiffness[e] * strain
+        t0, t1, t2 = d0 / length, d1 / length, d2 / length
+        gradient[a, 0] -= force * t0
+        gradient[a, 1] -= force * t1
+        gradient[a, 2] -= force * t2
+        gradient[b, 0] += force * t0
+        gradient[b, 1] += force * t1
+        gradient[b, 2] += force * t2
+        if wanted:
+            across = (force if own else forces[e]) / length  # geometric stiffness
+            along = stiffness[e] / rest[e] - across
+            t = (t0, t1, t2)
+            for i in range(3):
+                for j in range(3):
+                    value = along * t[i] * t[j]
+                    if i == j:
+                        value += across
+                    hessians[e, i, j] = value
+                    hessians[e, i + 3, j + 3] = value
+                    hessians[e, i, j + 3] = -value
+                    hessians[e, i + 3, j] = -value
+    return energy
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
+    result = np.empty(len(edges))
+    for e in range(len(edges)):
+        square = 0.0
+        for k in range(3):
+            square += (x[edges[e, 1], k] - x[edges[e, 0], k]) ** 2
+        result[e] = np.sqrt(square) / rest[e] - 1.0
+    return result
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
+    result = np.empty(len(edges))
+    for e in range(len(edges)):
+        a, b = edges[e, 0], edges[e, 1]
+        square, along = 0.0, 0.0
+        for k in range(3):
+            d = x[b, k] - x[a, k]
+            square += d * d
+            along += d * (motion[b, k] - motion[a, k])
+        result[e] = along / (np.sqrt(square) * rest[e])
+    return result
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _add_axial(x, edges, forces, gradient):  # type: ignore[no-untyped-def]
+    for e in range(len(edges)):
+        a, b = edges[e, 0], edges[e, 1]
+        square = 0.0
+        for k in range(3):
+            square += (x[b, k] - x[a, k]) ** 2
+        share = forces[e] / np.sqrt(square)
+        for k in range(3):
+            pull = share * (x[b, k] - x[a, k])
+            gradient[b, k] += pull
+            gradient[a, k] -= pull

@@ -1,0 +1,237 @@
+"""The dense work on a front: elimination of its pivots, the update of what is left, and the two substitutions.
+
+A front is stored row after row, its rows padded to a multiple of `PAD` numbers. Memory comes from `room`: kernels read
+up to a register past the end of what they need, and begin where a register would.
+"""
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.solve.tiles import BYTES, LANES, REGISTERS, ROWS, adding, eliminating, multiplying, subtracting
+
+Floats = NDArray[np.float64]
+
+PAD = 8  # numbers in the largest register
+BLOCK = 32  # pivots after which all rows below are updated
+DEPTH = 128  # pivots whose rows are multiplied at a time: so many stay in the nearest cache
+TALL = 48  # rows of a product from which on they are laid side by side first
+
+_WIDE = LANES * REGISTERS
+_FACTORS = ROWS * LANES  # where they lie in the workspace, behind the rows they are found from
+_PACKED = 2 * _FACTORS  # where rows are laid side by side
+
+_subtract_43, _subtract_42, _subtract_41 = (subtracting(ROWS, k) for k in (3, 2, 1))
+_subtract_13, _subtract_12, _subtract_11 = (subtracting(1, k) for k in (3, 2, 1))
+_eliminate_43, _eliminate_42, _eliminate_41 = (eliminating(ROWS, k) for k in (3, 2, 1))
+_eliminate_13, _eliminate_12, _eliminate_11 = (eliminating(1, k) for k in (3, 2, 1))
+_multiply_4, _multiply_1 = multiplying(ROWS), multiplying(1)
+_add = adding()
+
+
+def room(numbers: int) -> Floats:
+    """Memory for so many numbers, and a register's more."""
+    memory = np.empty(numbers + 2 * PAD)
+    begin = -(memory.ctypes.data // BYTES) % PAD
+    return memory[begin : begin + numbers + PAD]
+
+
+def workspace(largest: int) -> Floats:
+    """What `eliminate` and `subtract_product` need for fronts of up to `largest` rows."""
+    return room(_PACKED + DEPTH * (largest + ROWS))
+
+
+@nb.njit(cache=True, inline="always")
+def padded(length):  # type: ignore[no-untyped-def]
+    """The length of a row with its padding."""
+    return (length + PAD - 1) // PAD * PAD
+
+
+@nb.njit(cache=True, inline="always")
+def _place(matrix, row, column):  # type: ignore[no-untyped-def]
+    """The address of an element."""
+    return matrix.ctypes.data + row * matrix.strides[0] + column * BYTES
+
+
+@nb.njit(cache=True, error_model="numpy")
+def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
+    """Eliminate the pivots of a front: D L^T in `rows` (own, stride), which holds the front's upper triangle before;
+    L^T in `panel` (own, stride), D in `pivots` (own,). False where a pivot vanishes or is not finite."""
+    own = len(rows)
+    for begin in range(0, own, BLOCK):
+        end = min(begin + BLOCK, own)
+        k = begin
+        while k < end:
+            count = ROWS if k + ROWS <= end else 1
+            if not _find_factors(rows, panel, begin, k, count, pivots, work):
+                return False
+            _eliminate_rows(rows, panel, begin, k, count, work)
+            k += count
+        if end < own:
+            subtract_product(panel, rows, begin, end, end, 1, rows[end:, end:], work)
+    return True
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _find_factors(rows, panel, begin, k, count, pivots, work):  # type: ignore[no-untyped-def]
+    """The `count` pivots from k on, and in the workspace the factors that the kernel asks for."""
+    left, stride = k // LANES * LANES, rows.shape[1]
+    for r in range(count):
+        for c in range(LANES):
+            work[r * LANES + c] = rows[k + r, left + c]
+    _subtract(
+        count, 1, work.ctypes.data, LANES, _place(panel, begin, k), stride, _place(rows, begin, left), stride,
+        k - begin, 1,
+    )  # fmt: skip
+    at, here = _FACTORS, k - left
+    for r in range(count):
+        for above in range(r):
+            factor = work[above * LANES + here + r] / pivots[k + above]
+            for c in range(here + r, here + count):
+                work[r * LANES + c] -= factor * work[above * LANES + c]
+            work[at] = -factor
+            at += 1
+        pivot = work[r * LANES + here + r]
+        if not (np.isfinite(pivot) and np.isfinite(1.0 / pivot)):
+            return False
+        pivots[k + r], work[at] = pivot, 1.0 / pivot
+        at += 1
+    return True
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-untyped-def]
+    """The rows of `count` pivots from k on, whose factors are known, after those of the pivots from `begin` on."""
+    stride, depth = rows.shape[1], k - begin
+    a, factors = _place(panel, begin, k), work.ctypes.data + _FACTORS * BYTES
+    for j in range(k // LANES * LANES, stride, _WIDE):
+        registers = min(REGISTERS, (stride - j) // LANES)
+        b, c, d = _place(rows, begin, j), _place(rows, k, j), _place(panel, k, j)
+        if count == ROWS:
+            if registers == 3:
+                _eliminate_43(c, d, a, b, stride, depth, factors)
+            elif registers == 2:
+                _eliminate_42(c, d, a, b, stride, depth, factors)
+            else:
+                _eliminate_41(c, d, a, b, stride, depth, factors)
+        elif registers == 3:
+            _eliminate_13(c, d, a, b, stride, depth, factors)
+        elif registers == 2:
+            _eliminate_12(c, d, a, b, stride, depth, factors)
+        else:
+            _eliminate_11(c, d, a, b, stride, depth, factors)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def subtract_product(panel, rows, begin, end, first, keep, target, work):  # type: ignore[no-untyped-def]
+    """target = keep target - panel[begin:end, first:]^T rows[begin:end, first:], but for what is below the diagonal.
+
+    Parameters
+    ----------
+    panel, rows : (own, stride).
+    keep : 0 or 1.
+    target : (n, m), for as many columns from `first` on.
+    work : `workspace`.
+    """
+    n, m = target.shape
+    for start in range(begin, end, DEPTH):
+        depth, a, step, apart = min(DEPTH, end - start), _place(panel, start, first), panel.shape[1], 1
+        if n >= TALL:
+            _pack(panel, start, depth, first, n, work)
+            a, step, apart = work.ctypes.data + _PACKED * BYTES, ROWS, depth
+        for j in range(0, m, _WIDE):
+            registers, b = min(REGISTERS, (m - j + LANES - 1) // LANES), _place(rows, start, first + j)
+            for i in range(0, min(n, j + _WIDE), ROWS):
+                _subtract(
+                    min(ROWS, n - i), registers, _place(target, i, j), target.strides[0] // BYTES,
+                    a + i * apart * BYTES, step, b, rows.shape[1], depth, keep,
+                )  # fmt: skip
+        keep = 1
+
+
+@nb.njit(cache=True)
+def _pack(panel, start, depth, first, n, work):  # type: ignore[no-untyped-def]
+    """`n` columns of the panel into the workspace, `ROWS` at a time side by side."""
+    at = _PACKED
+    for i in range(first, first + n, ROWS):
+        wide = min(ROWS, first + n - i)
+        for k in range(start, start + depth):
+            for r in range(wide):
+                work[at + r] = panel[k, i + r]
+            at += ROWS
+
+
+@nb.njit(cache=True, inline="always")
+def _subtract(rows, registers, c, stride_c, a, stride_a, b, stride_b, depth, keep):  # type: ignore[no-untyped-def]
+    """A tile; one of fewer rows row by row."""
+    for _ in range(1 if rows == ROWS else rows):
+        if rows == ROWS:
+            if registers == 3:
+                _subtract_43(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+            elif registers == 2:
+                _subtract_42(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+            else:
+                _subtract_41(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        elif registers == 3:
+            _subtract_13(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        elif registers == 2:
+            _subtract_12(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        else:
+            _subtract_11(c, stride_c, a, stride_a, b, stride_b, depth, keep)
+        c, a = c + stride_c * BYTES, a + BYTES
+
+
+@nb.njit(cache=True)
+def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
+    """Add to the rows from `begin` to `end` of a front, whose columns from `begin` on are `target`, what a child's
+    update matrix has for them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to."""
+    count = len(runs)
+    for low in range(count):
+        past = runs[low + 1, 0] if low + 1 < count else len(update)
+        shift = runs[low, 1] - runs[low, 0] - begin
+        for i in range(max(runs[low, 0], -shift), min(past, end - begin - shift)):
+            _add(_place(target, i + shift, i + shift), _place(update, i, i), past - i)
+            for high in range(low + 1, count):
+                first, stop = runs[high, 0], runs[high + 1, 0] if high + 1 < count else len(update)
+                _add(_place(target, i + shift, runs[high, 1] - begin), _place(update, i, first), stop - first)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def forward(panel, values, aside):  # type: ignore[no-untyped-def]
+    """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
+    what that takes. `aside` (own,) is scratch."""
+    own, stride = panel.shape
+    for k in range(own):
+        value, row = values[k], panel[k]
+        for i in range(k + 1, own):
+            values[i] -= row[i] * value
+    aside[:own] = values[:own]
+    begin = own // LANES * LANES
+    for j in range(begin, stride, _WIDE):
+        _subtract(
+            1, min(REGISTERS, (stride - j) // LANES), values.ctypes.data + j * BYTES, stride, aside.ctypes.data, 1,
+            _place(panel, 0, j), stride, own, 1,
+        )  # fmt: skip
+    values[begin:own] = aside[begin:own]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
+    """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the padding
+    of the panel itself is 0. `aside` (2 own,) is scratch."""
+    own, stride = panel.shape
+    begin = own // LANES * LANES
+    for k in range(own):
+        aside[k] = values[k] / pivots[k]
+    values[begin:own] = 0.0
+    x, count = values.ctypes.data + begin * BYTES, stride - begin
+    whole = own // ROWS * ROWS
+    for k in range(0, whole, ROWS):
+        _multiply_4(aside.ctypes.data + (own + k) * BYTES, _place(panel, k, begin), stride, x, count)
+    for k in range(whole, own):
+        _multiply_1(aside.ctypes.data + (own + k) * BYTES, _place(panel, k, begin), stride, x, count)
+    for k in range(own - 1, -1, -1):
+        value, row = aside[k] - aside[own + k], panel[k]
+        for i in range(k + 1, own):
+            value -= row[i] * values[i]
+        values[k] = value

@@ -1,0 +1,149 @@
+"""Static equilibrium by Newton's method with the axial forces as unknowns.
+
+Stiff edges make the plain Newton method crawl: the geometric stiffness of an axial force EA eps evaluated at
+a strain that is not yet equilibrated is wild. Here each edge carries its force N as an unknown, updated with
+the linearised strain; the same iteration serves elastic edges (N = EA eps at the end) and inextensible ones
+(eps = 0 at the end, EA being a penalty that any size serves). On a curved constraint it is the SQP method on
+a manifold: steps in the tangent directions, the constraint's curvature in the Hessian, a retraction after.
+
+The steps are those of `newton_step`.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.rods.elements import Elements
+from rodshell.solve.linear import SingularError
+from rodshell.solve.newton_step import NewtonStep
+from rodshell.solve.problem import Pattern, Problem
+from rodshell.solve.report import SolveReport, Status
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, float], None]
+
+STRAIN_TOLERANCE = 2e-6
+CIRCLES, ALIKE = 12, 1e-3  # steps; and how near to each other
+LONGEST_SLIDE = 120  # iterations off a saddle
+NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state (n, 3), its axial forces (e,) [N], its gradient (n, 3) [N] without constraint forces, and figures.
+
+    The twist angles of the state belong to the source frames of `elements`, which are at the state. `pattern` serves
+    the next solve of this shell, and keeps the factors alive. Where the state is not stable, `mode` (n, 3) is the
+    direction of the most negative curvature, its largest displacement being 1.
+    """
+
+    state: Floats
+    forces: Floats
+    gradient: Floats
+    report: SolveReport
+    elements: tuple[Elements, ...]
+    pattern: Pattern
+    mode: Floats | None = None
+
+
+def find_equilibrium(
+    problem: Problem,
+    state: Floats,
+    forces: Floats,
+    *,
+    descend: bool = False,
+    cut: bool = False,
+    most_iterations: int = 60,
+    progress: Progress | None = None,
+) -> Equilibrium:
+    """Equilibrium near `state` (n, 3) [m] with axial forces near `forces` (e,) [N].
+
+    Never raises for a solve that does not converge: the report's status says so, and the last state comes with it.
+
+    Parameters
+    ----------
+    descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
+    cut : for a start from afar: cut the steps that were too long. Not on a path, which has steps of its own to cut.
+    """
+    begin = time.perf_counter()
+    step = NewtonStep(problem, state, cut=cut)
+    status, steps = Status.STALLED, list[float]()
+    while step.iterations + step.counts <= most_iterations:
+        new = step.counts
+        try:
+            moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
+        except SingularError:
+            status = Status.DIVERGED
+            break
+        if not (np.isfinite(moved) and np.isfinite(forces_next).all()):
+            status = Status.DIVERGED
+            break
+        state, forces = state_next, forces_next
+        if progress is not None and new:
+            progress(step.iterations, moved / problem.length)
+        if step.settled and mismatch < STRAIN_TOLERANCE:
+            status = Status.CONVERGED
+            break
+        steps.append(moved)
+        if _in_circles(steps):
+            break
+        step.refresh(state)
+    gradient = step.gradient(state, forces)
+    residual = problem.constraint.freedom(state).reduce(gradient)
+    report = SolveReport(
+        status=status,
+        dofs=step.dofs,
+        iterations=step.iterations,
+        factorizations=step.factorizations,
+        seconds=time.perf_counter() - begin,
+        force_residual=float(np.abs(residual).max(initial=0.0)),
+        max_strain=float(np.abs(problem.stretch.strains(state)).max()),
+        negative_modes=step.negative_modes,
+    )
+    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
+    step.refresh(state)
+    return Equilibrium(state, forces, gradient, report, step.elements, step.pattern, mode)
+
+
+def _in_circles(steps: list[float]) -> bool:
+    """Whether the last `CIRCLES` steps are as long as those two before: to and fro between two states, for ever."""
+    last = np.array(steps[-CIRCLES - 2 :])
+    return len(last) == CIRCLES + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+
+
+def find_stable(
+    problem: Problem,
+    state: Floats,
+    forces: Floats,
+    *,
+    cut: bool = False,
+    most_iterations: int = 60,
+    progress: Progress | None = None,
+) -> Equilibrium:
+    """As `find_equilibrium`; where that ends on a saddle, slide off along its mode, to either side in turn.
+
+    Returns the saddle, with its negative modes counted, where neither side leads to a stable equilibrium.
+    The report counts the work of all solves.
+    """
+    first = find_equilibrium(problem, state, forces, cut=cut, most_iterations=most_iterations, progress=progress)
+    tries = [first]
+    if first.mode is not None:
+        for side in (1.0, -1.0):
+            start = first.state + side * NUDGE * problem.length * first.mode
+            tries.append(
+                find_equilibrium(
+                    replace(problem, elements=first.elements, pattern=first.pattern),
+                    start,
+                    first.forces,
+                    descend=True,
+                    most_iterations=min(2 * most_iterations, LONGEST_SLIDE),
+                    progress=progress,
+                )
+            )
+            if tries[-1].report.stable:
+                break
+    best = tries[-1] if tries[-1].report.stable else first
+    return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))

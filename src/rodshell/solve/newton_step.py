@@ -1,0 +1,274 @@
+"""One step of Newton's method with the axial forces as unknowns, and how far to go.
+
+Near the end a factorisation serves for the steps after it, too, which then cost a gradient and a solve (chord steps).
+
+A step along which rods turn by a leaves them strained by a^2/2, with forces that may buckle them. The next
+factorisation tells: where it counts several negative modes more than the one that the step was made with, the step was
+too long, and a part of it is taken instead. It is a trust region, with the modes as its measure: the energy would not
+do, for it jumps with those strains.
+"""
+
+from dataclasses import dataclass, replace
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.rods.elements import NO_HESSIANS, Elements
+from rodshell.solve.linear import SingularError
+from rodshell.solve.problem import Problem, pattern_of
+
+Floats = NDArray[np.float64]
+
+TOLERANCE = 1e-13  # of the length: estimate of the error that is left
+FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces
+LEAST_FORCE = 1e-6  # of EA: axial forces smaller than this are not known better
+CURVED = 20.0  # times the square of Newton's step is left after it: 6 to 23 measured on smooth targets
+LONGEST_STEP = 0.15  # of the length
+PART = 0.25  # of a step that was too long is taken
+LONGER = 2.0  # growth of the longest step after one that was not
+NEAR = 0.02  # of the length: a step this short leads to the equilibrium at hand, be it a saddle,
+NEARER = 0.5  # and at most so much of the last ones: past a limit point nothing is near, and steps do not shrink
+STALE = 1e-3  # of the largest axial force: by more they must not change after the negative modes are counted
+CHORD = 5e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
+SLOW = 0.1  # of the last step: a chord step that is longer is not made
+SHIFT_GROWTH = 8.0
+TINY = 1e-300  # no step is shorter, but for none at all
+
+
+@dataclass(frozen=True)
+class _Stride:
+    """The last step, so that less of it can be taken: from where, at how many negative modes; the whole motion (n, 3),
+    `reach` [m] long, with the change (e,) of the forces; and the share taken of both."""
+
+    state: Floats
+    forces: Floats
+    elements: tuple[Elements, ...]
+    negative_modes: int
+    motion: Floats
+    change: Floats
+    reach: float
+    share: float
+
+
+class NewtonStep:
+    """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
+
+    def __init__(self, problem: Problem, state: Floats, *, cut: bool = False) -> None:
+        self._problem, self._cut = problem, cut
+        self.elements = problem.elements
+        free = problem.constraint.freedom(state)
+        everywhere = np.arange(len(state))[:, None]
+        self._blocks = (*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere)
+        self.pattern = pattern_of(problem, self._blocks, free)
+        self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
+        self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
+        self.dofs = free.size
+        self.iterations = 0
+        self.factorizations = 0
+        self.negative_modes = 0
+        self._shift = 0.0
+        self._longest = LONGEST_STEP
+        self._nearest = np.inf  # the last step that was near
+        self._shifted = False  # the last step was one of the shifted Hessian
+        self._stride: _Stride | None = None
+        self._factored = state, np.empty(0)  # where the matrix is from
+        self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
+        self._chord = self._was_chord = self.settled = False
+
+    @property
+    def counts(self) -> bool:
+        """Whether the next step is an iteration: chord steps in a row stand for one of Newton's."""
+        return not (self._chord and self._was_chord)
+
+    def refresh(self, state: Floats) -> None:
+        self.elements = tuple(element.refreshed(state) for element in self.elements)
+
+    def gradient(self, state: Floats, forces: Floats) -> Floats:
+        """Gradient (n, 3) of energy and load with the given axial forces [N]."""
+        gradient = np.zeros_like(state) if self._problem.load is None else -self._problem.load
+        for element in self.elements:
+            element.evaluate(state, gradient)
+        self._problem.stretch.add_axial(state, forces, gradient)
+        return gradient
+
+    def take(self, state: Floats, forces: Floats, descend: bool) -> tuple[float, Floats, Floats, float]:
+        """Length of the step, the next state and forces, and how far these are from matching the strains."""
+        problem = self._problem
+        if not self._chord:
+            self._factored = state, forces
+        at, strains = self._factored[0], problem.stretch.strains(state)
+        base = forces if problem.inextensible else np.zeros_like(forces)
+        stretch = problem.stretch.with_forces(forces, multipliers=base)
+        self._free = free = problem.constraint.freedom(state)
+        gradient = np.zeros_like(state) if problem.load is None else -problem.load
+        for element, hessians in zip(self.elements, self._hessians, strict=False):
+            element.evaluate(state, gradient, NO_HESSIANS if self._chord else hessians)
+        if self._chord:  # what the edges lack acts along those of the matrix, else strains do not settle
+            stretch.add_axial(state, forces, gradient)
+            stretch.add_axial(at, base + stretch.stiffness * strains - forces, gradient)
+        else:
+            by_force = gradient.copy()
+            stretch.add_axial(state, forces, by_force)
+            stretch.evaluate(state, gradient, self._hessians[-2])
+            curvature = problem.constraint.curvature(state, by_force)
+            self._hessians[-1][:] = curvature if len(curvature) else 0.0
+        prescribed = problem.constraint.remaining(state)
+        if prescribed is not None:
+            gradient += self._times(prescribed)
+        direction = self._direction(-free.reduce(gradient), descend)
+        if direction is None:
+            return self._retreat()
+        motion = free.expand(direction)
+        if prescribed is not None:
+            motion += prescribed
+        reach = float(np.sqrt(np.einsum("ij,ij->i", motion, motion).max()))
+        if self._chord and not reach <= SLOW * self._last[0] * problem.length:  # of no use: Newton's step instead
+            self._chord = False
+            return self.take(state, forces, descend)
+        share = min(1.0, self._longest * problem.length / reach) if reach > 0 else 1.0
+        strains += stretch.elongation(at, motion)
+        change = base + stretch.stiffness * strains - forces
+        stride = _Stride(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
+        state_next, forces_next = self._stridden(stride)
+        left = problem.stretch.strains(state_next)
+        if not problem.inextensible:
+            left = left - forces_next / problem.stretch.stiffness
+        self._judge(reach / problem.length, forces, forces_next)
+        return reach, state_next, forces_next, float(np.abs(left).max())
+
+    def _stridden(self, stride: _Stride) -> tuple[Floats, Floats]:
+        """State and forces after a step."""
+        self._stride = stride
+        state = self._problem.constraint.retract(stride.state + stride.share * stride.motion)
+        return state, stride.forces + stride.share * stride.change
+
+    def _retreat(self) -> tuple[float, Floats, Floats, float]:
+        """As `take`, for a part of the last step in its place: no iteration of its own."""
+        assert self._stride is not None
+        stride = replace(self._stride, share=PART * self._stride.share)
+        moved, self.elements = stride.share * stride.reach, stride.elements
+        self._longest = moved / self._problem.length
+        return moved, *self._stridden(stride), np.inf
+
+    def _near(self, moved: float) -> bool:
+        """Whether a step of Newton's so long leads to the equilibrium at hand, be it a saddle."""
+        before = min(self._nearest, np.inf if self._shifted else self._last[0]) if self._cut else np.inf
+        near = moved < min(NEAR, NEARER * before)
+        if near:
+            self._nearest = moved
+        return near
+
+    def _too_far(self) -> bool:
+        """Whether the last step was not short and led to more negative modes than it began with: by several, which are
+        rods that buckle; one more is a saddle on the way."""
+        last = self._stride
+        if last is None or not self._cut or self.negative_modes <= last.negative_modes + 1:
+            return False
+        return last.share * last.reach > NEAR * self._problem.length
+
+    def _judge(self, moved: float, before: Floats, after: Floats) -> None:
+        """Whether the error that is left is small enough, and whether the factorisation serves for another step.
+
+        After Newton's step the error is about its square; after a chord step it shrinks as from the last step to this.
+        The last factorisation is made where the forces are nearly those of the equilibrium: it counts its modes.
+        """
+        self.iterations += self.counts
+        size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE * float(self._problem.stretch.stiffness.max()))
+        changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
+        shrunk = moved / max(self._last[0], TINY), changed / max(self._last[1], TINY)
+        rates = shrunk if self._chord else (max(CURVED * moved, changed), changed)
+        self.settled = moved * rates[0] < TOLERANCE and changed * rates[1] < FORCE_TOLERANCE and since < STALE
+        self._was_chord, self._last = self._chord, (moved, changed)
+        count_again = since >= STALE > changed / 3
+        self._chord = moved < CHORD and not count_again and not self.negative_modes
+
+    def _times(self, motion: Floats) -> Floats:
+        """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""
+        result = np.zeros_like(motion)
+        for hessians, blocks in zip(self._hessians, self._blocks, strict=True):
+            _add_product(hessians, blocks, motion, result)
+        return result
+
+    def lowest_mode(self) -> Floats:
+        """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated."""
+        self._shift_until_definite()
+        mode = self._free.expand(self._inverse_iteration(12)[0])
+        return mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max())
+
+    def _direction(self, right: Floats, descend: bool) -> Floats | None:
+        """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
+        where the step that led there was too long."""
+        if self._chord:
+            return self._solver.solve(right)
+        self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
+        regular = self._count_negative_modes()
+        if self.negative_modes and regular and not descend:
+            step = self._solver.solve(right)
+            if self._near(float(np.abs(step).max()) / self._problem.length):
+                self._shifted = False
+                return step
+        if self._too_far():
+            return None
+        self._longest = min(LONGER * self._longest, LONGEST_STEP)
+        self._shifted = self.negative_modes > 0
+        if self.negative_modes:
+            self._shift_until_definite()
+        return self._solver.solve(right)
+
+    def _count_negative_modes(self) -> bool:
+        """Factorise the Hessian; whether that can be done. A mode without stiffness counts as a negative one."""
+        self.factorizations += 1
+        try:
+            self.negative_modes = self._solver.factor(self._data)
+        except SingularError:
+            if not np.isfinite(self._data).all():
+                raise
+            self.negative_modes = 1
+            return False
+        return True
+
+    def _shift_until_definite(self) -> None:
+        """Factorise with the diagonal shifted by about twice the most negative eigenvalue.
+
+        A Newton step then doubles what the state has of its mode. The search begins where a wave as long as the
+        shell is soft against the bending of an edge, or below the last shift that sufficed.
+        """
+        bending = self._hessians[0]
+        slender = float(self._problem.stretch.rest_lengths.mean()) / self._problem.length
+        softest = slender**4 * float(np.trace(bending, axis1=1, axis2=2).mean()) / bending.shape[1]
+        shift, tries = max(softest, self._shift / SHIFT_GROWTH), 0
+        while self._factor_shifted(shift) and tries < 40:
+            shift, tries = SHIFT_GROWTH * shift, tries + 1
+        lowest = self._inverse_iteration(4)[1] - shift
+        if 0.0 < -2.0 * lowest < 0.5 * shift and not self._factor_shifted(-2.0 * lowest):
+            shift = -2.0 * lowest
+        self._shift = shift
+
+    def _factor_shifted(self, shift: float) -> int:
+        shifted = self._data.copy()
+        shifted[self._assembly.diagonal] += shift
+        self.factorizations += 1
+        return self._solver.factor(shifted)
+
+    def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
+        """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
+        v = np.sin(1.0 + np.arange(self._free.size) ** 2)  # no symmetry of the shell is one of this start
+        for _ in range(steps):
+            v /= np.linalg.norm(v)
+            image = self._solver.solve(v)
+            smallest = 1.0 / float(v @ image)
+            v = image
+        return v, smallest
+
+
+@nb.njit(cache=True)
+def _add_product(hessians, blocks, motion, result):  # type: ignore[no-untyped-def]
+    """Add to `result` (n, 3) what elements with `hessians` (m, 3k, 3k) on `blocks` (m, k) make of displacements."""
+    for m in range(blocks.shape[0]):
+        for a in range(blocks.shape[1]):
+            for b in range(blocks.shape[1]):
+                i, j = blocks[m, a], blocks[m, b]
+                for k in range(3):
+                    for d in range(3):
+                        result[i, k] += hessians[m, 3 * a + k, 3 * b + d] * motion[j, d]

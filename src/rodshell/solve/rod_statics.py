@@ -1,0 +1,310 @@
+"""Equilibrium of one rod: what is held, where it goes, what pulls; followed by steps from a start to the goal.
+
+Two things set a rod apart from a shell. Lengths and angles are unknowns of one system: the solver sees lengths as
+shares of the rod's own, so that neither the unit nor the size of the rod decides how far a step goes. And the energies
+change along the way, where natural strains are let go bit by bit, so that `follow` does not serve.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rodshell.errors import ConvergenceError, InputError
+from rodshell.geometry.given import finite, vector
+from rodshell.geometry.vectors import cross, unit
+from rodshell.model.elastic_rod import ElasticRod, RodStrains
+from rodshell.model.freedom import Freedom
+from rodshell.model.rod_line import End
+from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.elements import Elements
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import NUDGE, Equilibrium, find_equilibrium
+from rodshell.solve.problem import Problem
+from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.rod_supports import RodSupports, SupportPath, index_of
+
+Floats = NDArray[np.float64]
+_NONE: Mapping[int, ArrayLike] = {}
+
+EASY = 6  # a step of no more iterations may be followed by a longer one
+MOST, MOST_DOWN = 40, 320  # iterations of a step; on the way down from a saddle
+SMALLEST_STEP = 1e-3
+NEUTRAL = 1e-6  # a mode of less than this of EI/L, the rod moving by its length, is one that nothing resists, such as
+# the turn of a round rod's bow about the line of its clamps: round-off chooses its sign
+
+
+@dataclass(frozen=True)
+class RodShape:
+    """A rod in equilibrium.
+
+    Parameters
+    ----------
+    rod : with its source frames at `state`, so that a further solve can start here.
+    state : (N, 3) blocks.
+    axial_forces : (edges,) [N].
+    load : (N, 3) what it carries [N, at angles N m].
+    reactions : (N, 3) of the supports [N, at angles N m]; zero where nothing is held.
+    report : iterations, residual, and whether the equilibrium is stable.
+    """
+
+    rod: ElasticRod
+    state: Floats
+    axial_forces: Floats
+    load: Floats
+    reactions: Floats
+    report: SolveReport
+
+    @property
+    def positions(self) -> Floats:
+        """(n, 3) of the nodes [m]."""
+        return self.state[self.rod.nodes]
+
+    @property
+    def angles(self) -> Floats:
+        """(edges,) twist angles [rad]."""
+        return self.state[self.rod.angles, 0]
+
+    @property
+    def frames(self) -> Floats:
+        """(edges, 3, 3) rows m1, m2, t of each edge."""
+        return self.rod.material_frames(self.state)
+
+    @property
+    def strains(self) -> RodStrains:
+        return self.rod.strains(self.state)
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy [J]."""
+        return self.rod.energy(self.state)
+
+    def support(self, end: End) -> tuple[Floats, Floats]:
+        """Force (3,) [N], and moment (3,) [N m] about the end, that a clamp puts on the rod."""
+        k = self.rod.clamps.index(end)
+        node, ghost = self.rod.clamped_nodes[k], self.rod.ghosts[k]
+        lever, pull = self.state[ghost] - self.state[node], self.reactions[ghost]
+        moment = cross(lever, pull)
+        if self.rod.twists:
+            along = unit(lever) * (-1.0 if end == "start" else 1.0)
+            moment = moment + self.reactions[self.rod.ghost_angles[k], 0] * along
+        return self.reactions[node] + pull, moment
+
+
+def solve_rod(
+    rod: ElasticRod,
+    *,
+    start: ArrayLike | RodShape | None = None,
+    positions: Mapping[int, ArrayLike | None] = _NONE,
+    along: Mapping[int, Sequence[tuple[float, float, float]]] | None = None,
+    tangents: Mapping[End, ArrayLike] | None = None,
+    directors: Mapping[End, ArrayLike] | None = None,
+    turns: Mapping[End, float] | None = None,
+    spinning: Sequence[End] = (),
+    angles: Mapping[int, float] | None = None,
+    forces: Mapping[int, ArrayLike] | ArrayLike = _NONE,
+    moments: Mapping[int | End, float] | None = None,
+    gravity: ArrayLike | None = None,
+    steps: int = 1,
+    stable: bool = True,
+) -> RodShape:
+    """Equilibrium of a rod, followed from `start` while supports and loads go to the goals given here.
+
+    Parameters
+    ----------
+    start : a state (N, 3), or a shape found before (then `rod` is shape.rod); by default the rest shape. What held
+        it is let go bit by bit, unless it is given again: the loads and supports of a shape; of a state, natural
+        strains go from what they are there to the rod's own, and forces that hold what is left fade.
+    positions : node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
+    along : node -> orthonormal directions along which alone it is free.
+    tangents : clamped end -> tangent (3,) along the rod there. Clamps that are not named stay as they are.
+    directors : clamped end -> first material director m1 (3,) there; its part across the tangent is used.
+    turns : clamped end -> how far it turns about its tangent [rad], on top of that; more than once around if so given.
+    spinning : clamped ends that hold position and direction but let the rod spin.
+    angles : edge -> twist angle that it is held at [rad].
+    forces : node -> dead force (3,) [N]; or (n, 3), one for each node.
+    moments : edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
+        the twist angle, counted from frames carried from the last step's shape.
+    gravity : acceleration (3,) [m/s2].
+    steps : equal steps to begin with; they halve where the solver fails and grow back.
+        Where ends travel far in a step, the solver can land on another branch than the one that a rod would
+        follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
+        twice as many end with the same energy.
+    stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path goes on
+        over saddles, and the report counts the negative modes at its end.
+
+    A rod that nothing keeps from spinning about itself is held at its first edge's angle.
+
+    Raises
+    ------
+    InputError : a support or a load that this rod does not have.
+    ConvergenceError : the goal was not reached, or not in a stable equilibrium; `report` holds the figures.
+    """
+    if not (isinstance(steps, int) and steps >= 1):
+        raise InputError(f"a path takes 1, 2, ... steps, not {steps}")
+    came = start if isinstance(start, RodShape) else None
+    state = came.state if came else rod.state() if start is None else np.array(start, dtype=float)
+    if came and came.rod is not rod:
+        raise InputError("twist angles belong to their frames: go on from a shape with its own rod, shape.rod")
+    if state.shape != (rod.block_count, 3):
+        raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
+    finite("the state to start from", state, *state.shape)
+    wanted = RodSupports(positions, along or {}, tangents or {}, directors or {}, turns or {}, spinning, angles or {})
+    path = SupportPath.of(rod, state, wanted)
+    load = _load(rod, forces, moments or {}, gravity, spinning)
+    if path.holds_spin and load[rod.angles.start :, 0].any():
+        raise InputError("nothing keeps this rod from spinning under its moments: hold an angle, or clamp an end")
+    axial = came.axial_forces if came else rod.stretch.stiffness * rod.stretch.strains(state)
+    held = () if came else tuple(_stress_free(element, state) for element in rod.elements)
+    before = _gradient(held or rod.elements, rod, state, axial)  # this load makes the start an equilibrium
+    scale = _scale(rod)
+    t, step = 0.0, 1.0 / steps
+    reports = list[SolveReport]()
+    while t < 1.0:
+        there = min(1.0, t + step)
+        if 1.0 - there < 1e-9:
+            there = 1.0
+        pulls = (1 - there) * before + there * load
+        problem = _problem(rod, _released(held, rod.elements, there), path.at(there), pulls)
+        found = _next(problem, rod.bend_energy, state / scale, axial * rod.length, slide=stable)
+        reports.append(found.report)
+        if found.report.converged:
+            t, state, axial = there, found.state * scale, found.forces / rod.length
+            rod = replace(rod, elements=_released(rod.elements, found.elements, 0.0))
+            if found.report.iterations <= EASY:
+                step *= 1.6
+        else:
+            step = 0.4 * min(step, there - t)
+            if step < SMALLEST_STEP:
+                report = replace(found.report, status=Status.STALLED).after(*reports[:-1])
+                raise ConvergenceError(
+                    f"the rod's equilibrium was lost {100 * t:.1f} % of the way from the start to the goal: "
+                    "give more steps, a finer mesh, or a start nearer to the goal; or hold what is free to move",
+                    report,
+                )
+    report = reports[-1].after(*reports[:-1])
+    if stable and not report.stable:
+        raise ConvergenceError(
+            f"the rod's equilibrium is not stable: {report.negative_modes} negative modes. Start from a shape bent "
+            "to the side that it is to take; or pass stable=False to have it as it is",
+            report,
+        )
+    return _shape(rod, state, axial, load, path.free, report)
+
+
+def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Freedom, report: SolveReport) -> RodShape:
+    gradient = _gradient(rod.elements, rod, state, axial) - load
+    reactions = gradient - free.expand(free.reduce(gradient))
+    residual = float(np.abs(gradient[rod.nodes] - reactions[rod.nodes]).max())
+    return RodShape(rod, state, axial, load, reactions, replace(report, force_residual=residual))
+
+
+def _scale(rod: ElasticRod) -> Floats:
+    """(N, 1) length of the rod at nodes, 1 at angles."""
+    scale = np.ones((rod.block_count, 1))
+    scale[rod.nodes] = scale[rod.ghosts] = rod.length
+    return scale
+
+
+def _problem(rod: ElasticRod, elements: tuple[Elements, ...], supports: Supports, load: Floats) -> Problem:
+    """In lengths measured by the rod's own; energies stay in joule. Bends and twists know no lengths."""
+    stretch = replace(
+        rod.stretch, rest_lengths=rod.stretch.rest_lengths / rod.length, stiffness=rod.stretch.stiffness * rod.length
+    )
+    scale = _scale(rod)
+    return Problem(
+        elements, stretch, replace(supports, goals=supports.goals / scale[supports.moved]), 1.0, load=load * scale
+    )
+
+
+def _next(problem: Problem, bend_energy: float, state: Floats, axial: Floats, *, slide: bool) -> Equilibrium:
+    """The equilibrium next to `state`; if `slide`, from a saddle on along its mode, to either side in turn.
+
+    As `find_stable`, but a mode that nothing resists makes no saddle.
+    """
+    first = best = find_equilibrium(problem, state, axial, most_iterations=MOST)
+    if _is_neutral(problem, first, bend_energy):
+        first = best = replace(first, mode=None, report=replace(first.report, negative_modes=0))
+    reports = [first.report]
+    for side in (1.0, -1.0) if slide and first.mode is not None else ():
+        assert first.mode is not None
+        nudged = first.state + side * NUDGE * first.mode
+        below = replace(problem, elements=first.elements)
+        found = find_equilibrium(below, nudged, first.forces, descend=True, most_iterations=MOST_DOWN)
+        if _is_neutral(problem, found, bend_energy):
+            found = replace(found, mode=None, report=replace(found.report, negative_modes=0))
+        reports.append(found.report)
+        if found.report.stable:
+            best = found
+            break
+    return replace(best, report=best.report.after(*(report for report in reports if report is not best.report)))
+
+
+def _is_neutral(problem: Problem, found: Equilibrium, bend_energy: float) -> bool:
+    """Whether the one negative mode of an equilibrium is round-off: along it the energy does not fall."""
+    if found.mode is None or found.report.negative_modes != 1:
+        return False
+    curvature = 0.0
+    for part in (*found.elements, problem.stretch.with_forces(found.forces)):
+        width = 3 * part.blocks.shape[1]
+        hessians = np.zeros((len(part.blocks), width, width))
+        part.evaluate(found.state, np.zeros_like(found.state), hessians)
+        along = found.mode[part.blocks].reshape(-1, width)
+        curvature += float(np.einsum("mi,mij,mj->", along, hessians, along))
+    return curvature > -NEUTRAL * bend_energy
+
+
+def _stress_free(element: Elements, state: Floats) -> Elements:
+    """The element without stress at `state`, if it has natural strains to choose."""
+    return element.relaxed(state) if isinstance(element, BendTwist) else element
+
+
+def _released(held: tuple[Elements, ...], own: tuple[Elements, ...], t: float) -> tuple[Elements, ...]:
+    """The elements `own`, their natural strains only the share t of the way from those of `held`, if any."""
+    result = list(own)
+    for k, first in enumerate(held):
+        last = own[k]
+        if isinstance(first, BendTwist) and isinstance(last, BendTwist) and t < 1:
+            result[k] = replace(
+                last,
+                natural_curvature=(1 - t) * first.natural_curvature + t * last.natural_curvature,
+                natural_twist=(1 - t) * first.natural_twist + t * last.natural_twist,
+            )
+    return tuple(result)
+
+
+def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, axial: Floats) -> Floats:
+    """(N, 3) of the energy, the edges carrying the axial forces (edges,) [N]."""
+    gradient = np.zeros_like(state)
+    for element in elements:
+        element.evaluate(state, gradient)
+    rod.stretch.add_axial(state, axial, gradient)
+    return gradient
+
+
+def _load(
+    rod: ElasticRod,
+    forces: Mapping[int, ArrayLike] | ArrayLike,
+    moments: Mapping[int | End, float],
+    gravity: ArrayLike | None,
+    spinning: Sequence[End],
+) -> Floats:
+    """(N, 3) dead load [N, at angles N m]."""
+    load = np.zeros((rod.block_count, 3)) if gravity is None else rod.weight(gravity)
+    if isinstance(forces, Mapping):
+        for node, force in forces.items():
+            load[index_of(node, rod.node_count, "node")] += vector(f"the force on node {node}", force)
+    else:
+        load[rod.nodes] += finite("the forces on all nodes", forces, rod.node_count, 3)
+    if moments and not rod.twists:
+        raise InputError("this rod carries no twist angles: build it with twist=True")
+    for place, given in moments.items():
+        moment = finite(f"the moment at {place!r}", given)
+        if isinstance(place, str):
+            if place not in spinning:
+                raise InputError(f'the moment at "{place}" needs a clamp there that spins: spinning=("{place}",)')
+            load[rod.ghost_angles[rod.clamps.index(place)], 0] += moment
+        else:
+            load[rod.node_count + index_of(place, rod.edge_count, "edge"), 0] += moment
+    return load

@@ -1,0 +1,152 @@
+"""Supports of one rod and their way from a start to a goal: held nodes and angles, clamps that turn."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rodshell.errors import InputError
+from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
+from rodshell.geometry.given import direction, finite, vector
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.model.elastic_rod import ElasticRod
+from rodshell.model.freedom import Freedom
+from rodshell.model.rod_line import End
+from rodshell.solve.constraint import Supports
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+SPIN = (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class RodSupports:
+    """The supports as `solve_rod` was given them."""
+
+    positions: Mapping[int, ArrayLike | None]
+    along: Mapping[int, Sequence[tuple[float, float, float]]]
+    tangents: Mapping[End, ArrayLike]
+    directors: Mapping[End, ArrayLike]
+    turns: Mapping[End, float]
+    spinning: Sequence[End]
+    angles: Mapping[int, float]
+
+    def check(self, rod: ElasticRod) -> None:
+        for end in (*self.tangents, *self.directors, *self.turns, *self.spinning):
+            if end not in rod.clamps:
+                raise InputError(f'the rod is not clamped at "{end}": build it with clamped=("{end}",)')
+        for end in self.spinning:
+            if end in self.directors or end in self.turns:
+                raise InputError(f'the clamp at "{end}" cannot both spin and be turned')
+        if (self.directors or self.turns or self.spinning or self.angles) and not rod.twists:
+            raise InputError("this rod carries no twist angles: build it with twist=True")
+
+
+@dataclass(frozen=True)
+class SupportPath:
+    """Where the prescribed blocks are at t from 0 to 1; a clamp's tangent turns along the great circle."""
+
+    free: Freedom
+    moved: Ints
+    first: Floats
+    last: Floats
+    clamps: tuple["_TurningClamp", ...]
+    holds_spin: bool
+
+    @staticmethod
+    def of(rod: ElasticRod, state: Floats, wanted: RodSupports) -> "SupportPath":
+        wanted.check(rod)
+        goals = dict[int, Floats]()
+        for k, node in enumerate(rod.clamped_nodes):
+            goals[int(node)] = state[node]
+            if rod.twists and rod.clamps[k] not in wanted.spinning:
+                goals[int(rod.ghost_angles[k])] = state[rod.ghost_angles[k]]
+        for node, goal in wanted.positions.items():
+            block = index_of(node, rod.node_count, "node")
+            goals[block] = state[block] if goal is None else vector(f"the position of node {node}", goal)
+        for edge, angle in wanted.angles.items():
+            goals[rod.node_count + index_of(edge, rod.edge_count, "edge")] = _about(f"the angle of edge {edge}", angle)
+        clamps = tuple(_TurningClamp.of(rod, state, k, goals, wanted) for k in range(len(rod.clamps)))
+        holds_spin = rod.twists and rod.free_spin and not any(block >= rod.node_count for block in goals)
+        if holds_spin:
+            goals[rod.angles.start] = state[rod.angles.start]
+        moved = np.array(list(goals), dtype=np.intp)
+        free = rod.freedom()
+        for node, directions in wanted.along.items():
+            block = index_of(node, rod.node_count, "node")
+            free = free.with_directions(np.array([block]), *_orthonormal(node, directions))
+        spins = [int(rod.ghost_angles[rod.clamps.index(end)]) for end in wanted.spinning]
+        free = free.with_directions(np.array(spins, dtype=np.intp), SPIN).with_directions(moved)
+        last = np.array([goals[block] for block in goals]).reshape(-1, 3)
+        return SupportPath(free, moved, state[moved], last, clamps, holds_spin)
+
+    def at(self, t: float) -> Supports:
+        moved = np.concatenate([self.moved, np.array([c.ghost for c in self.clamps], dtype=np.intp)])
+        goals = (1 - t) * self.first + t * self.last
+        ghosts = [clamp.at(t) for clamp in self.clamps]
+        return Supports(self.free, moved, np.vstack([goals, *ghosts]))
+
+
+@dataclass(frozen=True)
+class _TurningClamp:
+    """A clamp whose end goes straight from `start` to `goal` [m] while its tangent turns by `angle` [rad] to `side`."""
+
+    ghost: int
+    start: Floats
+    goal: Floats
+    reach: float
+    tangent: Floats
+    side: Floats
+    angle: float
+
+    @staticmethod
+    def of(rod: ElasticRod, state: Floats, k: int, goals: dict[int, Floats], wanted: RodSupports) -> "_TurningClamp":
+        """The k-th clamp; puts the angle that its ghost edge is to reach into `goals`."""
+        end, node, ghost = rod.clamps[k], int(rod.clamped_nodes[k]), int(rod.ghosts[k])
+        outward = -1.0 if end == "start" else 1.0
+        arm = outward * (state[ghost] - state[node])
+        reach, now = float(np.linalg.norm(arm)), unit(arm)
+        then = direction(f'the tangent at the "{end}"', wanted.tangents.get(end, now))
+        angle = float(np.arctan2(np.linalg.norm(cross(now, then)), dot(now, then)))
+        if angle > np.pi - 1e-6:
+            raise InputError(f'the clamp at "{end}" turns back on itself: give its way in two solves')
+        side = unit(then - dot(now, then) * now) if angle > 1e-12 else np.zeros(3)
+        if end in wanted.directors or end in wanted.turns:
+            block = int(rod.ghost_angles[k])
+            turn = finite(f'the turn of the "{end}"', wanted.turns.get(end, 0.0))
+            theta = float(state[block, 0] + turn)
+            if end in wanted.directors:
+                d1 = rod.reference_directors(state)[rod.edge_count + k]
+                m1 = np.cos(state[block, 0]) * d1 + np.sin(state[block, 0]) * cross(now, d1)
+                carried = parallel_transport(m1, now, then)
+                given = direction(f'the director at the "{end}"', wanted.directors[end])
+                theta += float(signed_angle(carried, adapted(given, then), then))
+            goals[block] = np.array([theta, 0.0, 0.0])
+        return _TurningClamp(ghost, state[node], goals[node], outward * reach, now, side, angle)
+
+    def at(self, t: float) -> Floats:
+        """(3,) place of the ghost."""
+        turned = np.cos(t * self.angle) * self.tangent + np.sin(t * self.angle) * self.side
+        return (1 - t) * self.start + t * self.goal + self.reach * turned
+
+
+def _about(name: str, angle: float) -> Floats:
+    """(3,) block of a twist angle."""
+    return np.array([float(finite(name, angle)), 0.0, 0.0])
+
+
+def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) -> Sequence[tuple[float, float, float]]:
+    rows = np.array([vector(f"a free direction of node {node}", one) for one in directions]).reshape(-1, 3)
+    if np.abs(rows @ rows.T - np.eye(len(rows))).max(initial=0.0) > 1e-9:
+        raise InputError(f"the free directions of node {node} must be unit vectors at right angles to each other")
+    return directions
+
+
+def index_of(given: int, count: int, what: str) -> int:
+    if not isinstance(given, int | np.integer):
+        raise InputError(f"a {what} is a whole number, not {given!r}")
+    if not -count <= given < count:
+        raise InputError(f"the rod has no {what} {given}: they run from 0 to {count - 1}")
+    return given % count

@@ -1,0 +1,339 @@
+"""The symbolic phase of a multifrontal factorisation: from a pattern and an order to the maps of the numeric one.
+
+All of it but the last maps is done on *blocks*, unknowns that lie at one place and are coupled alike: a node's
+directions of motion. Tree, supernodes and fronts are found from a graph some ten times smaller than the matrix.
+"""
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.solve.dense import padded
+from rodshell.solve.sharing import parts_of, stacks_of
+
+Ints = NDArray[np.int64]
+
+
+class Plan(NamedTuple):
+    """What the numeric phase needs; supernodes s in postorder, `n_s` of them."""
+
+    order: Ints  # (n,) original index of each permuted unknown
+    first: Ints  # (n_s + 1,) first column of each supernode
+    row_start: Ints  # (n_s + 1,) where its rows begin in `rows`
+    rows: Ints  # permuted row indices of each front, its own columns first
+    child_start: Ints  # (n_s + 1,)
+    children: Ints
+    run_start: Ints  # beside `children`
+    runs: Ints  # (r, 2) rows of a child's update matrix that stay side by side in the front: the first, and its place
+    entry_start: Ints  # (n_s + 1,)
+    entry_source: Ints  # which value of the matrix
+    entry_place: Ints  # where it goes in the rows of the front's pivots
+    panel_start: Ints  # (n_s + 1,) where its part of the factor begins
+    update_start: Ints  # (n_s,) where its update matrix lies in `stacks`
+    part_start: Ints  # (p + 1,) parts that can be eliminated at the same time, but for the last, which needs them all
+    parts: Ints  # (n_s,) the supernodes of each part, ascending
+    stack_size: int
+    largest_front: int
+    largest_panel: int
+
+
+class Blocks(NamedTuple):
+    """Unknowns in blocks of consecutive ones, `begin` (b + 1,), and the blocks that each is coupled to:
+    neighbours[start[k] : start[k + 1]]."""
+
+    begin: Ints
+    start: Ints
+    neighbours: Ints
+
+
+def blocks_of(indptr: Ints, indices: Ints, begin: Ints) -> Blocks:
+    """The graph of blocks of a pattern (upper triangle, compressed columns)."""
+    begin = np.asarray(begin, dtype=np.int64)
+    return Blocks(begin, *_coupled(indptr.astype(np.int64), indices.astype(np.int64), begin))
+
+
+def plan_of(indptr: Ints, indices: Ints, blocks: Blocks, order: Ints) -> Plan:
+    """Of a pattern whose `blocks` are eliminated in `order` (b,), but for what the tree leaves open."""
+    order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
+    first = _supernodes(tree, count, weight)
+    up, child_start, children = _children(tree, first)
+    row_start, rows = _fronts(first, order, blocks.start, blocks.neighbours, up)
+    maps = _maps(indptr, indices, blocks.begin, order, weight, first, up, row_start, rows, child_start, children)
+    return Plan(*maps)
+
+
+@nb.njit(cache=True)
+def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
+    """The other blocks to which each block of unknowns is coupled, as start and neighbours."""
+    n = len(begin) - 1
+    block = np.empty(begin[n], dtype=np.int64)
+    for b in range(n):
+        block[begin[b] : begin[b + 1]] = b
+    mark, count = np.full(n, -1, dtype=np.int64), np.zeros(n + 1, dtype=np.int64)
+    start, neighbours, place = count, np.empty(0, dtype=np.int64), count
+    for sweep in range(2):  # count, then fill
+        mark[:] = -1
+        for b in range(n):
+            for j in range(begin[b], begin[b + 1]):
+                for e in range(indptr[j], indptr[j + 1]):
+                    a = block[indices[e]]
+                    if a != b and mark[a] != b:
+                        mark[a] = b
+                        if sweep == 0:
+                            count[a + 1] += 1
+                            count[b + 1] += 1
+                        else:
+                            neighbours[place[a]], neighbours[place[b]] = b, a
+                            place[a] += 1
+                            place[b] += 1
+        if sweep == 0:
+            start = np.cumsum(count)
+            place = start.copy()
+            neighbours = np.empty(start[n], dtype=np.int64)
+    return start, neighbours
+
+
+@nb.njit(cache=True)
+def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
+    """Blocks in a postorder of their elimination tree; and for each, its parent, unknowns, and rows of its columns."""
+    n = len(order)
+    place = np.empty(n, dtype=np.int64)
+    for k in range(n):
+        place[order[k]] = k
+    parent = _elimination_tree(start, neighbours, order, place)
+    post = _postorder(parent)
+    back = np.empty(n, dtype=np.int64)
+    back[post] = np.arange(n)
+    order, above = order[post], parent[post]
+    for k in range(n):
+        place[order[k]] = k
+        parent[k] = back[above[k]] if above[k] >= 0 else -1
+    weight = begin[order + 1] - begin[order]
+    count, mark = weight.copy(), np.full(n, -1, dtype=np.int64)
+    for k in range(n):  # every nonzero of row k of the factor once
+        mark[k] = k
+        for e in range(start[order[k]], start[order[k] + 1]):
+            j = place[neighbours[e]]
+            while j < k and mark[j] != k:
+                mark[j] = k
+                count[j] += weight[k]
+                j = parent[j]
+    return order, parent, weight, count
+
+
+@nb.njit(cache=True)
+def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyped-def]
+    """Parent of each permuted block (Liu 1990), -1 for roots."""
+    n = len(order)
+    parent, ancestor = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    for k in range(n):
+        for e in range(start[order[k]], start[order[k] + 1]):
+            j = place[neighbours[e]]
+            while j != -1 and j < k:
+                above = ancestor[j]
+                ancestor[j] = k
+                if above == -1:
+                    parent[j] = k
+                j = above
+    return parent
+
+
+@nb.njit(cache=True)
+def _postorder(parent):  # type: ignore[no-untyped-def]
+    """Nodes of the forest, children before parents and every subtree in a row."""
+    n = len(parent)
+    head, following = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    for j in range(n - 1, -1, -1):
+        if parent[j] >= 0:
+            following[j] = head[parent[j]]
+            head[parent[j]] = j
+    post, stack = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    done = 0
+    for root in range(n):
+        if parent[root] >= 0:
+            continue
+        stack[0], top = root, 0
+        while top >= 0:
+            j = stack[top]
+            child = head[j]
+            if child == -1:
+                post[done] = j
+                done += 1
+                top -= 1
+            else:
+                head[j] = following[child]
+                top += 1
+                stack[top] = child
+    return post
+
+
+@nb.njit(cache=True)
+def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
+    """First block of each supernode: blocks of one structure, and small ones merged for a few zeros more."""
+    n = len(parent)
+    first = np.empty(n + 1, dtype=np.int64)
+    zeros = np.zeros(n, dtype=np.int64)
+    size = np.empty(n, dtype=np.int64)  # rows of the front
+    width = np.empty(n, dtype=np.int64)  # its own columns
+    supers = 0
+    for j in range(n):
+        if supers > 0 and parent[j - 1] == j and count[j] == count[j - 1] - weight[j - 1]:
+            width[supers - 1] += weight[j]
+            continue
+        first[supers], size[supers], width[supers], zeros[supers] = j, count[j], weight[j], 0
+        supers += 1
+    first[supers] = n
+    kept = 0  # supernodes kept so far; the last is tried on its parent, which follows it
+    for s in range(supers):
+        begin, rows, wide, empty = first[s], size[s], width[s], zeros[s]
+        while kept > 0 and parent[begin - 1] == begin:
+            narrow = width[kept - 1]
+            taller, own = narrow + rows, narrow + wide
+            more = empty + zeros[kept - 1] + narrow * (taller - size[kept - 1])
+            total = own * taller - own * (own - 1) // 2
+            share = 0.6 if own <= 8 else (0.35 if own <= 24 else (0.12 if own <= 64 else 0.04))
+            if more > share * total:
+                break
+            kept -= 1
+            begin, rows, wide, empty = first[kept], taller, own, more
+        first[kept], size[kept], width[kept], zeros[kept] = begin, rows, wide, empty
+        kept += 1
+    first[kept] = n
+    return first[: kept + 1].copy()
+
+
+@nb.njit(cache=True)
+def _children(parent, first):  # type: ignore[no-untyped-def]
+    """Parent of each supernode, -1 for roots; and the children of each, ascending."""
+    supers = len(first) - 1
+    owner, up = np.empty(len(parent), dtype=np.int64), np.empty(supers, dtype=np.int64)
+    start = np.zeros(supers + 1, dtype=np.int64)
+    for s in range(supers):
+        owner[first[s] : first[s + 1]] = s
+    for s in range(supers):
+        p = parent[first[s + 1] - 1]
+        up[s] = owner[p] if p >= 0 else -1
+        if p >= 0:
+            start[owner[p] + 1] += 1
+    start = np.cumsum(start)
+    filled, children = start[:-1].copy(), np.empty(start[supers], dtype=np.int64)
+    for s in range(supers):
+        if up[s] >= 0:
+            children[filled[up[s]]] = s
+            filled[up[s]] += 1
+    return up, start, children
+
+
+@nb.njit(cache=True)
+def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def]
+    """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]].
+
+    Block i is in its own front, and in all those between that of an earlier block it is coupled to and its own.
+    """
+    supers, n = len(first) - 1, len(order)
+    place, owner, mark = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(supers, dtype=np.int64)
+    for k in range(n):
+        place[order[k]] = k
+    for s in range(supers):
+        owner[first[s] : first[s + 1]] = s
+    row_start, rows, used = np.zeros(supers + 1, dtype=np.int64), np.empty(0, dtype=np.int64), mark.copy()
+    for sweep in range(2):  # count, then fill
+        used[:], mark[:] = row_start[:-1], -1
+        for i in range(n):
+            s = owner[i]
+            mark[s] = i
+            if sweep == 1:
+                rows[used[s]] = i
+            used[s] += 1
+            for e in range(start[order[i]], start[order[i] + 1]):
+                j = place[neighbours[e]]
+                s = owner[j]
+                while j < i and mark[s] != i:
+                    mark[s] = i
+                    if sweep == 1:
+                        rows[used[s]] = i
+                    used[s] += 1
+                    s = up[s]
+        if sweep == 0:
+            row_start[1:] = np.cumsum(used)
+            rows = np.empty(row_start[supers], dtype=np.int64)
+    return row_start, rows
+
+
+@nb.njit(cache=True)
+def _maps(  # type: ignore[no-untyped-def]
+    indptr, indices, begin, order, weight, first, up, row_start, rows, child_start, children
+):
+    """From blocks to unknowns: all that `Plan` holds."""
+    supers, n, unknowns = len(first) - 1, len(order), begin[len(begin) - 1]
+    column = np.zeros(n + 1, dtype=np.int64)  # first permuted unknown of each block
+    column[1:] = np.cumsum(weight)
+    original, place = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
+    block, owner = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
+    for s in range(supers):
+        for k in range(first[s], first[s + 1]):
+            for d in range(weight[k]):
+                at = column[k] + d
+                original[at], block[at], owner[at] = begin[order[k]] + d, k, s
+                place[original[at]] = at
+    entry_start, by_front = _by_front(indptr, indices, place, owner, supers)
+    total = 0
+    for k in rows:
+        total += weight[k]
+    all_rows = np.empty(total, dtype=np.int64)
+    all_start, panel_start = np.zeros(supers + 1, dtype=np.int64), np.zeros(supers + 1, dtype=np.int64)
+    entry_place, local = np.empty(len(indices), dtype=np.int64), np.empty(n, dtype=np.int64)
+    below = np.empty(supers, dtype=np.int64)
+    run_start, runs = np.zeros(len(children) + 1, dtype=np.int64), np.empty((len(rows), 2), dtype=np.int64)
+    used, largest, widest = 0, 0, 0
+    for s in range(supers):
+        for e in range(row_start[s], row_start[s + 1]):
+            k = rows[e]
+            local[k] = used - all_start[s]
+            for d in range(weight[k]):
+                all_rows[used] = column[k] + d
+                used += 1
+        all_start[s + 1] = used
+        size, own = used - all_start[s], column[first[s + 1]] - column[first[s]]
+        below[s] = size - own
+        stride = padded(size)
+        panel_start[s + 1] = panel_start[s] + own * stride
+        largest, widest = max(largest, size), max(widest, own * stride)
+        for e in range(child_start[s], child_start[s + 1]):
+            c, count, at, past = children[e], run_start[e], 0, -1
+            for k in rows[row_start[c] + first[c + 1] - first[c] : row_start[c + 1]]:
+                if local[k] != past:
+                    runs[count, 0], runs[count, 1] = at, local[k]
+                    count += 1
+                at, past = at + weight[k], local[k] + weight[k]
+            run_start[e + 1] = count
+        for e in range(entry_start[s], entry_start[s + 1]):
+            low, high = by_front[e, 1], by_front[e, 2]
+            entry_place[e] = (low - column[first[s]]) * stride + local[block[high]] + high - column[block[high]]
+    part_start, parts = parts_of(up, np.diff(column[first]), below)
+    update_start, deepest = stacks_of(up, below, child_start, children, part_start, parts)
+    return (
+        original, column[first], all_start, all_rows, child_start, children, run_start, runs, entry_start,
+        by_front[:, 0].copy(), entry_place, panel_start, update_start, part_start, parts, deepest, largest, widest,
+    )  # fmt: skip
+
+
+@nb.njit(cache=True)
+def _by_front(indptr, indices, place, owner, supers):  # type: ignore[no-untyped-def]
+    """The values of the matrix front by front: which value, and its permuted column and row, column <= row."""
+    start = np.zeros(supers + 1, dtype=np.int64)
+    for j in range(len(indptr) - 1):
+        for e in range(indptr[j], indptr[j + 1]):
+            start[owner[min(place[j], place[indices[e]])] + 1] += 1
+    start = np.cumsum(start)
+    filled, sorted_values = start[:-1].copy(), np.empty((len(indices), 3), dtype=np.int64)
+    for j in range(len(indptr) - 1):
+        for e in range(indptr[j], indptr[j + 1]):
+            a, b = place[j], place[indices[e]]
+            low, high = min(a, b), max(a, b)
+            k = filled[owner[low]]
+            filled[owner[low]] += 1
+            sorted_values[k, 0], sorted_values[k, 1], sorted_values[k, 2] = e, low, high
+    return start, sorted_values

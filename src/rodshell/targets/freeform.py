@@ -1,0 +1,299 @@
+"""A target given by a surface in triangles: its smooth field, where the shell ends, and its highest point."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.targets.filling import fill_openings
+from rodshell.targets.fitting import fit_field, patch_spacing
+from rodshell.targets.meshsamples import mesh_samples
+from rodshell.targets.patches import PatchField
+from rodshell.targets.rim import Rim
+from rodshell.targets.target import Floats, Gap, Implicit, Target
+from rodshell.targets.trianglemesh import TriangleMesh, sound_mesh
+
+if TYPE_CHECKING:
+    from rodshell.targets.footing import Footing
+
+PAST = 0.6  # of the size: how far the surface is continued past an open rim
+LOST = 0.005  # of the size: a vertex this far off its smooth field is not followed by it
+ASKEW = 0.7  # cosine: nor is one whose normal differs this much from the field's
+ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
+TIE = 1e-3  # of the size: points as high as the highest
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Freeform(Target):
+    """A surface in triangles, open or closed, through which a smooth field is laid.
+
+    Parameters
+    ----------
+    surface : one smooth piece, facing up; see `Freeform.of`.
+    base : z of a plane under which there is no shell [m], or None.
+    curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
+    source : kind, file and options, as they stand in a case file.
+    repairs : what was done to the mesh, in sentences.
+    """
+
+    surface: TriangleMesh
+    base_height: float | None = None
+    curves: tuple[Floats, ...] = ()
+    source: Mapping[str, object] = field(default_factory=dict)
+    repairs: tuple[str, ...] = ()
+
+    @staticmethod
+    def of(
+        vertices: Floats,
+        faces: NDArray[np.intp],
+        *,
+        base: float | None = None,
+        curves: tuple[Floats, ...] = (),
+        source: Mapping[str, object] | None = None,
+        name: str = "the mesh",
+        notes: tuple[str, ...] = (),
+    ) -> "Freeform":
+        """From vertices (n, 3) [m] and triangles (m, 3), checked; it ends at its open boundary, curves and base.
+
+        notes : what was done to them before, in sentences.
+
+        Raises
+        ------
+        InputError : the mesh is no smooth surface, or it is closed and nothing says where the shell ends.
+        """
+        surface, repairs = sound_mesh(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.intp), name)
+        made = {"kind": "mesh", "vertices": len(vertices), "faces": len(faces)}
+        target = Freeform(
+            surface=surface, base_height=base, curves=curves, source=dict(source or made),
+            repairs=(*notes, *repairs),
+        )  # fmt: skip
+        target._require_an_end(name)
+        target._require_a_good_fit(name)
+        return target
+
+    @property
+    def name(self) -> str:
+        """Of its file, without the folder, if it has one."""
+        return Path(str(self.source.get("file", self.source.get("kind", "mesh")))).name
+
+    @property
+    def base(self) -> float | None:
+        return self.base_height
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return self.repairs
+
+    def parameters(self) -> dict[str, object]:
+        return dict(self.source)
+
+    @cached_property
+    def size(self) -> float:
+        """Half the largest extent of the shell [m]."""
+        known = np.vstack([self.surface.vertices, *(rim.points for rim in self.rims)])
+        inside = self.margin(known) > -1e-6 * self._extent
+        return 0.5 * float(np.ptp(known[inside], axis=0).max())
+
+    @cached_property
+    def _extent(self) -> float:
+        return 0.5 * float(np.ptp(self.surface.vertices, axis=0).max())
+
+    @cached_property
+    def _fitted(self) -> tuple[PatchField, int]:
+        spacing = patch_spacing(float(self.surface.areas.sum()), len(self.surface.vertices))
+        samples = fill_openings(self.surface, mesh_samples(self.surface, spacing), spacing)
+        return fit_field(samples, spacing, past=PAST * self._extent, reach=self._extent)
+
+    @property
+    def field(self) -> PatchField:
+        """The smooth field that stands for the surface."""
+        return self._fitted[0]
+
+    def implicit(self, x: Floats) -> Implicit:
+        return self.field.implicit(x)
+
+    def level(self, x: Floats) -> tuple[Floats, Floats]:
+        value, gradient, _ = self.field.implicit(x, second=False)
+        return value, gradient
+
+    def carries(self, x: Floats) -> NDArray[np.bool_]:
+        """Inside the end, or where an opening was filled."""
+        return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted[1])
+
+    @cached_property
+    def rims(self) -> tuple[Rim, ...]:
+        """The open boundary, and the curves, as far as there are any."""
+        rims = []
+        if self.surface.loops:
+            rims.append(self._rim([self.surface.vertices[loop] for loop in self.surface.loops]))
+        if self.curves:
+            rims.append(self._rim([_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]))
+        return tuple(rims)
+
+    def _rim(self, loops: list[Floats]) -> Rim:
+        return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]))
+
+    def _settle(self, x: Floats) -> Floats:
+        """As `retract`, for points that lie on the surface but for its rounding (the size needs the rims first)."""
+        for _ in range(3):
+            value, gradient = self.level(x)
+            x = x - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
+        return x
+
+    def margin(self, x: Floats) -> Floats:
+        """(n,) how far inside the nearest of base plane, open boundary and curves the points (n, 3) are [m]."""
+        margins = [rim.distance(x) for rim in self.rims]
+        if self.base_height is not None:
+            margins.append(x[:, 2] - self.base_height)
+        return np.min(margins, axis=0)
+
+    def section(self, z: float) -> Rim:
+        """The loops in which the plane at height `z` [m] cuts the smooth surface, counter-clockwise seen from above."""
+
+        def onto(x: Floats) -> Floats:
+            for _ in range(4):
+                value, gradient = self.level(x)
+                across = gradient * [1.0, 1.0, 0.0]
+                x = x - (value / dot(across, across))[:, None] * across
+            return x
+
+        return Rim.of(
+            [_turning(loop, False) for loop in self.surface.section(z)], onto, lambda x: unit(self.level(x)[1])
+        )
+
+    @cached_property
+    def _footing(self) -> "Footing":
+        from rodshell.targets.footing import footing
+
+        return footing(self)
+
+    def outside(self, x: Floats) -> NDArray[np.bool_]:
+        return self._footing.outside(x)
+
+    def contact(self, x: Floats) -> Gap:
+        return self._footing.contact(x)
+
+    def height(self, xy: Floats) -> Floats:
+        """z (n,) of the uppermost surface over the plan points (n, 2) [m]; NaN where there is none."""
+        return np.array([self._height(*point) for point in np.asarray(xy, dtype=float).tolist()])
+
+    def _height(self, x: float, y: float) -> float:
+        a, b, c = (self.surface.vertices[k] - [x, y, 0.0] for k in self.surface.faces.T)
+        wedge = np.stack([p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b))])
+        total = wedge.sum(axis=0)
+        hit = (np.abs(total) > 0) & (np.all(wedge >= 0, axis=0) | np.all(wedge <= 0, axis=0))
+        if hit.any():
+            z = float(((wedge * np.stack([a[:, 2], b[:, 2], c[:, 2]]))[:, hit].sum(axis=0) / total[hit]).max())
+        else:
+            z = self._height_of_patch(x, y)
+        point = np.array([[x, y, z]])
+        for _ in range(20):  # from the facet to the smooth surface, straight up or down
+            value, gradient, _ = self.implicit(point)
+            step = -value[0] / gradient[0, 2]
+            if not abs(step) < 0.1 * self._extent:
+                return np.nan
+            point[0, 2] += step
+            if abs(step) <= 1e-14 * self._extent:
+                break
+        return float(point[0, 2])
+
+    def _height_of_patch(self, x: float, y: float) -> float:
+        """z of the uppermost patch that fills an opening over a point of the plan, or NaN."""
+        centres = self.field.centres[: self._fitted[1]]
+        near = np.hypot(centres[:, 0] - x, centres[:, 1] - y) < self.field.spacing
+        return float(centres[near, 2].max()) if near.any() else np.nan
+
+    @cached_property
+    def summit(self) -> tuple[float, float]:
+        """x, y of the highest point inside the end [m]; of the surface's middle where that lies on its edge.
+
+        Of equally high points, as on a barrel vault, the one nearest to the middle.
+        """
+        x = self.surface.vertices
+        margin = self.margin(x)
+        inner = x[margin > -1e-6 * self._extent]
+        middle = 0.5 * (inner.min(axis=0) + inner.max(axis=0))
+        high = (margin > 2 * self.field.spacing) & (x[:, 2] >= inner[:, 2].max() - TIE * self._extent)
+        if high.any():
+            return self._climbed(x[high][np.argmin(np.linalg.norm(x[high, :2] - middle[:2], axis=1))])
+        if np.isfinite(self._height(*middle[:2].tolist())):
+            return float(middle[0]), float(middle[1])
+        x, y, _ = x[np.argmax(margin)].tolist()
+        return x, y
+
+    def _climbed(self, start: Floats) -> tuple[float, float]:
+        """The peak near a vertex, by Newton on the smooth surface; along a ridge it stays where it is."""
+        point = start[None].copy()
+        for _ in range(30):
+            point = self.retract(point)
+            _, gradient, hessian = self.implicit(point)
+            slope, bend = -gradient[0, :2] / gradient[0, 2], -hessian[0, :2, :2] / gradient[0, 2]
+            values, axes = np.linalg.eigh(bend)
+            along = (axes.T @ slope) * (np.abs(values) > 0.02 / self._extent)
+            step = axes @ (along / np.maximum(np.abs(values), 0.02 / self._extent))
+            step *= min(1.0, self.field.spacing / max(float(np.linalg.norm(step)), 1e-300))
+            point[0, :2] += step
+            if np.linalg.norm(step) < 1e-12 * self._extent:
+                break
+        x, y = np.where(np.abs(point[0, :2]) < 1e-5 * self._extent, 0.0, point[0, :2]).tolist()
+        return x, y
+
+    def _over(self, curve: Floats) -> Floats:
+        """A curve that was drawn in a level plane, such as a plan, projected vertically; any other as it is."""
+        if np.ptp(curve[:, 2]) > 1e-6 * self._extent or self._off(curve) < ASIDE * self._extent:
+            return curve
+        z = self.height(curve[:, :2])
+        if not np.isfinite(z).all():
+            x, y, _ = curve[int(np.argmin(np.isfinite(z)))]
+            raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it within")
+        return np.column_stack([curve[:, :2], z])
+
+    def _off(self, curve: Floats) -> float:
+        """How far a curve lies off the surface's vertices and faces, at most [m]."""
+        return float(np.nan_to_num(np.abs(self.implicit(curve).value), nan=np.inf).max())
+
+    def _require_an_end(self, name: str) -> None:
+        if self.base_height is None and not self.surface.loops and not self.curves:
+            x = self.surface.vertices
+            raise InputError(
+                f"{name} is closed: say where the shell ends, by a base plane between z = {x[:, 2].min():.4g} and "
+                f"{x[:, 2].max():.4g} m or by a boundary curve"
+            )
+        for curve in self.curves:
+            off = self._off(self._over(curve))
+            if not off < ASIDE * self._extent:
+                raise InputError(f"the boundary curve lies up to {off:.3g} m off {name}: draw it on the surface")
+        if not (self.margin(self.surface.vertices) > 0).any():
+            if len(np.unique(np.concatenate([[], *self.surface.loops]))) == len(self.surface.vertices):
+                raise InputError(
+                    f"no vertex of {name} lies inside its edge, at which creases of more than 40 degrees end it too: "
+                    "mesh it more finely, or round its creases"
+                )
+            raise InputError(f"nothing of {name} lies inside its end: choose a lower base or another boundary")
+
+    def _require_a_good_fit(self, name: str) -> None:
+        """Where patches cannot follow the mesh, it is rough, or two sheets of it come too close."""
+        x = self.surface.vertices
+        value, gradient = self.level(x)
+        cosine = dot(gradient, self.surface.normals) / np.linalg.norm(gradient, axis=1)
+        off = np.where(cosine > ASKEW, np.abs(value), np.inf)
+        k = int(np.argmax(np.where(np.isfinite(value), off, np.inf)))
+        if not off[k] < LOST * self._extent:
+            px, py, pz = x[k]
+            how = f"vertices lie {abs(value[k]):.2g} m off it" if np.isfinite(off[k]) else "normals point elsewhere"
+            raise InputError(
+                f"{name} cannot be followed by a smooth surface near ({px:.4g}, {py:.4g}, {pz:.4g}) m, where its "
+                f"{how}: smooth it, mesh it more finely there, or part sheets that touch or cross each other"
+            )
+
+
+def _turning(curve: Floats, opening: bool) -> Floats:
+    """A closed curve with the shell on its left: inside the outer one, outside an opening; seen from above."""
+    area = cross(curve, np.roll(curve, -1, axis=0)).sum(axis=0)
+    return curve[::-1] if (area[2] < 0) != opening else curve

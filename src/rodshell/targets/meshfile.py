@@ -1,0 +1,134 @@
+"""Surfaces in files: OBJ, STL, PLY, OFF and glTF, in the unit that the user states."""
+
+import re
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.units import shown
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
+IN_METRES = (".glb", ".gltf")  # by their standard
+LARGEST_FILE = 300e6  # bytes
+SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a rodshell can have
+WHOLE = 0.97  # of the vertices of a sound file belong to faces; of one cut short, fewer
+HEAD = 4000  # bytes in which a header lies
+
+
+def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints]:
+    """Vertices (n, 3) [m] and triangles (m, 3) of the surface in a file.
+
+    Parameters
+    ----------
+    unit : length of the file's unit [m]; None only for a format that has one of its own.
+    name : of the object wanted, in a file that holds several.
+
+    Raises
+    ------
+    InputError : no such file, damaged or cut short, without a surface, without a unit, of an absurd size.
+    """
+    path = Path(path)
+    data = file_bytes(path)
+    meshes = _loaded(path)
+    if not meshes:
+        raise InputError(f"{path} holds no faces, or is damaged: export the surface as a mesh of triangles")
+    if name is not None:
+        if name not in meshes:
+            raise InputError(f"{path} has no object named {shown(name)}: it holds {', '.join(map(shown, meshes))}")
+        meshes = {name: meshes[name]}
+    vertices, faces = _joined(list(meshes.values()))
+    if name is None:
+        _require_whole(path, data, vertices, faces)
+    return in_metres(vertices, faces, unit, path), faces
+
+
+def file_bytes(path: Path) -> bytes:
+    """The content of a file that is there, is none of the largest, and is not empty."""
+    if not path.is_file():
+        raise InputError(f"there is no file named {shown(str(path))}: give the path of one that is there")
+    size = path.stat().st_size
+    if size == 0:
+        raise InputError(f"{path} is empty: export it anew")
+    if size > LARGEST_FILE:
+        raise InputError(f"{path} has {size / 1e6:.0f} MB: reduce the mesh; some 20,000 triangles are enough")
+    try:
+        return path.read_bytes()
+    except OSError as reason:
+        raise InputError(f"{path} cannot be read: {reason.strerror}") from None
+
+
+def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> Floats:
+    """The vertices scaled by the unit, if the result can be a shell."""
+    used = vertices[np.unique(faces)] if len(faces) else vertices
+    extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)
+    size = " x ".join(f"{side:.4g}" for side in extent)
+    if unit is None:
+        if path.suffix.lower() not in IN_METRES:
+            raise InputError(f"{path} does not say its unit (it is {size} units wide): give it, such as --unit mm")
+        unit = 1.0
+    largest = float(extent.max()) * unit
+    if np.isfinite(largest) and largest > 0 and not SMALLEST <= largest <= LARGEST:
+        raise InputError(
+            f"{path} is {largest:.3g} m wide in this unit ({size} units): give another unit, for "
+            f"{SMALLEST:g} to {LARGEST:g} m"
+        )
+    return vertices * unit
+
+
+def _loaded(path: Path) -> dict[str, Any]:
+    """The meshes in a file by name, each in its place."""
+    import trimesh
+
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is refused later, with its place
+            scene = trimesh.load_scene(str(path), process=False, skip_materials=True)
+            found: dict[str, Any] = {}
+            for node in scene.graph.nodes_geometry:
+                transform, geometry = scene.graph[node]
+                mesh = scene.geometry[geometry]
+                if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+                    x = np.asarray(mesh.vertices, dtype=float) @ transform[:3, :3].T + transform[:3, 3]
+                    found[str(geometry)] = (x, np.asarray(mesh.faces, dtype=np.intp))
+            return found
+    except MemoryError:
+        raise InputError(f"{path} claims to be larger than the memory: it is damaged; export it anew") from None
+    except Exception:  # a damaged file can break a reader anywhere
+        raise InputError(
+            f"{path} cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export it anew"
+        ) from None
+
+
+def _joined(meshes: list[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
+    first = np.cumsum([0] + [len(x) for x, _ in meshes])
+    return np.vstack([x for x, _ in meshes]), np.vstack([f + k for (_, f), k in zip(meshes, first, strict=False)])
+
+
+def _require_whole(path: Path, data: bytes, vertices: Floats, faces: Ints) -> None:
+    """Text formats can be cut short and still be read: what the file announces must be there."""
+    used, kind = len(np.unique(faces)), path.suffix.lower()
+    announced: Mapping[str, int] = {}
+    if kind == ".obj":
+        listed = len(re.findall(rb"^\s*v\s", data, re.MULTILINE))
+        if used < WHOLE * listed:
+            raise InputError(
+                f"{path} seems to be cut short: {listed - used} of its {listed} vertices belong to no face"
+            )
+    elif kind == ".ply":
+        head = data[:HEAD].decode("ascii", "replace")
+        announced = {what: int(n) for what, n in re.findall(r"element (vertex|face) (\d+)", head)}
+    elif kind == ".off" and (numbers := re.search(rb"OFF\s*(?:#.*\s*)*(\d+)\s+(\d+)", data[:HEAD])):
+        announced = {"vertex": int(numbers[1]), "face": int(numbers[2])}
+    for what, count in announced.items():
+        there = len(vertices if what == "vertex" else faces)
+        if there < count:
+            raise InputError(
+                f"{path} seems to be cut short: it has {there} entries of {count} for {what}: export it anew"
+            )

@@ -1,0 +1,281 @@
+"""A triangle mesh as a surface: welded, oriented alike, in one smooth piece; or one sentence why it is none."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, degrees, radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError
+from rodshell.geometry.vectors import cross, dot
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+CREASE = 40.0  # degrees between faces: there a smooth piece ends
+WELD = 1e-6  # of the largest extent: vertices this close are one; single precision has 1e-7
+MOST_FACES = 3_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Vertices (n, 3) [m] and faces (m, 3) in counter-clockwise order seen from outside. Make one with `sound_mesh`."""
+
+    vertices: Floats
+    faces: Ints
+
+    @cached_property
+    def doubled(self) -> Floats:
+        """(m, 3) normals of the faces, as long as twice their area [m2]."""
+        a, b, c = self.vertices[self.faces.T]
+        return cross(b - a, c - a)
+
+    @cached_property
+    def areas(self) -> Floats:
+        """(m,) [m2]"""
+        return 0.5 * np.linalg.norm(self.doubled, axis=1)
+
+    @cached_property
+    def normals(self) -> Floats:
+        """(n, 3) unit normals of the vertices, exact where these lie on a sphere [Max 1999, Weights for normals]."""
+        result = np.zeros_like(self.vertices)
+        for k in range(3):
+            here, after, before = (self.faces[:, (k + i) % 3] for i in range(3))
+            p, q = self.vertices[after] - self.vertices[here], self.vertices[before] - self.vertices[here]
+            scale = np.maximum(dot(p, p) * dot(q, q), 1e-300)
+            np.add.at(result, here, self.doubled / scale[:, None])
+        return result / np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None]
+
+    @cached_property
+    def loops(self) -> list[Ints]:
+        """The open boundary: vertices of each closed loop in turn, the surface on the left seen from outside."""
+        a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        count = _edge_counts(a, b, len(self.vertices))
+        after = dict(zip(a[count == 1].tolist(), b[count == 1].tolist(), strict=True))
+        loops = list[Ints]()
+        while after:
+            first, here = after.popitem()
+            loop = [first]
+            while here != first:
+                loop.append(here)
+                here = after.pop(here)
+            loops.append(np.array(loop, dtype=np.intp))
+        return sorted(loops, key=lambda loop: -self.length(loop))
+
+    def section(self, z: float) -> list[Floats]:
+        """Closed polylines (n, 3) in which the plane at height `z` [m] cuts the surface."""
+        above = self.vertices[:, 2] > z
+        cut = above[self.faces].any(axis=1) & ~above[self.faces].all(axis=1)
+        a, b = self.faces[cut], np.roll(self.faces[cut], -1, axis=1)
+        crossed = above[a] != above[b]
+        ends = np.column_stack([np.minimum(a, b)[crossed], np.maximum(a, b)[crossed]])
+        first, kind = unique_rows(ends.astype(np.int64))
+        low, high = self.vertices[ends[first].T]
+        points = low + ((z - low[:, 2]) / (high[:, 2] - low[:, 2]))[:, None] * (high - low)
+        beside: list[list[int]] = [[] for _ in points]
+        for one, other in kind.reshape(-1, 2).tolist():
+            beside[one].append(other)
+            beside[other].append(one)
+        loops, left = list[Floats](), set(range(len(points)))
+        while left:
+            loop = [left.pop()]
+            while onward := [k for k in beside[loop[-1]] if k in left]:
+                loop.append(onward[0])
+                left.remove(onward[0])
+            loops.append(points[loop])
+        return loops
+
+    def length(self, loop: Ints) -> float:
+        """Of a closed loop of vertices [m]."""
+        x = self.vertices[loop]
+        return float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum())
+
+    def only(self, faces: NDArray[np.bool_]) -> "TriangleMesh":
+        """The part that consists of these faces (m,)."""
+        used, renumbered = np.unique(self.faces[faces], return_inverse=True)
+        return TriangleMesh(self.vertices[used], renumbered.reshape(-1, 3).astype(np.intp))
+
+
+def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, list[str]]:
+    """The smooth surface that a mesh stands for, facing up; and sentences about what was repaired.
+
+    Normals may point either way. Creases end the surface: of a half ball with its floor, or of a shell with a
+    thickness, the piece that covers most of the plan is taken.
+
+    Raises
+    ------
+    InputError : empty, not finite, not manifold, in several pieces, one-sided, creased; names the place.
+    """
+    _require_numbers(vertices, faces, name)
+    mesh, repairs = _welded(vertices, faces, name), list[str]()
+    neighbours = _Neighbours.of(mesh, name)
+    pieces = neighbours.pieces(np.ones(len(neighbours.edges), dtype=bool), len(mesh.faces))
+    if pieces.max() > 0:
+        shares = np.sort(np.bincount(pieces, mesh.areas))[::-1] / mesh.areas.sum()
+        raise InputError(
+            f"{name} holds {pieces.max() + 1} separate pieces (the largest two have {100 * shares[0]:.0f} and "
+            f"{100 * shares[1]:.0f} % of the area): keep one, or join them"
+        )
+    turned = neighbours.turned(len(mesh.faces), name, mesh)
+    if turned.any() and not turned.all():
+        fewer = min(int(turned.sum()), int((~turned).sum()))
+        repairs.append(f"{fewer} of {len(turned)} faces were turned over to face as the others")
+    mesh = TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
+    if not len(mesh.loops) and _volume(mesh) < 0:
+        mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    return _smooth_piece(mesh, neighbours, name, repairs)
+
+
+def _require_numbers(vertices: Floats, faces: Ints, name: str) -> None:
+    if len(faces) == 0 or len(vertices) == 0:
+        raise InputError(f"{name} holds no faces: export the surface as a mesh of triangles")
+    if len(faces) > MOST_FACES:
+        raise InputError(f"{name} has {len(faces)} faces: reduce it to {MOST_FACES} or fewer")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{name} is damaged: a face names vertex {int(faces.max())} of {len(vertices)}")
+    bad = ~np.isfinite(vertices[faces]).all(axis=(1, 2))
+    if bad.any():
+        raise InputError(f"{name} has {int(bad.sum())} faces with coordinates that are no numbers: export it anew")
+    if np.abs(vertices[faces]).max() > 1e100:
+        raise InputError(f"{name} has coordinates up to {np.abs(vertices[faces]).max():.1g}: export it anew")
+
+
+def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
+    """Equal vertices made one; faces without three different vertices, and faces given twice, left out."""
+    used = np.unique(faces)
+    extent = float(np.ptp(vertices[used], axis=0).max())
+    if not extent > 0:
+        raise InputError(f"{name} has no extent: all its vertices coincide")
+    rounded = np.round((vertices[used] - vertices[used].min(axis=0)) / (WELD * extent)).astype(np.int64)
+    first, place = unique_rows(rounded)
+    number = np.zeros(len(vertices), dtype=np.intp)
+    number[used] = place
+    faces = number[faces]
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    once, _ = unique_rows(np.sort(faces, axis=1))
+    mesh = TriangleMesh(vertices[used][first], faces[np.sort(once)])
+    if len(mesh.faces) == 0 or mesh.areas.sum() < 1e-9 * extent**2:
+        raise InputError(f"{name} has no area: all its faces are degenerate")
+    return mesh
+
+
+def unique_rows(rows: NDArray[np.int64]) -> tuple[Ints, Ints]:
+    """Of rows (n, k) of integers from 0 on: the first of each kind (m,), and of which kind each is (n,)."""
+    key, kinds = np.zeros(len(rows), dtype=np.int64), 1
+    for column in rows.T:
+        more = int(column.max(initial=0)) + 1
+        if kinds * more >= 2**63:
+            key = np.unique(key, return_inverse=True)[1].reshape(-1)
+            kinds = int(key.max()) + 1
+        key, kinds = key * more + column, kinds * more
+    _, first, kind = np.unique(key, return_index=True, return_inverse=True)
+    return first, kind.reshape(-1)
+
+
+def _edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
+    """(k,) how many faces have the edge between a and b."""
+    key = np.minimum(a, b).astype(np.int64) * vertices + np.maximum(a, b)
+    _, place, count = np.unique(key, return_inverse=True, return_counts=True)
+    return np.asarray(count[place.reshape(-1)], dtype=np.intp)
+
+
+@dataclass(frozen=True)
+class _Neighbours:
+    """Pairs of faces (e, 2) that share an edge (e, 2), and whether they run along it in the same direction (e,)."""
+
+    faces: Ints
+    edges: Ints
+    against: NDArray[np.bool_]
+
+    @staticmethod
+    def of(mesh: TriangleMesh, name: str) -> "_Neighbours":
+        a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+        low, high = np.minimum(a, b), np.maximum(a, b)
+        order = np.lexsort((high, low))
+        same = (np.diff(low[order]) == 0) & (np.diff(high[order]) == 0)
+        if (same[:-1] & same[1:]).any():
+            k = order[np.flatnonzero(same[:-1] & same[1:])[0]]
+            raise InputError(f"{name} is not manifold: three faces or more share the edge near {place(mesh, a[k])}")
+        first, second = order[:-1][same], order[1:][same]
+        rim = np.ones(len(a), dtype=bool)
+        rim[first] = rim[second] = False
+        ends = np.bincount(np.concatenate([a[rim], b[rim]]), minlength=len(mesh.vertices))
+        if (ends > 2).any():
+            where = place(mesh, int(np.argmax(ends)))
+            raise InputError(f"{name} is not manifold: two parts of it touch in the single point {where}")
+        return _Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
+
+    def pieces(self, keep: NDArray[np.bool_], faces: int) -> Ints:
+        """(m,) number of the piece that each face belongs to, when only the edges `keep` join faces."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        i, j = self.faces[keep].T
+        return np.asarray(connected_components(coo_matrix((np.ones(len(i)), (i, j)), (faces, faces)), False)[1])
+
+    def turned(self, faces: int, name: str, mesh: TriangleMesh) -> NDArray[np.bool_]:
+        """(m,) faces that run against the first one."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import breadth_first_order
+
+        i, j = self.faces.T
+        graph = coo_matrix((np.where(self.against, 2.0, 1.0), (i, j)), (faces, faces)).tocsr()
+        graph = graph + graph.T
+        order, before = breadth_first_order(graph, 0, directed=False)
+        later, parents = order[1:], before[order[1:]]
+        odd = np.zeros(faces, dtype=bool)
+        odd[later] = np.asarray(graph[later, parents]).ravel() == 2.0
+        turned = [False] * faces
+        for k, parent, flip in zip(later.tolist(), parents.tolist(), odd[later].tolist(), strict=True):
+            turned[k] = turned[parent] ^ flip
+        result = np.array(turned)
+        wrong = (result[i] ^ result[j]) != self.against
+        if wrong.any():
+            where = place(mesh, int(self.edges[np.argmax(wrong), 0]))
+            raise InputError(f"{name} has only one side, as a Moebius strip has (seen near {where}): cut it")
+        return result
+
+
+def _volume(mesh: TriangleMesh) -> float:
+    centre = mesh.vertices.mean(axis=0)
+    return float(dot(mesh.vertices[mesh.faces[:, 0]] - centre, mesh.doubled).sum())
+
+
+def _smooth_piece(
+    mesh: TriangleMesh, neighbours: _Neighbours, name: str, repairs: list[str]
+) -> tuple[TriangleMesh, list[str]]:
+    """The piece between creases that covers most of the plan, facing up."""
+    i, j = neighbours.faces.T
+    length = 2 * mesh.areas
+    flat = (length[i] > 0) & (length[j] > 0)
+    cosine = dot(mesh.doubled[i], mesh.doubled[j]) / np.maximum(length[i] * length[j], 1e-300)
+    smooth = ~flat | (cosine > cos(radians(CREASE)))
+    closed = not len(mesh.loops)
+    pieces = neighbours.pieces(smooth, len(mesh.faces))
+    plan = np.bincount(pieces, mesh.doubled[:, 2]) / 2
+    chosen = int(np.argmax(plan if closed else np.abs(plan)))
+    if not smooth.all():
+        within = np.flatnonzero(~smooth & (pieces[i] == chosen) & (pieces[j] == chosen))
+        share = mesh.areas[pieces == chosen].sum() / mesh.areas.sum()
+        if len(within) or share < 0.1:
+            worst = within[np.argmin(cosine[within])] if len(within) else int(np.argmin(np.where(flat, cosine, 2.0)))
+            angle, where = degrees(np.arccos(np.clip(cosine[worst], -1, 1))), place(mesh, neighbours.edges[worst, 0])
+            raise InputError(
+                f"{name} is creased: faces meet at {angle:.0f} degrees near {where}, and a target must be smooth: "
+                "round it off, or mesh it more finely"
+            )
+        repairs.append(
+            f"the surface has creases: the target is the smooth piece of it that covers most of the plan, "
+            f"{100 * share:.0f} % of the area"
+        )
+        mesh = mesh.only(pieces == chosen)
+    if not closed and plan[chosen] < 0:
+        mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    return mesh, repairs
+
+
+def place(mesh: TriangleMesh, vertex: int) -> str:
+    x, y, z = mesh.vertices[vertex]
+    return f"({x:.4g}, {y:.4g}, {z:.4g}) m"

@@ -1,0 +1,226 @@
+"""Quantities as people write them, "30 mm", "45 deg", "25 GPa", become SI numbers: at the edge only."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from decimal import Decimal
+from difflib import get_close_matches
+from math import fmod, inf, isfinite, tau
+from numbers import Real
+from typing import Literal
+
+from rodshell.errors import InputError
+
+Kind = Literal[
+    "length",
+    "angle",
+    "stress",
+    "density",
+    "acceleration",
+    "rotational stiffness",
+    "force",
+    "bending stiffness",
+    "mass per length",
+    "inertia per length",
+    "time",
+    "stiffness",
+    "number",
+]
+
+
+@dataclass(frozen=True)
+class _Units:
+    """One kind of quantity: its name in a sentence, an example, and the SI value of each unit, SI first."""
+
+    name: str
+    example: str
+    factors: dict[str, Decimal]
+
+    @property
+    def wanted(self) -> str:
+        si = next(iter(self.factors), "")
+        return f"{self.name} such as {self.example}" + (f", or a plain number in {si}" if si else "")
+
+
+def _factors(*groups: str) -> dict[str, Decimal]:
+    """{"mm": 0.001} from "factor spelling spelling"; exact decimals, so that "17 mm" is 0.017 to the bit."""
+    rows = (group.split() for group in groups)
+    return {spelling: Decimal(factor) for factor, *spellings in rows for spelling in spellings}
+
+
+FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is one in degrees without its unit
+_DEGREE = Decimal("3.14159265358979323846264338327950288") / 180
+
+_KINDS: dict[Kind, _Units] = {
+    "length": _Units(
+        "a length",
+        '"200 mm"',
+        _factors(
+            "1 m metre metres meter meters",
+            "0.001 mm",
+            "0.01 cm",
+            "0.1 dm",
+            "1000 km",
+            "0.000001 um µm μm",
+            '0.0254 in inch inches "',
+            "0.3048 ft foot feet '",
+        ),
+    ),
+    "angle": _Units("an angle", '"45 deg"', _factors("1 rad", f"{_DEGREE} deg ° degree degrees")),
+    "stress": _Units(
+        "a stress",
+        '"25 GPa"',
+        _factors(
+            "1 Pa N/m2",
+            "1e3 kPa kN/m2",
+            "1e6 MPa N/mm2 MN/m2",
+            "1e9 GPa kN/mm2 GN/m2",
+            "6894.757293168361 psi",
+            "6894757.293168361 ksi",
+        ),
+    ),
+    "time": _Units("a time", '"10 ms"', _factors("1 s second seconds", "0.001 ms")),
+    "stiffness": _Units("a stiffness", '"0.8 N/m"', _factors("1 N/m", "1e3 N/mm kN/m")),
+    "density": _Units(
+        "a density",
+        '"1000 kg/m3"',
+        _factors("1 kg/m3", "1000 g/cm3 kg/dm3 t/m3", "16.01846337396014 lb/ft3"),
+    ),
+    "acceleration": _Units(
+        "an acceleration", '"9.81 m/s2"', _factors("1 m/s2", "0.01 cm/s2", "0.001 mm/s2", "0.3048 ft/s2")
+    ),
+    "rotational stiffness": _Units(
+        "a rotational stiffness", '"0.5 N m/rad"', _factors("1 Nm/rad Nm", "1000 kNm/rad kNm", "0.001 Nmm/rad Nmm")
+    ),
+    "force": _Units("a force", '"5 kN"', _factors("1 N", "1000 kN", "1e6 MN", "4.4482216152605 lbf")),
+    "bending stiffness": _Units(
+        "a bending stiffness",
+        '"2.5 kN m2"',
+        _factors("1 Nm2", "1000 kNm2", "1e6 MNm2", "0.000001 Nmm2", "0.001 kNmm2", "1e-4 Ncm2", "0.1 kNcm2"),
+    ),
+    "mass per length": _Units("a mass per length", '"1.2 kg/m"', _factors("1 kg/m", "0.001 g/m", "1 g/mm")),
+    "inertia per length": _Units("an inertia per length", '"0.001 kg m"', _factors("1 kgm", "0.001 gm", "0.001 kgmm")),
+    "number": _Units("a plain number", "0.5", {}),
+}
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+
+
+def parse_quantity(value: object, kind: Kind, key: str) -> float:
+    """A quantity in SI: a number as it is, a string by its unit (without one: SI).
+
+    Parameters
+    ----------
+    value : number, or text such as "30 mm", "1 g/cm3", "1.5e-3".
+    kind : of quantity that is wanted: m, rad, Pa, kg/m3, m/s2 or a plain number.
+    key : how the user knows the value, for the error message.
+
+    Raises
+    ------
+    InputError : not a number, not finite, an unknown unit or one of another kind; it says what would do.
+    """
+    try:
+        return read_quantity(value, kind)
+    except ValueError as reason:
+        raise InputError(f"{key} = {shown(value)}: {reason}") from None
+
+
+def read_quantity(value: object, kind: Kind) -> float:
+    """As `parse_quantity`, but raises ValueError with the reason alone: the caller names the key.
+
+    An angle of more than a full turn needs a unit, and is given within one turn.
+    """
+    units = _KINDS[kind]
+    if isinstance(value, str):
+        match = _QUANTITY.fullmatch(value)
+        if match is None:
+            raise ValueError(f"not a finite number; give {units.wanted}")
+        number = _scaled(match[1], read_unit(match[2], kind) if match[2] else Decimal(1))
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        number = _plain(value)
+    else:
+        raise ValueError(f"not a number; give {units.wanted}")
+    if not isfinite(number):
+        raise ValueError(f"not finite; give {units.wanted}")
+    if kind == "angle" and abs(number) > FULL_TURN:
+        if not _unit_of(value):
+            raise ValueError(f'a plain number is in radians, and this is more than a full turn; write "{number:g} deg"')
+        number = fmod(number, tau)
+    return number
+
+
+def require_unit_of_all(values: Iterable[object]) -> None:
+    """Of values in one text, as "30, 40 mm", all but zeros have a unit or none has; else ValueError."""
+    texts = [text.strip() for text in values if isinstance(text, str) and _QUANTITY.fullmatch(text)]
+    bare = [text for text in texts if not _unit_of(text) and float(text) != 0]
+    full = [text for text in texts if _unit_of(text)]
+    if bare and full:
+        unit = _unit_of(full[-1])
+        raise ValueError(
+            "only some of these have a unit, and a decimal takes a point, not a comma: give each its own, such as "
+            f'"{bare[0]} {unit}, {full[-1]}"'
+        )
+
+
+def _unit_of(value: object) -> str:
+    """The unit in a text; empty without one."""
+    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    return match[2] if match else ""
+
+
+def read_unit(text: str, kind: Kind) -> Decimal:
+    """SI value of one unit of this kind; ValueError with the reason where there is no such unit."""
+    unit = re.sub(r"\s|\^|\*\*", "", text).replace("²", "2").replace("³", "3")
+    units = _KINDS[kind]
+    if unit in units.factors:
+        return units.factors[unit]
+    for other in _KINDS.values():
+        if unit in other.factors:
+            raise ValueError(f"{text} is a unit of {other.name.split(' ', 1)[1]}; give {units.wanted}")
+    if not units.factors:
+        raise ValueError(f'takes no unit, and "{text}" follows the number; give {units.wanted}')
+    near = {name.lower(): name for name in reversed(units.factors)}
+    close = get_close_matches(unit.lower(), near, n=1, cutoff=0.5)
+    hint = f" (did you mean {near[close[0]]}?)" if close else ""
+    raise ValueError(f'unknown unit "{text}"{hint}; give {units.wanted}')
+
+
+def wanted(kind: Kind) -> str:
+    """What would do for this kind: 'a length such as "200 mm", or a plain number in m'."""
+    return _KINDS[kind].wanted
+
+
+def shown(value: object) -> str:
+    """A value as it would stand in a case file, cut short, on one line."""
+    if isinstance(value, str):
+        text = '"' + value.replace("\n", " ") + '"'
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, list | tuple):
+        text = "[" + ", ".join(shown(item) for item in value) + "]"
+    elif isinstance(value, dict):
+        text = "{ " + ", ".join(f"{key} = {shown(item)}" for key, item in value.items()) + " }"
+    else:
+        text = str(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def length_text(metres: float) -> str:
+    """A length in the unit that reads well: 83.3 mm, 20 m."""
+    in_mm = metres < 0.9995
+    return f"{float(f'{1e3 * metres if in_mm else metres:.3g}'):g} {'mm' if in_mm else 'm'}"
+
+
+def _plain(value: Real) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer past the largest float
+        return inf
+
+
+def _scaled(number: str, factor: Decimal) -> float:
+    """number * factor, rounded once; infinite where no float can hold it."""
+    try:
+        return float(Decimal(number) * factor)
+    except ArithmeticError:
+        return inf
