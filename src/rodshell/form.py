@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,8 @@ from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output import Archive
 from rodshell.output.result import States, form_result, form_states, table_result, table_states
 from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
-from rodshell.output.summary import summary_text
 from rodshell.output.takeaway import Takeaway
+from rodshell.output.verdict import Verdict, verdict
 from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
@@ -35,16 +36,32 @@ FOUND = "a form that an earlier rodshell.find_form returned (one read from a fol
 LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
 
 
-class Form(FoundForm):
+class _Judged:
+    """A job's result with its checks, made once with the usual options, and what they come to."""
+
+    @cached_property
+    def _checked(self) -> Archive:
+        return self.archive()  # type: ignore[attr-defined]
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the result is worth, all checks done: good, check or unbuildable, with the reasons.
+
+        For a strength or other options of the checks: `archive(takeaway=...).verdict`.
+        """
+        return self._checked.verdict
+
+    def summary(self) -> str:
+        """One screen of text, all checks done."""
+        return self._checked.summary()
+
+
+class Form(_Judged, FoundForm):
     """A form that was found: its stages, and its files."""
 
     def result(self) -> dict[str, Any]:
         """The content of result.json before anything was checked."""
         return form_result(self)
-
-    def summary(self) -> str:
-        """One screen of text."""
-        return summary_text(self.result())
 
     def archive(
         self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
@@ -75,16 +92,12 @@ class Form(FoundForm):
         return self.archive(case_toml, takeaway=takeaway).save(folder)
 
 
-class PoppedUp(PoppedTable):
+class PoppedUp(_Judged, PoppedTable):
     """A table of rods that was popped up, and its files."""
 
     def result(self) -> dict[str, Any]:
         """The content of result.json before anything was checked."""
         return table_result(self, "popup")
-
-    def summary(self) -> str:
-        """One screen of text."""
-        return summary_text(self.result())
 
     def archive(self, *, takeaway: Takeaway | None = None, progress: Progress = silent) -> Archive:
         """Everything that is kept, checked and made ready to be built."""
@@ -95,16 +108,12 @@ class PoppedUp(PoppedTable):
         return self.archive(takeaway=takeaway).save(folder)
 
 
-class Sewn(SewnForm):
+class Sewn(_Judged, SewnForm):
     """A form in patches that are sewn together, and its files."""
 
     def result(self) -> dict[str, Any]:
         """The content of result.json before anything was checked."""
         return sewn_result(self)
-
-    def summary(self) -> str:
-        """One screen of text."""
-        return summary_text(self.result())
 
     def archive(
         self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
@@ -143,6 +152,7 @@ def _kept(
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
     result = workshop_result(result, mesh, checks, made, takeaway.strength)
     result["drawings"] = takeaway.drawings.parameters()
+    result["verdict"] = verdict(result).table()
     return Archive(result, states | workshop_states(checks), case_toml).as_stored()
 
 

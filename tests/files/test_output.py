@@ -310,8 +310,7 @@ def test_report_needs_nothing_else(which: str, request: pytest.FixtureRequest) -
 
 def test_report_gives_the_verdict_first(out: Path) -> None:
     page = (out / "report.html").read_text()
-    verdict = page.index("Converged and stable")
-    assert verdict < page.index("<h2>")
+    assert page.index('aria-label="Verdict"') < page.index("<strong>Check: ") < page.index("<h2>")
     assert "A support that holds the rod&#39;s direction (clamped) is worth it" in page
     assert "Design aid, not code compliance" in page
     assert page.count("<figure>") == 7
@@ -326,10 +325,10 @@ def test_report_puts_failure_and_warnings_before_all(archive: Archive, tmp_path:
     words = {"warnings": ["<script>alert(1)</script>"], "dropped": [{"id": "U99", "reason": "no two ends"}]}
     result = {**archive.result, "status": "stalled", "pop_up": shells, **words}
     page = (write(replace(archive, result=result), tmp_path / "bad") / "report.html").read_text()
-    assert "Converged and stable" not in page
-    assert page.index("&lt;script&gt;alert(1)") < page.index("Not converged: do not build") < page.index("<h2>")
+    first = "Not buildable: the pop-up with pinned ends did not converge: stalled"
+    assert page.index(first) < page.index("&lt;script&gt;alert(1)") < page.index("<h2>")
     assert "<script>alert" not in page
-    assert "With clamped ends the shell would snap away from this unstable equilibrium (1 buckling mode)." in page
+    assert "with clamped ends the shell is unstable (1 buckling mode) and would snap to another shape" in page
     assert "With pinned ends the shell stays" not in page  # a shell that did not converge has no gap
     assert "U99: no two ends" in page
 
@@ -353,7 +352,7 @@ def test_least_result_is_written(tmp_path: Path) -> None:
     full = sample_archive()
     result = {key: full.result[key] for key in ("format", "version", "units", "rods")}
     out = write(Archive({**result, "status": "diverged"}, {"flat": full.states["flat"]}, ""), tmp_path / "least")
-    assert "Not converged" in (out / "report.html").read_text()
+    assert "Not buildable: it did not converge: diverged" in (out / "report.html").read_text()
     assert len(rows(out, "rods.csv")) == 18
     assert rows(out, "joints.csv")[0]["final_deg"] == ""
 

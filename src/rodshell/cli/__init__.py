@@ -72,7 +72,8 @@ def app(ctx: click.Context) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; returns its exit code: 0 done, 2 bad input, 3 not converged, 130 interrupted."""
+    """Run the command line; returns its exit code: 0 found, 2 bad input, 3 not converged, 4 found but
+    not buildable, 130 interrupted."""
     try:
         code = app.main(args=argv, prog_name="rodshell", standalone_mode=False)
     except RodshellError as error:

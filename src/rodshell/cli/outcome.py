@@ -11,7 +11,7 @@ import click
 if TYPE_CHECKING:
     from rodshell.output import Archive
 
-CONVERGED, NOT_CONVERGED = 0, 3
+FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
 
 
 class Result(Protocol):
@@ -74,14 +74,18 @@ def wanted_kinds(only: str | None) -> list[str] | None:
 
 
 def deliver(result: Result, save: Callable[[Path], object], folder: Path, *, as_json: bool, quiet: bool) -> int:
-    """Save a result, print its summary, and return the exit code."""
+    """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
     save(folder)
     if as_json:
         click.echo(json.dumps({"out": str(folder), **result.result()}))
     elif not quiet:
         click.echo(result.summary())
         click.echo(f"written to {folder}")
-    if result.status == "converged":
-        return CONVERGED
-    click.echo(f"rodshell: NOT CONVERGED: {result.status}; partial results are in {folder}", err=True)
-    return NOT_CONVERGED
+    if result.status != "converged":
+        click.echo(f"rodshell: NOT CONVERGED: {result.status}; partial results are in {folder}", err=True)
+        return NOT_CONVERGED
+    verdict = result.result().get("verdict")
+    if verdict and verdict["level"] == "unbuildable":
+        click.echo(f"rodshell: NOT BUILDABLE: {verdict['reasons'][0]}; results are in {folder}", err=True)
+        return UNBUILDABLE
+    return FOUND

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import wraps
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from rodshell.errors import OutputError
 from rodshell.output.beside import beside
 from rodshell.output.folder import put, read_json, replacing
+
+if TYPE_CHECKING:
+    from rodshell.output.verdict import Verdict
 
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
 T = TypeVar("T")
@@ -53,6 +56,13 @@ class Archive:
     def save(self, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:
         """As `write`."""
         return write(self, folder, kinds)
+
+    @property
+    def verdict(self) -> "Verdict":
+        """What the result is worth: good, check or unbuildable, with the reasons."""
+        from rodshell.output.verdict import verdict_of
+
+        return verdict_of(self.result)
 
     @property
     def name(self) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import degrees
 from typing import Any
 
-from rodshell.output.verdict import unknown_below, utilisation
+from rodshell.output.verdict import unknown_below, verdict_of
 from rodshell.output.wording import NAMES, case_rows, percent, rounded, stage, stress
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1], what a case has by default
@@ -14,10 +14,10 @@ def summary_text(result: dict[str, Any]) -> str:
     """What was found, how good it is, and what to read first."""
     rods = result["rods"]
     joints = sum(len(rod["joints"]) for rod in rods) // 2
-    verdict = "converged" if result["status"] == "converged" else f"NOT CONVERGED: {result['status']}"
-    if (utilisation(result) or 0.0) > 1:
-        verdict += ", but the rods would break"
-    lines = [f"{result['name']}: {verdict}", f"  grid      {len(rods)} rods, {joints} joints"]
+    verdict = verdict_of(result)
+    lines = [f"{result['name']}: {verdict.headline}"]
+    lines += [f"            {reason}" for reason in verdict.reasons[1:]]
+    lines.append(f"  grid      {len(rods)} rods, {joints} joints")
     lines += _rod(result["rod"])
     lines += _sewn(result)
     if net := result.get("net"):
@@ -45,7 +45,6 @@ def summary_text(result: dict[str, Any]) -> str:
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
     if len(result["dropped"]) > 6:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
-    lines += [f"  WARNING   {warning}" for warning in result["warnings"]]
     return "\n".join(lines)
 
 

@@ -18,7 +18,7 @@ Ints = NDArray[np.intp]
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
 IN_METRES = (".glb", ".gltf")  # by their standard
 LARGEST_FILE = 300e6  # bytes
-SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a rodshell can have
+SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a gridshell can have
 WHOLE = 0.97  # of the vertices of a sound file belong to faces; of one cut short, fewer
 HEAD = 4000  # bytes in which a header lies
 
