@@ -29,8 +29,9 @@ CROSS = [
 
 
 class FakeArchive:
-    def __init__(self, status: str, case_toml: str) -> None:
-        self.result = {"format": "rodshell-result", "status": status}
+    def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
+        verdict = {"level": level, "reasons": ["the rods touch"]}
+        self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
     def save(self, folder: Path, kinds: list[str] | None = None) -> None:
@@ -43,11 +44,11 @@ class FakeArchive:
 
 
 class FakeForm:
-    def __init__(self, status: str) -> None:
-        self.status = status
+    def __init__(self, status: str, level: str) -> None:
+        self.status, self.level = status, level
 
     def archive(self, case_toml: str = "", **options: Any) -> FakeArchive:
-        return FakeArchive(self.status, case_toml)
+        return FakeArchive(self.status, case_toml, self.level)
 
 
 class FakeFinder(ModuleType):
@@ -56,7 +57,7 @@ class FakeFinder(ModuleType):
     def __init__(self) -> None:
         super().__init__("rodshell.form")
         self.calls = list[tuple[tuple[Any, ...], dict[str, Any]]]()
-        self.status = "converged"
+        self.status, self.level = "converged", "good"
         self.fault: BaseException | None = None
 
     def find_form(self, *args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
@@ -65,7 +66,7 @@ class FakeFinder(ModuleType):
             progress(stage, f"iteration {iteration}", 1e-3)
         if self.fault:
             raise self.fault
-        return FakeForm(self.status)
+        return FakeForm(self.status, self.level)
 
     pop_up_table = find_form
 
@@ -225,6 +226,26 @@ def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
     finder.fault = NetLimitError("no net")
     assert main(["form", "hemisphere", "--out", "dome"]) == 2
     assert len(finder.calls) == 1
+
+
+@pytest.mark.parametrize(
+    ("status", "level", "code"),
+    [
+        ("converged", "good", 0),
+        ("converged", "check", 0),
+        ("converged", "unbuildable", 4),
+        ("stalled", "unbuildable", 3),
+    ],
+)
+def test_the_exit_code_is_the_verdict_s_and_not_converged_wins(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], status: str, level: str, code: int
+) -> None:
+    finder.status, finder.level = status, level
+    assert main(["form", "hemisphere", "--quiet"]) == code
+    said = {0: "", 3: "rodshell: NOT CONVERGED: stalled", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
+    err = capsys.readouterr().err
+    assert err.startswith(said)
+    assert (err == "") == (code == 0)
 
 
 def test_not_converged_saves_says_so_and_ends_with_3(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
