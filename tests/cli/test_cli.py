@@ -230,13 +230,9 @@ def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
 
 @pytest.mark.parametrize(
     ("status", "level", "code"),
-    [
-        ("converged", "good", 0),
-        ("converged", "check", 0),
-        ("converged", "unbuildable", 4),
-        ("stalled", "unbuildable", 3),
-    ],
-)
+    [("converged", "good", 0), ("converged", "check", 0), ("converged", "unbuildable", 4), ("stalled", "check", 3),
+     ("stalled", "unbuildable", 3)],
+)  # fmt: skip
 def test_the_exit_code_is_the_verdict_s_and_not_converged_wins(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str], status: str, level: str, code: int
 ) -> None:
@@ -276,6 +272,7 @@ def test_json_is_the_result_and_nothing_else_on_stdout(finder: FakeFinder, capsy
         "out": str(Path("out/hemisphere").resolve()),
         "format": "rodshell-result",
         "status": "converged",
+        "verdict": {"level": "good", "reasons": ["the rods touch"]},
     }
 
 
