@@ -16,7 +16,7 @@ from rodshell.checks.joined import joined_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import fabricate
 from rodshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
-from rodshell.formfinding.drape import Method, require
+from rodshell.formfinding.drape import Method
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
@@ -31,6 +31,7 @@ from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, works
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.targets.seam import Seam
+from rodshell.validation import instance
 
 FOUND = "a form that an earlier rodshell.find_form returned (one read from a folder: run its case.toml again)"
 LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
@@ -163,10 +164,10 @@ def find_form(
     *,
     method: Method = "bound",
     anchor: tuple[float, float] | None = None,
-    gravity: float = 9.81,
+    gravity: float | None = None,
     joint: Joint | None = None,
     fall: Fall | None = None,
-    ends: Sequence[Ends] = ("pinned", "clamped"),
+    ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
     start: FoundForm | None = None,
     progress: Progress = silent,
 ) -> Form:
@@ -180,7 +181,7 @@ def find_form(
     method, anchor, gravity : of the drape, see `drape`.
     joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
     fall : of method "paper", see `drape`.
-    ends : end conditions of the pop-up.
+    ends : end conditions of the pop-up: "pinned", "clamped", or both in a tuple.
     start : a form found before, for a spacing, heading, anchor or target that has changed a little: its net is where
         the new net is looked for (method "bound"), and where its shells went from their draped states is where the new
         ones start, rods being matched by their place in the lattice. Any form will do; what does not help is
@@ -197,9 +198,9 @@ def find_form(
     InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
     """
     for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
-        require(name, value, kind)
+        instance(name, value, kind)
     if start is not None:
-        require("start", start, FoundForm, FOUND)
+        instance("start", start, FoundForm, FOUND)
     found = find_stages(
         target, layout, rod,
         method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,
@@ -216,7 +217,7 @@ def sew(
     *,
     own: Mapping[str, PatchLayout] | None = None,
     joint: Joint | None = None,
-    ends: Sequence[Ends] = ("pinned", "clamped"),
+    ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
     search: bool = False,
     progress: Progress = silent,
 ) -> Sewn:
@@ -236,7 +237,7 @@ def sew(
     InputError : a value does not fit. NetLimitError : no net covers a patch from its anchor and heading.
     """
     for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
-        require(name, value, kind)
+        instance(name, value, kind)
     found = find_sewn_stages(
         target, [Seam.of(row) for row in seams], layout, rod,
         own=own, joint=joint, ends=ends, search=search, progress=progress,

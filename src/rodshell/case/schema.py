@@ -292,7 +292,8 @@ class Case(Table):
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "gravity": drape.gravity, "ends": ends}
+        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "ends": ends}
+        options["gravity"] = None if drape.method == "bound" else drape.gravity
         options["fall"] = drape.fall() if drape.method == "paper" else None
         options["joint"] = self.joint.build()
         target = self.target.build()
