@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from math import isfinite
 from numbers import Real
 from reprlib import repr as short
+from types import UnionType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,10 +21,11 @@ Floats = NDArray[np.float64]
 Choice = TypeVar("Choice", bound=str)
 
 
-def instance(name: str, value: object, kind: type, wanted: str = "") -> None:
+def instance(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:
     """Refuse a `value` that is no `kind`; `wanted` says in words what it must be, by default a rodshell `kind`."""
     if not isinstance(value, kind):
-        raise InputError(f"{name} must be {wanted or f'a rodshell {kind.__name__}'}, not {_described(value)}")
+        what = wanted or f"a rodshell {getattr(kind, '__name__', kind)}"
+        raise InputError(f"{name} must be {what}, not {_described(value)}")
 
 
 def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
