@@ -1,0 +1,259 @@
+"""The load factor at which a shell first loses its stability, limit points and bifurcations alike.
+
+The path of equilibria under t W begins at t = 0 and is followed by the work w = W . (x - x0) that the load W would do.
+The tangent v = K^-1 W has dt/dw = 1 / (W . v), which is positive where the shell is stable and passes smoothly through
+zero at a limit point, so that w grows all along the path, bifurcations and limit points included: displacement
+control by the displacement that belongs to the load [Riks 1979; Crisfield 1991, section 9.3].
+
+At each point the lowest modes of the stiffness, and how it changes along the path, say how far away the first
+singular stiffness is. Steps go for it from below until a stable and an unstable point enclose it. The factor of the
+stable one is the answer, so that it is never larger than what was found to be stable.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.rods.elements import Elements
+from rodshell.solve.linear import SingularError
+from rodshell.solve.problem import Problem
+from rodshell.solve.tangent import Tangent
+
+Floats = NDArray[np.float64]
+Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
+
+CLOSE = 2e-3  # of the factor: the last stable point is as near as this to the first unstable one
+MODES = 4  # lowest ones that are looked at
+MOST_FACTORIZATIONS = 80
+MOST_STEPS = 12  # of Newton's method for a point
+FARTHEST = 0.1  # of the length that a node moves from point to point
+STRAYED = 0.3  # of a step: a point so far off the prediction may lie on another path
+LEAST = 1e-5  # of the work or factor so far: shorter steps are given up
+SETTLED, SETTLED_FORCE = 1e-10, 1e-8  # of the length and of the largest axial force: last change of a point
+CHORD, SLOW = 5e-3, 0.2  # as in `newton_step`
+SAME_STIFFNESS = 1e-5, 1e-4  # of length and force: factors from this near are those of the point
+PROBE = 1e-5  # of the length: displacement over which the stiffness's change is taken
+
+
+@dataclass(frozen=True)
+class Critical:
+    """Where a path of equilibria under t W first loses its stability.
+
+    Parameters
+    ----------
+    factor : the largest t found stable, `CLOSE` to where stability is lost; 0 where the unloaded shell is not stable.
+    limit : what ends the stable path: "limit point", the load cannot grow; "bifurcation", the shell leaves the path
+        sideways; "none", nothing up to the largest factor asked for; "lost", the path could not be followed
+        further, and nothing is known above `factor`.
+    state : (n, 3) the equilibrium at t = 1, or None where that was not reached.
+    """
+
+    factor: float
+    limit: Limit
+    state: Floats | None
+    factorizations: int
+
+
+@dataclass(frozen=True)
+class _Point:
+    """An equilibrium on the path: at work `work` [J], with the derivatives by the work `motion` (n, 3), `change` (e,)
+    and `rate` of state, forces and factor; its modes and the work `ahead` to the first singular stiffness as the modes
+    change here, and that `behind`."""
+
+    factor: float
+    work: float
+    state: Floats
+    forces: Floats
+    elements: tuple[Elements, ...]
+    negative_modes: int
+    motion: Floats
+    change: Floats
+    rate: float
+    modes: Floats | None = None
+    ahead: float = np.inf
+    behind: float = -np.inf
+
+
+def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats, *, most: float = 100.0) -> Critical:
+    """Follow a shell from equilibrium without the load until it loses its stability.
+
+    Parameters
+    ----------
+    problem : the shell; its elements' source frames are at `state`, its edges elastic, its supports at rest.
+    state, forces : (n, 3) the equilibrium without the load [m], axial forces (e,) [N].
+    load : (n, 3) W, the dead load at factor 1 [N]; not zero in the free directions.
+    most : factor up to which the path is followed.
+    """
+    path = _Path(problem, state, load)
+    here = path.begin(state, forces)
+    if here is None or here.negative_modes:
+        return Critical(0.0, "unstable unloaded", None, path.factorizations)
+    beyond, before, limit, unit_state, longest = None, None, "lost", None, np.inf
+    doubt = 0.5  # share of the way ahead that is left: how well the last point foresaw this one
+    while path.factorizations < MOST_FACTORIZATIONS:
+        if here.factor >= most:
+            limit = "none"
+            break
+        if beyond is not None and _peak(here, beyond) - here.factor <= CLOSE * here.factor:
+            limit = "limit point" if beyond.rate < 0 else "bifurcation"
+            break
+        step = min(path.next_step(here, before, beyond, most, doubt), longest)
+        if step <= LEAST * max(here.work, 0.0) or step * here.rate <= LEAST * here.factor:
+            break
+        there = path.point(here, before or beyond, step)
+        if there is None or (there.negative_modes == 0 and (-there.behind < step or there.rate <= 0)):
+            longest = 0.5 * step
+            continue
+        if there.negative_modes:
+            beyond = there
+            continue
+        if here.factor < 1.0 <= there.factor:
+            unit_state = path.at_one(here, there)
+        foreseen, now = here.ahead, step + there.ahead
+        doubt = min(0.5, max(0.02, abs(now - foreseen) / now)) if np.isfinite(now) and np.isfinite(foreseen) else 0.5
+        before, here, longest = here, there, max(2.0 * step, longest) if np.isfinite(longest) else np.inf
+    return Critical(here.factor, limit, unit_state, path.factorizations)
+
+
+def _peak(here: _Point, beyond: _Point) -> float:
+    """The largest factor between two points, by the cubic through both: at a limit point above the last one's."""
+    if beyond.rate >= 0:
+        return beyond.factor
+    share, span = np.linspace(0.0, 1.0, 101), beyond.work - here.work
+    rise = (1 + 2 * share) * (1 - share) ** 2 * here.factor + share**2 * (3 - 2 * share) * beyond.factor
+    return float((rise + span * share * (1 - share) * ((1 - share) * here.rate - share * beyond.rate)).max())
+
+
+class _Path:
+    def __init__(self, problem: Problem, state: Floats, load: Floats) -> None:
+        self._problem, self._start, self._load = problem, state, load
+        self._tangent = Tangent(problem, state)
+        self._least_force = 1e-6 * float(problem.stretch.stiffness.max())
+
+    @property
+    def factorizations(self) -> int:
+        return self._tangent.factorizations
+
+    def begin(self, state: Floats, forces: Floats) -> _Point | None:
+        """The unloaded shell."""
+        try:
+            negative = self._tangent.factor(self._problem.elements, state, forces)
+        except SingularError:
+            return None
+        return self._with_tangent(0.0, state, forces, self._problem.elements, negative, None)
+
+    def next_step(
+        self, here: _Point, before: _Point | None, beyond: _Point | None, most: float, doubt: float
+    ) -> float:
+        """How far to go in work: for the singular stiffness ahead, from below until it is near enough to pass."""
+        left = 0.5 * here.ahead * here.rate if np.isfinite(here.ahead) else np.inf  # of the factor, at least
+        near = 2 * left < 0.4 * CLOSE * here.factor
+        step = 2.0 * here.ahead if near else (1 - doubt) * here.ahead
+        if beyond is not None:
+            span = beyond.work - here.work
+            return float(np.clip(step, 0.05 * span, 0.95 * span)) if here.ahead < span else 0.5 * span
+        reach = float(np.abs(here.motion).max())
+        longest = min(FARTHEST * self._problem.length / reach, 1.02 * (most - here.factor) / here.rate)
+        return min(step, longest)
+
+    def point(self, here: _Point, other: _Point | None, step: float) -> _Point | None:
+        """The point a step further; None where Newton's method does not find it, or strays from the prediction.
+
+        other : a point that tells the curvature of the path, or None.
+        """
+        state, forces = here.state + step * here.motion, here.forces + step * here.change
+        if other is not None:
+            half = 0.5 * step**2 / (other.work - here.work)
+            state, forces = state + half * (other.motion - here.motion), forces + half * (other.change - here.change)
+        found = self._correct(state, forces, here.factor + step * here.rate, here.elements, work=here.work + step)
+        if found is None:
+            return None
+        factor, at, axial, elements, negative = found
+        strayed = np.abs(at - state).max() > STRAYED * np.abs(at - here.state).max()
+        return None if strayed else self._with_tangent(factor, at, axial, elements, negative, here.modes)
+
+    def at_one(self, here: _Point, there: _Point) -> Floats | None:
+        """(n, 3) the state at factor 1 between two points."""
+        span = there.work - here.work
+        share = (1.0 - here.factor) / (there.factor - here.factor)
+        bend = 0.5 * share * (share - 1) * span
+        state = (1 - share) * here.state + share * there.state + bend * (there.motion - here.motion)
+        forces = (1 - share) * here.forces + share * there.forces + bend * (there.change - here.change)
+        found = self._correct(state, forces, 1.0, here.elements, work=None)
+        return None if found is None else found[1]
+
+    def _correct(
+        self, state: Floats, forces: Floats, factor: float, elements: tuple[Elements, ...], *, work: float | None
+    ) -> tuple[float, Floats, Floats, tuple[Elements, ...], int] | None:
+        """Newton's method to the equilibrium at this work, or at this factor; the last factors are those of the end."""
+        tangent, stretch, length = self._tangent, self._problem.stretch, self._problem.length
+        last, chord = np.inf, False
+        elements = _refreshed(elements, state)
+        try:
+            for _ in range(MOST_STEPS):
+                if not chord:
+                    negative = tangent.factor(elements, state, forces)
+                    at, axial, along = state, forces, tangent.solve(self._load)
+                strains = stretch.strains(state)
+                gradient = tangent.gradient(elements, state, forces) - factor * self._load
+                stretch.add_axial(at, stretch.stiffness * strains - forces, gradient)
+                motion, more = tangent.solve(-gradient), 0.0
+                if work is not None:
+                    missing = work - self._work(state + motion)
+                    more = missing / float(np.sum(self._load * along))
+                    motion = motion + more * along
+                moved = float(np.abs(motion).max()) / length
+                if not np.isfinite(moved) or moved > 1.0:
+                    return None
+                if chord and moved > SLOW * last:
+                    chord = False
+                    continue
+                after = stretch.stiffness * (strains + stretch.elongation(at, motion))
+                size = max(float(np.abs(after).max(initial=0.0)), self._least_force)
+                changed = float(np.abs(after - forces).max(initial=0.0)) / size
+                state, forces, factor = state + motion, after, factor + more
+                elements = _refreshed(elements, state)
+                last, chord = moved, moved < CHORD
+                if moved < SETTLED and changed < SETTLED_FORCE:
+                    since = float(np.abs(state - at).max()) / length, float(np.abs(forces - axial).max()) / size
+                    if since[0] > SAME_STIFFNESS[0] or since[1] > SAME_STIFFNESS[1]:
+                        negative = tangent.factor(elements, state, forces)
+                    return factor, state, forces, elements, negative
+        except SingularError:
+            pass
+        return None
+
+    def _with_tangent(
+        self, factor: float, state: Floats, forces: Floats, elements: tuple[Elements, ...], negative: int,
+        modes: Floats | None,
+    ) -> _Point:  # fmt: skip
+        """The point at a state whose stiffness was factorised last."""
+        along = self._tangent.solve(self._load)
+        rate = 1.0 / float(np.sum(self._load * along))
+        motion = rate * along
+        stretch = self._problem.stretch
+        change = stretch.stiffness * stretch.elongation(state, motion)
+        point = _Point(factor, self._work(state), state, forces, elements, negative, motion, change, rate)
+        return point if negative else self._looking_ahead(point, modes)
+
+    def _looking_ahead(self, here: _Point, start: Floats | None) -> _Point:
+        """With its modes and the nearest singular stiffness, as the stiffness of the lowest modes changes here."""
+        values, modes = self._tangent.lowest(MODES, start)
+        step = PROBE * self._problem.length / float(np.abs(here.motion).max())
+        state, forces = here.state + step * here.motion, here.forces + step * here.change
+        change = self._tangent.change(here.elements, state, forces, modes, step)
+        root = 1.0 / np.sqrt(values)
+        loss = np.linalg.eigvalsh(-change * root[:, None] * root)  # 1/J: the modes' stiffness vanishes at 1/loss
+        ahead = 1.0 / loss[-1] if loss[-1] > 0 else np.inf
+        behind = 1.0 / loss[0] if loss[0] < 0 else -np.inf
+        return replace(here, modes=modes, ahead=float(ahead), behind=float(behind))
+
+    def _work(self, state: Floats) -> float:
+        return float(np.sum(self._load * (state - self._start)))
+
+
+def _refreshed(elements: Sequence[Elements], state: Floats) -> tuple[Elements, ...]:
+    return tuple(element.refreshed(state) for element in elements)
