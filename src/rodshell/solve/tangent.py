@@ -79,7 +79,7 @@ class Tangent:
         return values, modes
 
     def change(self, elements: Sequence[Elements], state: Floats, forces: Floats, modes: Floats, step: float) -> Floats:
-        """(k, k) change of the last stiffness to the state and the forces given, over `step`, between modes (k, dofs)."""
+        """(k, k) change of the last stiffness to that at the state given, over `step`, between modes (k, dofs)."""
         data = (self._values(elements, state, forces) - self._data) / step
         size, assembly = self.free.size, self.pattern.assembly
         upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(size, size))
