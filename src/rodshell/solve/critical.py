@@ -33,7 +33,9 @@ FARTHEST = 0.1  # of the length that a node moves from point to point
 STRAYED = 0.3  # of a step: a point so far off the prediction may lie on another path; half of it is aimed at
 SHRINKAGE, GROWTH = 0.4, 3.0  # of steps that failed, at least; and from point to point, at most
 RETURNED = 0.5  # of a step, from its end: where a mode's stiffness seems to vanish there, it may have been negative
-LEAST = 1e-5  # of the arc so far, or of a hundredth of the length: shorter steps are given up
+PASSING = 0.5 * CLOSE  # of the arc so far: the shortest step past a singular stiffness
+UNEXPLAINED = 4.0  # of the arc to an unstable point: the lowest modes of the stable one vanish farther ahead only
+LEAST = 1e-5  # of the arc so far: shorter steps are given up; that arc being counted as so much of the length at least
 SETTLED, SETTLED_FORCE = 1e-10, 1e-8  # of the length and of the largest axial force: last change of a point
 CHORD, SLOW = 5e-3, 0.2  # as in `newton_step`
 SAME_STIFFNESS = 1e-5, 1e-4  # of length and force: factors from this near are those of the point
@@ -90,16 +92,18 @@ def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats
 
     Parameters
     ----------
-    problem : the shell; its elements' source frames are at `state`, its edges elastic, its supports at rest.
-    state, forces : (n, 3) the equilibrium without the load [m], axial forces (e,) [N].
-    load : (n, 3) W, the dead load at factor 1 [N]; not zero in the free directions.
+    problem : the shell; its elements' source frames are at `state`, its edges elastic, its supports at rest. A load
+        that it has stays as it is.
+    state, forces : (n, 3) its equilibrium [m], axial forces (e,) [N].
+    load : (n, 3) W, the dead load that grows, at factor 1 [N]; not zero in the free directions.
     most : factor up to which the path is followed.
     """
     path = _Path(problem, state, load)
     here = path.begin(state, forces)
     if here is None or here.negative_modes:
         return Critical(0.0, "unstable unloaded", None, path.factorizations)
-    beyond, before, limit, unit_state, longest = None, None, "lost", None, np.inf
+    limit: Limit = "lost"
+    beyond, before, unit_state, longest = None, None, None, np.inf
     doubt = 0.5  # share of the way ahead that is left: how well the last point foresaw this one
     while path.factorizations < MOST_FACTORIZATIONS:
         if here.factor >= most:
@@ -109,7 +113,7 @@ def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats
             limit = "limit point" if beyond.rate < 0 else "bifurcation"
             break
         step = min(path.next_step(here, beyond, most, doubt), longest)
-        if step <= LEAST * max(here.arc, 0.01 * problem.length):
+        if step <= LEAST * max(here.arc, LEAST * problem.length):
             break
         there = path.point(here, before or beyond, step)
         if there is None or (there.negative_modes == 0 and -there.behind < RETURNED * step):
@@ -124,6 +128,10 @@ def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats
         foreseen, now = here.ahead, step + there.ahead
         doubt = min(0.5, max(0.02, abs(now - foreseen) / now)) if np.isfinite(now) and np.isfinite(foreseen) else 0.5
         before, here = here, there
+        if beyond is not None and here.ahead > UNEXPLAINED * (beyond.arc - here.arc) and here.strayed < 0.1 * STRAYED:
+            beyond = None  # it lies on another path
+    if limit == "lost" and here.ahead * here.rate <= CLOSE * here.factor:
+        limit = "limit point"  # so sharp a turn that its far side was not found, but no farther than that
     return Critical(here.factor, limit, unit_state, path.factorizations)
 
 
@@ -137,8 +145,11 @@ def _peak(here: _Point, beyond: _Point) -> float:
 
 
 class _Path:
+    """Points on the path of a problem under a growing load."""
+
     def __init__(self, problem: Problem, state: Floats, load: Floats) -> None:
-        self._problem, self._start, self._load = problem, state, load
+        self._problem, self._load = problem, load
+        self._constant = np.zeros_like(load) if problem.load is None else problem.load
         self._nodes = np.unique(problem.stretch.blocks)  # the other blocks are angles
         self._tangent = Tangent(problem, state)
         self._least_force = 1e-6 * float(problem.stretch.stiffness.max())
@@ -159,7 +170,7 @@ class _Path:
         """How far to go: for the singular stiffness ahead, from below until it is near enough to pass."""
         left = 0.5 * here.ahead * here.rate if np.isfinite(here.ahead) else np.inf  # of the factor, at least
         near = 2 * left < 0.4 * CLOSE * here.factor
-        step = 2.0 * here.ahead if near else (1 - doubt) * here.ahead
+        step = max(2.0 * here.ahead, PASSING * here.arc) if near else (1 - doubt) * here.ahead
         if beyond is not None:
             span = beyond.arc - here.arc
             return float(np.clip(step, 0.05 * span, 0.95 * span)) if here.ahead < span else 0.5 * span
@@ -192,15 +203,16 @@ class _Path:
         bend = 0.5 * share * (share - 1) * span
         state = (1 - share) * here.state + share * there.state + bend * (there.motion - here.motion)
         forces = (1 - share) * here.forces + share * there.forces + bend * (there.change - here.change)
-        found = self._correct(state, forces, 1.0, here.elements)
+        near = STRAYED * self._reach(there.state - here.state)
+        found = self._correct(state, forces, 1.0, here.elements, near=near)
         return None if found is None else found[1]
 
     def _correct(
         self, state: Floats, forces: Floats, factor: float, elements: tuple[Elements, ...], *,
         across: Floats | None = None, near: float = np.inf,
     ) -> tuple[float, Floats, Floats, tuple[Elements, ...], int] | None:  # fmt: skip
-        """Newton's method to the equilibrium at this factor, or on the plane through the state `across` a motion (n, 3),
-        at most `near` [m] away; the last factors are those of the end."""
+        """Newton's method to the equilibrium at this factor, or on the plane through the state `across` a motion
+        (n, 3), at most `near` [m] away; the last factors are those of the end."""
         tangent, stretch, length, first = self._tangent, self._problem.stretch, self._problem.length, state
         last, chord = np.inf, False
         elements = _refreshed(elements, state)
@@ -210,7 +222,7 @@ class _Path:
                     negative = tangent.factor(elements, state, forces)
                     at, axial, along = state, forces, tangent.solve(self._load)
                 strains = stretch.strains(state)
-                gradient = tangent.gradient(elements, state, forces) - factor * self._load
+                gradient = tangent.gradient(elements, state, forces) - self._constant - factor * self._load
                 stretch.add_axial(at, stretch.stiffness * strains - forces, gradient)
                 motion, more = tangent.solve(-gradient), 0.0
                 if across is not None:
