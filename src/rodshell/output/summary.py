@@ -5,7 +5,7 @@ from math import degrees
 from typing import Any
 
 from rodshell.output.verdict import unknown_below, verdict_of
-from rodshell.output.wording import NAMES, case_rows, percent, rounded, stage, stress
+from rodshell.output.wording import NAMES, case_rows, percent, rounded, share_of_weight, stage, stress
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1], what a case has by default
 
@@ -35,7 +35,7 @@ def summary_text(result: dict[str, Any]) -> str:
         if own := drape.get("own_ends"):
             lines.append(f"            its own rod ends within {_mm(own['max'])}, median {_mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
-        state = "stable" if shell["stable"] else shell["status"] + ", NOT STABLE"
+        state = "stable, unloaded" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
         if gap := result.get("agreement", {}).get(ends):
             line += f"; gap max {_mm(gap['max'])} ({percent(gap['max_relative'])}), "
@@ -79,7 +79,7 @@ def _sewn(result: dict[str, Any]) -> Iterator[str]:
 
 
 def _checked(result: dict[str, Any]) -> list[str]:
-    """Bending and reactions, in a line each."""
+    """Bending, own weight and reactions, in a line each."""
     lines, unknown = [], unknown_below(result)
     for place, bent in result.get("bending", {}).items():
         if place == "pop_up" and unknown >= 1:
@@ -94,6 +94,11 @@ def _checked(result: dict[str, Any]) -> list[str]:
             if place == "pop_up" and unknown:
                 line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
+    for ends, weighed in result.get("self_weight", {}).items():
+        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}"
+        if weighed.get("deflection") is not None:
+            line += f"; sinks by {_mm(weighed['deflection'])} under it"
+        lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
         lines.append(f"  reactions {ends:<8}largest {rounded(held['largest_force'])} N; sums of {sums}")
