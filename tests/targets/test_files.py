@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import rodshell as rs
 from rodshell.case import load_case
@@ -86,10 +87,9 @@ def test_a_table_of_heights_is_its_surface(tmp_path):
 
 
 def test_a_grey_image_is_heights_between_black_and_white(tmp_path):
-    image = pytest.importorskip("PIL.Image")
     x, y = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(1, -1, 40))
     share = 0.9 - 0.4 * x**2 - 0.3 * y**2 + 0.1 * x
-    image.fromarray(np.rint(65535 * share).astype(np.uint16)).save(tmp_path / "roof.png")
+    Image.fromarray(np.rint(65535 * share).astype(np.uint16)).save(tmp_path / "roof.png")
     target = rs.heights_from(tmp_path / "roof.png", size=(0.6, 0.4), height=0.2)
     assert target.height(np.array([[0.15, 0.1], [-0.15, -0.1]])) == pytest.approx(
         0.2 * (0.9 - 0.1 - 0.075 + 0.05 * np.array([1, -1])), abs=2e-5
@@ -98,7 +98,7 @@ def test_a_grey_image_is_heights_between_black_and_white(tmp_path):
 
 def test_a_nurbs_patch_is_met_and_its_trim_bounds_it(tmp_path):
     """A plane trimmed to a circle, and the same plane whole: the surface of both goes on past the trim."""
-    rhino3dm = pytest.importorskip("rhino3dm")
+    rhino3dm = pytest.importorskip("rhino3dm", reason="no rhino3dm: pip install rhino3dm")
     circle = rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 150.0).ToNurbsCurve()
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters

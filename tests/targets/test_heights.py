@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import rodshell as rs
 from rodshell.targets.greyimage import read_image, smoothed
@@ -132,10 +133,9 @@ def test_planes_and_what_is_no_terrace_are_left_alone():
 
 @pytest.mark.parametrize(("mode", "white", "coarse"), [("L", 255, True), ("RGB", 255, True), ("I;16", 65535, False)])
 def test_an_image_of_8_bits_is_told_and_one_of_16_bits_is_taken_as_it_is(mode, white, coarse, tmp_path):
-    image = pytest.importorskip("PIL.Image")
     true = dome(40)
     stored = np.round(white * true).astype(np.uint16 if white > 255 else np.uint8)
-    image.fromarray(np.repeat(stored[:, :, None], 3, axis=2) if mode == "RGB" else stored).save(tmp_path / "roof.png")
+    Image.fromarray(np.repeat(stored[:, :, None], 3, axis=2) if mode == "RGB" else stored).save(tmp_path / "roof.png")
     heights, step = read_image(tmp_path / "roof.png")
     assert (step is not None) == coarse
     vertices, _, notes = read_heights(tmp_path / "roof.png", SIZE, 3.0)
@@ -152,8 +152,7 @@ def test_an_image_of_8_bits_is_told_and_one_of_16_bits_is_taken_as_it_is(mode, w
 
 def test_a_grid_forms_on_an_image_of_8_bits(tmp_path):
     """Its terraces had no drape without smoothing."""
-    image = pytest.importorskip("PIL.Image")
-    image.fromarray(np.round(255 * dome(80)).astype(np.uint8)).save(tmp_path / "roof.png")
+    Image.fromarray(np.round(255 * dome(80)).astype(np.uint8)).save(tmp_path / "roof.png")
     target = rs.heights_from(tmp_path / "roof.png", size=SIZE, height=3.0)
     rod = rs.Rod(rs.Circle(radius=0.03), rs.Material(youngs_modulus=1e6, density=1e3))
     draped = rs.drape(rs.GridLayout.orthogonal(spacing=1.0), rod, target)
