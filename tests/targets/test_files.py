@@ -1,6 +1,7 @@
 """Targets from files: every format gives the same surface, and the command line takes the file alone."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -186,14 +187,32 @@ def test_broken_files_are_refused_in_one_sentence(tmp_path):
         ("noise.glb", b"glTF" + bytes(range(200))),
     ],
 )  # fmt: skip
-def test_what_went_wrong_inside_a_reader_is_not_the_users_business(name, content, tmp_path):
+def test_a_file_that_cannot_be_read_is_refused_with_the_readers_own_words_in_one_line(name, content, tmp_path):
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(rs.InputError) as caught:
         rs.surface_from(path, unit=1.0)
-    assert f"cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export" in str(
-        caught.value
-    )
+    words = f"cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export it anew "
+    assert re.search(re.escape(words) + r"\(the reader says: \w+(: .+)?\)$", str(caught.value))
+
+
+def test_a_fault_of_the_reader_itself_is_not_hidden_behind_the_file(bowl, tmp_path, monkeypatch):
+    (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
+    monkeypatch.delattr("trimesh.load_scene")  # as in its versions before 4.6
+    with pytest.raises(rs.InputError, match="module 'trimesh' has no attribute 'load_scene'"):
+        rs.surface_from(tmp_path / "bowl.obj", unit=1.0)
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+def test_names_and_comments_may_be_written_in_any_usual_code(code, bowl, tmp_path):
+    text = WRITERS["obj"](*bowl).decode()
+    (tmp_path / "bowl.obj").write_bytes(f"# gro\xdf\no K\xfcppel\n{text}".encode(code))
+    assert rs.surface_from(tmp_path / "bowl.obj", unit=1.0, name="K\xfcppel").size > 0
+    comments = {"off": ("OFF\n", "OFF\n# gro\xdf\n"), "ply": ("ascii 1.0\n", "ascii 1.0\ncomment gro\xdf\n")}
+    for kind, (line, longer) in comments.items() if code != "utf-16" else ():
+        written = WRITERS[kind](*bowl).decode().replace(line, longer)
+        (tmp_path / f"bowl.{kind}").write_bytes(written.encode(code.removesuffix("-sig")))
+        assert rs.surface_from(tmp_path / f"bowl.{kind}", unit=1.0).size > 0
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,9 @@
 """Tables and images of heights: however the same surface is written down, the same surface is read."""
 
+import struct
+import warnings
+import zlib
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -158,3 +162,24 @@ def test_a_grid_forms_on_an_image_of_8_bits(tmp_path):
     draped = rs.drape(rs.GridLayout.orthogonal(spacing=1.0), rod, target)
     assert draped.report.converged
     assert draped.report.negative_modes == 0
+
+
+@pytest.mark.parametrize(("width", "height"), [(1501, 1000), (5000, 4000), (12000, 12000), (60000, 60000)])
+def test_an_image_of_too_many_pixels_is_refused_before_they_are_decoded(width, height, tmp_path):
+    """There are none: only the header."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    chunks = head, b"IDAT" + zlib.compress(b""), b"IEND"
+    data = b"".join(struct.pack(">I", len(c) - 4) + c + struct.pack(">I", zlib.crc32(c)) for c in chunks)
+    (tmp_path / "roof.png").write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(rs.InputError, match=r"(x \d+ heights|far too many pixels): scale it down to 1.5 million"):
+            read_image(tmp_path / "roof.png")
+
+
+@pytest.mark.parametrize("line", ["0," * 1300 + "0", "0,0,0"])
+def test_a_table_of_too_many_heights_is_refused_before_its_numbers_are_read(line, tmp_path):
+    rows = 1_500_001 // (line.count(",") + 1 if len(line) > 5 else 1) + 1
+    (tmp_path / "roof.csv").write_text("\n".join([line, *["x"] * rows]))
+    with pytest.raises(rs.InputError, match=r"heights: scale it down to 1.5 million or fewer"):
+        read_table(tmp_path / "roof.csv", SIZE)
