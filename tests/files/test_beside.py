@@ -11,7 +11,7 @@ from rodshell.output import beside as module
 from rodshell.output.archive import write
 from rodshell.output.beside import beside
 
-forked = pytest.mark.skipif(not hasattr(os, "fork"), reason="no child processes here")
+forked = pytest.mark.skipif(not hasattr(os, "fork"), reason="no os.fork: run on Linux or macOS")
 
 
 @pytest.fixture

@@ -1,10 +1,10 @@
 """The report: what a reader meets first, that it needs nothing else, and that it works in a browser."""
 
 import base64
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from rodshell.output.figures import key_figures
 from rodshell.output.plan import flat_plan
 from rodshell.output.result import rod_table
 from rodshell.output.verdict import facts
-from rodshell.output.viewer import viewer_json
+from rodshell.output.viewer import viewer_data, viewer_json
 from tests.acceptance.cases import ROD
 
 
@@ -28,20 +28,75 @@ def page_of(made: object, folder: Path) -> Path:
     return folder / "report.html"
 
 
+UNITS = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0, "mm": 1e-3, "m": 1.0}
+
+
+def breaking() -> Archive:
+    """A dome whose rods use 169 % of their strength halfway up, and little of it before and after."""
+    made = wished()
+    history = made.states["history_stress"].copy()
+    history[2] *= 1.69 * made.result["bending"]["strength"] / history[2].max()
+    return replace(made, states={**made.states, "history_stress": history})
+
+
+REPORTS = {**{name: lambda name=name: archive(name) for name in TARGETS}, "table": table_archive, "breaking": breaking}
+
+
+def coloured(made: Archive) -> dict[str, list[np.ndarray | None]]:
+    """By colour, what each frame of the view shows [Pa or m] at each entry of `rod_nodes`, where it is known."""
+    states, nodes = made.states, made.states["rod_nodes"]
+    ends = [end for end in ("pinned", "clamped") if f"popped_{end}" in states]
+    between = len(states["history"]) - 2 if "history" in states else 0
+    stress = [*states.get("history_stress", [])[1 : between + 1], *(states.get(f"stress_{end}") for end in ends)]
+    if not made.result.get("target"):
+        return {"gap": [None, *(states[f"popped_{end}"][nodes, 2] for end in ends)]}
+    gap = [*[None] * between, *(states[f"gap_{end}"][nodes] for end in ends)]
+    return {"stress": [None, *stress], "gap": [None, *gap]}
+
+
+def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
+    """Every caption or tick at the colour bar that is not true of the frame that is shown."""
+    strength, wrong = (made.result.get("bending") or {}).get("strength"), []
+    for kind, k, caption, ticks in found["legends"]:
+        shown = coloured(made)[kind][k] if kind != "none" else None
+        if shown is None or not caption:
+            wrong += [f"{kind}, frame {k}: {caption!r}"] if (shown is None) != (not caption) else []
+            continue
+        what, unit = re.match(r"([a-z ]+) in ([A-Za-z%]+)", caption).groups()  # type: ignore[union-attr]
+        values = shown / (strength / 100 if unit == "%" else UNITS[unit])
+        named = re.search(r"here up to ([0-9.e+-]+)$", caption)
+        (share, least), (stop, most) = [
+            (at, float(text.replace("\N{MINUS SIGN}", "-"))) for at, text in ticks[:: len(ticks) - 1]
+        ]
+        low, high = (least + (end - share) * (most - least) / (stop - share) for end in (0, 1))
+        true = {
+            "word": what
+            == {"gap": "gap to target" if made.result.get("target") else "height"}.get(
+                kind, "utilisation" if strength else "stress"
+            ),
+            "choice": found["kinds"][kind] == what,
+            "largest": kind == "gap" or (named and float(named[1]) == pytest.approx(values.max(), rel=6e-3)),
+            "range": low <= values.min() + 1e-3 * (high - low) and values.max() <= high + 1e-3 * (high - low),
+        }
+        wrong += [f"{kind}, frame {k}: {caption!r}, {ticks} ({name})" for name, right in true.items() if not right]
+    return wrong
+
+
 @needs_browser
-@pytest.mark.parametrize("name", [*TARGETS, "table"])
+@pytest.mark.parametrize("name", REPORTS)
 def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent(name: str, tmp_path: Path) -> None:
-    made = table_archive() if name == "table" else archive(name)
+    made = REPORTS[name]()
     found, console = open_report(page_of(made, tmp_path), tmp_path)
     assert console == []
     pictures = [picture for _, picture in found["stages"]]
     captions = [caption for caption, _ in found["stages"]]
-    assert len(set(captions)) == len(captions) == (2 if name == "table" else 10)
+    assert len(set(captions)) == len(captions) == {"table": 2, "breaking": 6}.get(name, 10)
     assert len(set(pictures)) == len(pictures)  # every stage looks different
     assert captions[0] == "Flat, as cut and laid out"
+    assert len(found["legends"]) == 2 * len(found["kinds"]) * len(captions)
+    assert wrong_legends(made, found) == []
     if name != "table":
         assert found["stress"] == pictures[-1] != found["gap"]
-        assert found["bar"] == "stress in kPa"
     assert found["turned"] != found["stress"]
     lengths = [float(value) for value in found["up"]]
     assert lengths == sorted(lengths)
@@ -49,10 +104,32 @@ def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent
     assert len(set(lengths)) > 2
 
 
+def test_colours_of_the_view_mean_what_stands_at_their_own_bar() -> None:
+    made = breaking()
+    data = viewer_data(made)
+    assert data is not None
+    unit = made.result["bending"]["strength"] / 100
+    for kind, factor in (("stress", unit), ("gap", 1e-3)):
+        for frame, shown in zip(data["frames"], coloured(made)[kind], strict=True):
+            assert (kind in frame) == (shown is not None)
+            if shown is None:
+                continue
+            (share, least), *_, (stop, most) = [(at, float(text)) for at, text in frame[kind]["ticks"]]
+            step = (most - least) / (stop - share) / (len(data["palettes"][kind]) - 1)
+            bins = np.frombuffer(base64.b64decode(frame[kind]["bins"]), dtype=np.uint8)
+            read = least - share * (most - least) / (stop - share) + step * bins
+            np.testing.assert_allclose(read, shown / factor, atol=0.51 * step)
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of 60 by 60 rods with a way up."""
+    return page_of(with_way_up(sample_archive(60, 6)), tmp_path_factory.mktemp("large"))
+
+
 @needs_browser
-def test_a_60_by_60_grid_is_usable_in_a_browser(tmp_path: Path) -> None:
-    page = page_of(with_way_up(sample_archive(60, 6)), tmp_path)
-    found, console = open_report(page, tmp_path)
+def test_a_60_by_60_grid_is_usable_in_a_browser(large: Path, tmp_path: Path) -> None:
+    found, console = open_report(large, tmp_path)
     assert console == []
     assert len({picture for _, picture in found["stages"]}) == 10
 
@@ -60,7 +137,8 @@ def test_a_60_by_60_grid_is_usable_in_a_browser(tmp_path: Path) -> None:
 def test_frames_of_the_view_are_the_archive_s_shapes() -> None:
     """Decoded again: every frame is a shape of the archive to 16 bits, and there are no others."""
     made = archive("dome")
-    data = json.loads(viewer_json(made) or "")
+    data = viewer_data(made)
+    assert data is not None
     nodes = made.states["rod_nodes"]
     shapes = [*made.states["history"][:-1], made.states["popped_pinned"], made.states["popped_clamped"]]
     cloud = np.concatenate([shape[nodes] for shape in shapes])
@@ -78,14 +156,14 @@ def test_without_a_way_up_the_view_says_that_nothing_is_known_between(tmp_path: 
     made = sample_archive()
     page = page_of(made, tmp_path).read_text()
     assert "The way up from flat was not followed: nothing is known between these shapes." in page
-    assert len(json.loads(viewer_json(made) or "")["frames"]) == 3  # flat, pinned, clamped, and nothing made up
+    assert len((viewer_data(made) or {})["frames"]) == 3  # flat, pinned, clamped, and nothing made up
 
 
 def test_data_of_the_view_cannot_end_its_script() -> None:
     made = table_archive()
     rods = [{**rod, "id": "</script>"} for rod in made.result["rods"]]
-    data = viewer_json(replace(made, result={**made.result, "rods": rods})) or ""
-    assert "</" not in data
+    data = viewer_data(replace(made, result={**made.result, "rods": rods}))
+    assert "</" not in viewer_json({**(data or {}), "names": {"gap": "</script>"}})
 
 
 @pytest.mark.parametrize("level", ["good", "check", "unbuildable"])
@@ -123,10 +201,9 @@ def test_checks_are_in_words_and_numbers(tmp_path: Path) -> None:
     assert "cut = &#34;LASER&#34;" in page
 
 
-def test_report_of_60_by_60_rods_with_its_way_up_stays_below_15_megabytes(tmp_path: Path) -> None:
-    page = page_of(with_way_up(sample_archive(60, 6)), tmp_path)
-    assert page.stat().st_size < 15e6
-    assert page_of(archive("dome"), tmp_path / "dome").stat().st_size < 5e6
+def test_report_of_60_by_60_rods_with_its_way_up_stays_below_15_megabytes(large: Path, tmp_path: Path) -> None:
+    assert large.stat().st_size < 15e6
+    assert page_of(archive("dome"), tmp_path).stat().st_size < 5e6
 
 
 def with_way(strength_used: float | None, lost: float | None, snaps: list[list[float]]) -> Archive:
