@@ -159,8 +159,8 @@ def json_text(result: Mapping[str, Any]) -> str:
 
 
 def printable(text: str) -> str:
-    """`text` on one line, without the control characters that drawings and models cannot hold."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
+    """`text` on one line, without the control characters and lone surrogates that no file of text can hold."""
+    return text if text.isprintable() else "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _dumps(value: Any) -> str:
@@ -168,13 +168,13 @@ def _dumps(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """`value` in JSON's own types; NumPy's arrays and numbers are converted."""
+    """`value` in JSON's own types; NumPy's arrays and numbers are converted, texts are printable."""
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):
-        return value
+        return printable(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {printable(str(key)): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, list | tuple):

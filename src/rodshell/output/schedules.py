@@ -1,7 +1,5 @@
 """Schedules as tables and as CSV: what to cut, where to drill, where each end goes. Millimetres, degrees, kg, MPa."""
 
-import csv
-import io
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -15,15 +13,6 @@ from rodshell.output.verdict import ENDS
 Floats = NDArray[np.float64]
 Rows = list[list[str]]
 Table = tuple[list[str], Rows]
-
-
-def table_csv(table: Table) -> str:
-    """A table as CSV."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(table[0])
-    writer.writerows(table[1])
-    return stream.getvalue()
 
 
 def rods_table(archive: Archive, *, brief: bool = False) -> Table:

@@ -7,10 +7,10 @@ from typing import Any
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.output.drawing import LAYERS
+from rodshell.output.dxf import FORBIDDEN
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 MOST_STAGES = 1000
-FORBIDDEN = '<>/\\\\":;?*|=`'  # in a layer's name, by the DXF reference
 
 
 @dataclass(frozen=True)
