@@ -25,6 +25,7 @@ def hostile_archive() -> Archive:
     result: dict[str, Any] = json.loads(json.dumps(made.result), object_hook=lambda table: _renamed(table, renamed))
     ids = [rod["id"] for rod in result["rods"]]
     a, b = f"{ids[0]}/{ids[9]}", f"{ids[1]}/{ids[10]}"
+    pieces = [{"piece": name, "length": 0.1} for name in ids]
     result |= {
         "name": NAMES[9],
         "warnings": list(NAMES),
@@ -32,8 +33,8 @@ def hostile_archive() -> Archive:
         "target": {"kind": "mesh", "file": NAMES[10]},
         "drawings": {"project": NAMES[10], "revision": NAMES[0], "author": NAMES[12], "layers": LAYERS},
         "fabrication": {
-            "bracing": [{"from": a, "to": b, "flat": 0.04, "final": 0.05}, {"from": b, "to": a, "flat": 0.04, "final": 0.03}],
-            "stock": {"waste": 0.1, "fewest": 1, "bars": [{"pieces": [{"piece": n, "length": 0.1} for n in ids], "left": 0.1}]},
+            "bracing": [{"from": one, "to": other, "flat": 0.04, "final": 0.05} for one, other in ((a, b), (b, a))],
+            "stock": {"waste": 0.1, "fewest": 1, "bars": [{"pieces": pieces, "left": 0.1}]},
         },
         "seams": [{"meetings": [{"ends": [f"{ids[0]}.0", f"{ids[1]}.1"], "point": [-0.1, 0.0, 0.1]}]}],
     }  # fmt: skip

@@ -20,7 +20,6 @@ from rodshell.output.csvtext import csv_text
 from rodshell.output.dxf import layer_names
 from rodshell.output.files import KINDS
 
-NUMBER = r"[-+]?[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?"
 LIVE = re.compile(r"[=+\-@\uff1d\uff0b\uff0d\uff20]")
 
 
@@ -31,12 +30,18 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def live_cells(text: str) -> list[str]:
-    """Cells that a spreadsheet would run, with commas or semicolons between cells; what begins with a number is none."""
-    rows = csv.reader(io.StringIO(text))
-    live = [cell for row in rows for cell in row if LIVE.match(cell.strip()) and not re.fullmatch(NUMBER, cell)]
-    rows = csv.reader(io.StringIO(text), delimiter=";")
-    parted = [cell.strip() for row in rows for cell in row]
-    return live + [cell for cell in parted if LIVE.match(cell) and not re.match(rf"{NUMBER}\s*(,|$)", cell)]
+    """Cells that a spreadsheet would run; where semicolons part cells, what begins with a signed number is none."""
+    cells = [cell.strip() for row in csv.reader(io.StringIO(text)) for cell in row]
+    parted = [cell.strip() for row in csv.reader(io.StringIO(text), delimiter=";") for cell in row]
+    live = [cell for cell in cells if LIVE.match(cell) and not _is_number(cell)]
+    return live + [cell for cell in parted if LIVE.match(cell) and not re.match(r"[-+][0-9.]", cell)]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return bool(float(cell) or True)
+    except ValueError:
+        return False
 
 
 def test_no_schedule_holds_a_live_formula(written: dict[str, Path]) -> None:

@@ -14,7 +14,7 @@ from rodshell.output.archive import printable
 NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 RUN = "=+\\-@\uff1d\uff0b\uff0d\uff20"  # what a formula begins with, the last four full-width
 WHOLE = re.compile(NUMBER)
-FORMULA = re.compile(rf'(^|[;,])([\s"]*)(?=[{RUN}])(?!(?<=[;,\s]){NUMBER}\s*(?:[;,]|$))')
+FORMULA = re.compile(rf'(^[\s"]*|[;,][\s"]*(?!{NUMBER}\s*(?:[;,]|$)))(?=[{RUN}])')
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
@@ -26,4 +26,4 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
 
 def safe_cell(cell: str) -> str:
     """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons."""
-    return cell if WHOLE.fullmatch(cell) else FORMULA.sub(r"\1\2'", printable(cell))
+    return cell if WHOLE.fullmatch(cell) else FORMULA.sub(r"\1'", printable(cell))
