@@ -13,9 +13,8 @@ from itertools import chain, count
 import numpy as np
 
 from rodshell.output.archive import printable
-from rodshell.output.drawing import LAYERS, Drawing, Mark, Path, Text
+from rodshell.output.drawing import CAP, LAYERS, Drawing, Mark, Path, Text
 
-CAP = 0.72  # height of a capital over the text size; DXF measures text by its capitals
 FIRST_LAYER = 0x2F  # handle of the first of our layers, and
 FIRST = 0x39  # of the first entity; the frame's own end before
 SPACE = "17"  # handle of the model space, to which entities belong
