@@ -1,6 +1,6 @@
 """The front door: from a target to a form in one call, and what can be done with it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from os import PathLike
@@ -23,6 +23,7 @@ from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
 from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output import Archive
+from rodshell.output.inputs import read_inputs
 from rodshell.output.result import States, form_result, form_states, table_result, table_states
 from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
 from rodshell.output.takeaway import Takeaway
@@ -65,11 +66,17 @@ class Form(_Judged, FoundForm):
         return form_result(self)
 
     def archive(
-        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+        self,
+        case_toml: str | None = None,
+        *,
+        takeaway: Takeaway | None = None,
+        inputs: Mapping[str, bytes] | None = None,
+        progress: Progress = silent,
     ) -> Archive:
         """Everything that is kept, checked and made ready to be built.
 
         case_toml : the input it came from, by default one made from the objects.
+        inputs : contents of the files that it names, by their path in it; default: as they are now.
         """
         takeaway = takeaway or Takeaway()
         if case_toml is None:
@@ -79,18 +86,25 @@ class Form(_Judged, FoundForm):
                 method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
                 fall=draped.fall, takeaway=takeaway,
             )  # fmt: skip
-        return _archive(self, form_states(self), case_toml, takeaway, progress)
+        return _archive(self, form_states(self), case_toml, takeaway, progress, inputs)
 
     def save(
-        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+        self,
+        folder: str | PathLike[str],
+        *,
+        case_toml: str | None = None,
+        takeaway: Takeaway | None = None,
+        kinds: Iterable[str] | None = None,
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
+
+        kinds : of files beside the archive, such as "dxf", "csv"; default: all that every installation can.
 
         Raises
         ------
         OutputError : the folder cannot be written, or holds something else.
         """
-        return self.archive(case_toml, takeaway=takeaway).save(folder)
+        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds)
 
 
 class PoppedUp(_Judged, PoppedTable):
@@ -104,9 +118,15 @@ class PoppedUp(_Judged, PoppedTable):
         """Everything that is kept, checked and made ready to be built."""
         return _archive(self, table_states(self), "", takeaway or Takeaway(), progress)
 
-    def save(self, folder: str | PathLike[str], *, takeaway: Takeaway | None = None) -> Path:
-        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return self.archive(takeaway=takeaway).save(folder)
+    def save(
+        self,
+        folder: str | PathLike[str],
+        *,
+        takeaway: Takeaway | None = None,
+        kinds: Iterable[str] | None = None,
+    ) -> Path:
+        """As `Form.save`."""
+        return self.archive(takeaway=takeaway).save(folder, kinds)
 
 
 class Sewn(_Judged, SewnForm):
@@ -117,9 +137,14 @@ class Sewn(_Judged, SewnForm):
         return sewn_result(self)
 
     def archive(
-        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+        self,
+        case_toml: str | None = None,
+        *,
+        takeaway: Takeaway | None = None,
+        inputs: Mapping[str, bytes] | None = None,
+        progress: Progress = silent,
     ) -> Archive:
-        """All patches as one: everything that is kept, checked and made ready to be built."""
+        """All patches as one: everything that is kept, checked and made ready to be built; see `Form.archive`."""
         takeaway = takeaway or Takeaway()
         if case_toml is None:
             case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
@@ -128,25 +153,33 @@ class Sewn(_Judged, SewnForm):
         )
         result = with_seam_forces(self.result(), self, checks)
         shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
-        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway)
+        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway, inputs)
 
     def save(
-        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+        self,
+        folder: str | PathLike[str],
+        *,
+        case_toml: str | None = None,
+        takeaway: Takeaway | None = None,
+        kinds: Iterable[str] | None = None,
     ) -> Path:
-        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return self.archive(case_toml, takeaway=takeaway).save(folder)
+        """As `Form.save`."""
+        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds)
 
 
-def _archive(job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress) -> Archive:
+def _archive(
+    job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress,
+    inputs: Mapping[str, bytes] | None = None,
+) -> Archive:  # fmt: skip
     """A job's result and states with its checks and its fabrication."""
     checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
     shapes = {ends: shell.positions for ends, shell in job.popped.items()}
-    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway)
+    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway, inputs)
 
 
 def _kept(
     job: Form | PoppedUp | Sewn, result: dict[str, Any], states: States, checks: Checks, shapes: Mapping[Ends, Any],
-    case_toml: str, takeaway: Takeaway,
+    case_toml: str, takeaway: Takeaway, inputs: Mapping[str, bytes] | None,
 ) -> Archive:  # fmt: skip
     mesh = job.footprint.mesh
     final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
@@ -154,7 +187,8 @@ def _kept(
     result = workshop_result(result, mesh, checks, made, takeaway.strength)
     result["drawings"] = takeaway.drawings.parameters()
     result["verdict"] = verdict(result).table()
-    return Archive(result, states | workshop_states(checks), case_toml).as_stored()
+    kept = read_inputs(case_toml) if inputs is None else inputs
+    return Archive(result, states | workshop_states(checks), case_toml, kept).as_stored()
 
 
 def find_form(

@@ -10,6 +10,7 @@ from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
 from rodshell.cli.outcome import Kept, deliver, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
+from rodshell.output.inputs import read_inputs
 from rodshell.units import length_text
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
     if case.seams.lines:
         return _sew(case, folder, only=only, as_json=as_json, quiet=quiet)
     target, layout, rod, options = case.build()
-    asked, case = case, case.sized(target)
+    asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
     _announce_sizes(asked, target, layout, rod, quiet=quiet)
@@ -62,7 +63,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
             layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
             case = case.decided(found.best.anchor, found.best.heading)
         form = find_form(target, layout, rod, progress=progress, **options)
-        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
+        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), kinds)
     if found and not (quiet or as_json):
         click.echo(found.table())
     code = deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
@@ -74,7 +75,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
 def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bool) -> int:
     """Find the form of a case with seams and write it; the exit code."""
     target, layout, rod, options = case.build_sewn()
-    asked, case = case, case.sized(target)
+    asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
     _announce_sizes(asked, target, layout, rod, quiet=quiet)
@@ -84,7 +85,7 @@ def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bo
         search = case.layout.rotate == "auto"
         form = sew(target, layout=layout, rod=rod, search=search, progress=progress, **options)
         case = case.headed(form.layout.rotate)
-        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
+        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), kinds)
     return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rodshell.errors import OutputError
 from rodshell.output.beside import beside
 from rodshell.output.folder import put, read_json, replacing
+from rodshell.output.inputs import kept_case, opened_case
 
 if TYPE_CHECKING:
     from rodshell.output.verdict import Verdict
@@ -36,11 +37,13 @@ class Archive:
         "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
         missing.
     case_toml : the full resolved input; empty if there was none.
+    inputs : contents of the files that it names and that are kept with the result, by their path in it.
     """
 
     result: dict[str, Any]
     states: dict[str, NDArray[Any]]
     case_toml: str = ""
+    inputs: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def as_stored(self) -> "Archive":
@@ -116,7 +119,10 @@ def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str]
     with replacing(folder) as temporary, beside(make_aside):
         put(temporary / "result.json", text)
         if archive.case_toml:
-            put(temporary / "case.toml", archive.case_toml)
+            case_toml, copies = kept_case(archive.case_toml, archive.inputs, Path(folder).expanduser().resolve())
+            put(temporary / "case.toml", case_toml)
+            for name, content in copies.items():
+                put(temporary / name, content)
         make(aside=False)
     return Path(folder).expanduser().resolve()
 
@@ -150,10 +156,10 @@ def read(folder: str | os.PathLike[str]) -> Archive:
         with np.load(path / "states.npz", allow_pickle=False) as stored:
             states = {name: stored[name] for name in stored.files}
         case = path / "case.toml"
-        case_toml = case.read_text(encoding="utf-8") if case.exists() else ""
+        case_toml, inputs = opened_case(case.read_text(encoding="utf-8") if case.exists() else "", path)
     except Exception as error:  # numpy and zipfile have many ways to say that a file is broken
         raise OutputError(f"cannot read the result in {path}: {error}") from error
-    return Archive(result, states, case_toml)
+    return Archive(result, states, case_toml, inputs)
 
 
 def json_text(result: Mapping[str, Any]) -> str:
@@ -169,8 +175,8 @@ def json_text(result: Mapping[str, Any]) -> str:
 
 
 def printable(text: str) -> str:
-    """`text` on one line, without the control characters that drawings and models cannot hold."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
+    """`text` on one line, without the control characters and lone surrogates that no file of text can hold."""
+    return text if text.isprintable() else "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _dumps(value: Any) -> str:
@@ -178,13 +184,13 @@ def _dumps(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """`value` in JSON's own types; NumPy's arrays and numbers are converted."""
+    """`value` in JSON's own types; NumPy's arrays and numbers are converted, texts are printable."""
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):
-        return value
+        return printable(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {printable(str(key)): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, list | tuple):

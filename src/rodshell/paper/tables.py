@@ -1,11 +1,11 @@
 """A figure's table as text, and its files: every figure has result.json, table.txt, table.csv and its pictures."""
 
-import csv
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from typing import Any
 
+from rodshell.output.csvtext import csv_text
 from rodshell.output.folder import FORMAT, VERSION, replacing
 
 Rows = Sequence[tuple[str, ...]]
@@ -46,8 +46,7 @@ def write(
         (temporary / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
         (temporary / "table.txt").write_text(summary + "\n", encoding="utf-8")
         for name, table in {"table": [columns, *rows], **(more or {})}.items():
-            with (temporary / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows(table)
+            (temporary / f"{name}.csv").write_text(csv_text(table), encoding="utf-8", newline="")
         for name, picture in pictures.items():
             (temporary / f"{name}.svg").write_text(picture, encoding="utf-8")
         for name, text in (texts or {}).items():
