@@ -64,15 +64,22 @@ class Form(FoundForm):
         return _archive(self, form_states(self), case_toml, takeaway, progress)
 
     def save(
-        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+        self,
+        folder: str | PathLike[str],
+        *,
+        case_toml: str | None = None,
+        takeaway: Takeaway | None = None,
+        force: bool = False,
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
+        force : also replace files that rodshell did not write, or that were changed since, where it has to write.
+
         Raises
         ------
-        OutputError : the folder cannot be written, or holds something else.
+        OutputError : the folder cannot be written, or such files are there and `force` is False.
         """
-        return self.archive(case_toml, takeaway=takeaway).save(folder)
+        return self.archive(case_toml, takeaway=takeaway).save(folder, force=force)
 
 
 class PoppedUp(PoppedTable):
@@ -90,9 +97,9 @@ class PoppedUp(PoppedTable):
         """Everything that is kept, checked and made ready to be built."""
         return _archive(self, table_states(self), "", takeaway or Takeaway(), progress)
 
-    def save(self, folder: str | PathLike[str], *, takeaway: Takeaway | None = None) -> Path:
-        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return self.archive(takeaway=takeaway).save(folder)
+    def save(self, folder: str | PathLike[str], *, takeaway: Takeaway | None = None, force: bool = False) -> Path:
+        """As of `Form`."""
+        return self.archive(takeaway=takeaway).save(folder, force=force)
 
 
 class Sewn(SewnForm):
@@ -121,10 +128,15 @@ class Sewn(SewnForm):
         return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway)
 
     def save(
-        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+        self,
+        folder: str | PathLike[str],
+        *,
+        case_toml: str | None = None,
+        takeaway: Takeaway | None = None,
+        force: bool = False,
     ) -> Path:
-        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return self.archive(case_toml, takeaway=takeaway).save(folder)
+        """As of `Form`."""
+        return self.archive(case_toml, takeaway=takeaway).save(folder, force=force)
 
 
 def _archive(job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress) -> Archive:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
-from rodshell.cli.outcome import Kept, deliver, output_folder
+from rodshell.cli.outcome import Kept, deliver, force_option, output_folder
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.errors import InputError
 from rodshell.units import shown
@@ -24,9 +24,12 @@ PAPER_ROD_LENGTH = pi * 0.2  # of the hemisphere's middle rod [HQK section 3.1],
 @click.argument("source", metavar="RODS.csv|DIR")
 @click.option("--unit", metavar="UNIT", help="Of the table's coordinates: m, mm, in, ...; a table needs it.")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME-popup.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs.")
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-def command(source: str, unit: str | None, out: str | None, as_json: bool, quiet: bool, **values: str | None) -> int:
+def command(
+    source: str, unit: str | None, out: str | None, force: bool, as_json: bool, quiet: bool, **values: str | None
+) -> int:
     """Pop up rods from flat, their ends pinned: where does the shell go?
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
@@ -35,19 +38,21 @@ def command(source: str, unit: str | None, out: str | None, as_json: bool, quiet
     """
     path = Path(source)
     ends, rod, takeaway = _rods_and_the_rest(path, unit, overrides_of(values))
-    folder = output_folder(out, f"{path.resolve().stem}-popup")
-    if folder == path.resolve():
-        raise InputError(f"--out {folder} is the result that is read: give another folder")
-    announce_compilation(quiet=quiet)
-    from rodshell.form import pop_up_table
-    from rodshell.layout import straight_rods
+    name = f"{path.resolve().stem}-popup"
+    if Path(out or Path("out") / name).resolve() == path.resolve():
+        raise InputError(f"--out {path.resolve()} is the result that is read: give another folder")
+    from rodshell.output.files import reserved
 
-    grid = straight_rods(ends.flat, names=ends.names)
-    with Progress(quiet=quiet) as progress:
-        kept = Kept(
-            pop_up_table(grid, ends.final, rod, progress=progress).archive(takeaway=takeaway, progress=progress)
-        )
-    return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
+    with output_folder(out, name, ["result.json", "states.npz", *reserved()], force=force) as place:
+        announce_compilation(quiet=quiet)
+        from rodshell.form import pop_up_table
+        from rodshell.layout import straight_rods
+
+        grid = straight_rods(ends.flat, names=ends.names)
+        with Progress(quiet=quiet) as progress:
+            popped = pop_up_table(grid, ends.final, rod, progress=progress)
+            kept = Kept(popped.archive(takeaway=takeaway, progress=progress))
+        return deliver(kept, kept.save, place, as_json=as_json, quiet=quiet)
 
 
 def _rods_and_the_rest(
@@ -59,14 +64,16 @@ def _rods_and_the_rest(
     """
     from rodshell.case import case_keys, load_case
     from rodshell.cli.rodends import read_result, read_table
+    from rodshell.output.folder import reading
 
     if path.is_dir():
         if unit is not None:
             raise InputError(f'--unit = "{unit}": {path} is a result, which is in SI; leave --unit out')
         ends = read_result(path)
-        if (path / "case.toml").is_file():
-            case = load_case(path / "case.toml", given)
-            return ends, case.rod.build(), case.takeaway()
+        with reading(path) as file:
+            if file("case.toml").is_file():
+                case = load_case(file("case.toml"), given)
+                return ends, case.rod.build(), case.takeaway()
     elif not path.exists():
         raise InputError(f"there is no file named {shown(str(path))}: give a table of rods, or the folder of a result")
     elif unit is None:
