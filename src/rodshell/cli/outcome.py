@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import click
 
+from rodshell.cli.interruption import Interruption
+
 if TYPE_CHECKING:
     from rodshell.output import Archive
     from rodshell.output.folder import ResultFolder
@@ -92,6 +94,7 @@ def deliver(
     result: Result, save: "Callable[[ResultFolder], object]", place: "ResultFolder", *, as_json: bool, quiet: bool
 ) -> int:
     """Save a result, print its summary, and return the exit code."""
+    Interruption.check()
     folder = _saved(save, place)
     if as_json:
         click.echo(json.dumps({"out": str(folder), **result.result()}))
