@@ -95,16 +95,18 @@ class Form(_Judged, FoundForm):
         case_toml: str | None = None,
         takeaway: Takeaway | None = None,
         kinds: Iterable[str] | None = None,
+        force: bool = False,
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
         kinds : of files beside the archive, such as "dxf", "csv"; default: all that every installation can.
+        force : also replace files that rodshell did not write, or that were changed since, where it has to write.
 
         Raises
         ------
-        OutputError : the folder cannot be written, or holds something else.
+        OutputError : the folder cannot be written, or such files are there and `force` is False.
         """
-        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds)
+        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
 
 
 class PoppedUp(_Judged, PoppedTable):
@@ -124,9 +126,10 @@ class PoppedUp(_Judged, PoppedTable):
         *,
         takeaway: Takeaway | None = None,
         kinds: Iterable[str] | None = None,
+        force: bool = False,
     ) -> Path:
         """As `Form.save`."""
-        return self.archive(takeaway=takeaway).save(folder, kinds)
+        return self.archive(takeaway=takeaway).save(folder, kinds, force=force)
 
 
 class Sewn(_Judged, SewnForm):
@@ -162,9 +165,10 @@ class Sewn(_Judged, SewnForm):
         case_toml: str | None = None,
         takeaway: Takeaway | None = None,
         kinds: Iterable[str] | None = None,
+        force: bool = False,
     ) -> Path:
         """As `Form.save`."""
-        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds)
+        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
 
 
 def _archive(

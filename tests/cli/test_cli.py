@@ -20,6 +20,7 @@ from rodshell.cli import main
 from rodshell.cli.options import ALIASES
 from rodshell.cli.rodends import COLUMNS
 from rodshell.errors import NetLimitError
+from rodshell.output.folder import ResultFolder
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -34,10 +35,10 @@ class FakeArchive:
         self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
-    def save(self, folder: Path, kinds: list[str] | None = None) -> None:
+    def save(self, folder: ResultFolder, kinds: list[str] | None = None, more: dict[str, str] | None = None) -> None:
         self.kinds = kinds
-        folder.mkdir(parents=True)
-        (folder / "case.toml").write_text(self.case_toml)
+        folder.put("case.toml", self.case_toml)
+        folder.commit()
 
     def summary(self) -> str:
         return "agreement 0.01 mm"
@@ -136,7 +137,7 @@ def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
         assert f"--{key}, {alias} " in shown
 
 
-ANY_WORDS = ("drawings.layers.", "drawings.project", "drawings.revision", "drape.frames")
+ANY_WORDS = tuple(f"drawings.{key}" for key in ("layers.", "project", "revision", "name", "author", "date")) + ("drape.frames",)
 WORDS = [key for key in case_keys() if key.startswith(ANY_WORDS)]
 
 
@@ -205,9 +206,9 @@ def test_an_output_folder_that_cannot_be_written_is_refused_before_the_solve(
     assert "file is a file" in refused(capsys, "form", "hemisphere", "--out", "file/dome")
     assert "file: it is a file" in refused(capsys, "form", "hemisphere", "--out", "file")
     Path("thesis").mkdir()
-    Path("thesis/chapter.tex").write_text("")
-    assert "thesis: it is not empty" in refused(capsys, "form", "hemisphere", "--out", "thesis")
-    assert "thesis: it is not empty" in refused(
+    Path("thesis/report.html").write_text("")
+    assert "will not replace report.html" in refused(capsys, "form", "hemisphere", "--out", "thesis")
+    assert "will not replace report.html" in refused(
         capsys, "popup", write_table(Path("rods.csv"), CROSS), "--unit", "m", "--out", "thesis"
     )
     assert "in /proc; choose another folder" in refused(capsys, "form", "hemisphere", "--out", "/proc/dome")
@@ -220,12 +221,31 @@ def test_the_output_folder_is_left_alone_by_the_check(finder: FakeFinder) -> Non
     assert list(Path.cwd().iterdir()) == []
 
 
-def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
-    Path("dome").mkdir()
+def test_an_earlier_result_is_replaced_and_a_copied_one_by_force(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
     Path("dome/result.json").write_text('{"format": "rodshell-result", "version": 1}')
-    finder.fault = NetLimitError("no net")
-    assert main(["form", "hemisphere", "--out", "dome"]) == 2
-    assert len(finder.calls) == 1
+    assert "will not replace result.json" in refused(capsys, "form", "hemisphere", "--out", "dome")
+    assert len(finder.calls) == 2
+    assert main(["form", "hemisphere", "--out", "dome", "--force", "-q"]) == 0
+
+
+def test_a_file_that_comes_into_the_way_while_the_job_runs_sends_the_result_elsewhere(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save = FakeArchive.save
+
+    def late(self: FakeArchive, folder: ResultFolder, *arguments: Any, **options: Any) -> None:
+        (folder.path / "case.toml").write_text("mine")
+        save(self, folder, *arguments, **options)
+
+    monkeypatch.setattr(FakeArchive, "save", late)
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    assert "dome-2 instead: will not replace case.toml" in capsys.readouterr().err
+    assert Path("dome/case.toml").read_text() == "mine"
+    assert load_case("dome-2/case.toml") == load_case("hemisphere")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
-from rodshell.cli.outcome import Kept, deliver, output_folder, wanted_kinds
+from rodshell.cli.outcome import Kept, deliver, force_option, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.errors import InputError
 from rodshell.units import shown
@@ -26,10 +26,18 @@ PAPER_ROD_LENGTH = pi * 0.2  # of the hemisphere's middle rod [HQK section 3.1],
 @click.option("--unit", metavar="UNIT", help="Of the table's coordinates: m, mm, in, ...; a table needs it.")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME-popup.")
 @click.option("--only", metavar="KINDS", help="Files beside the archive, such as dxf,csv; see rodshell export --help.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs.")
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 def command(
-    source: str, unit: str | None, out: str | None, only: str | None, as_json: bool, quiet: bool, **values: str | None
+    source: str,
+    unit: str | None,
+    out: str | None,
+    only: str | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    **values: str | None,
 ) -> int:
     """Pop up rods from flat, their ends pinned: where does the shell go?
 
@@ -40,20 +48,21 @@ def command(
     """
     path, kinds = Path(source), wanted_kinds(only)
     ends, rod, takeaway = _rods_and_the_rest(path, unit, overrides_of(values))
-    folder = output_folder(out, f"{path.resolve().stem}-popup")
-    if folder == path.resolve():
-        raise InputError(f"--out {folder} is the result that is read: give another folder")
-    announce_compilation(quiet=quiet)
-    from rodshell.form import pop_up_table
-    from rodshell.layout import straight_rods
+    name = f"{path.resolve().stem}-popup"
+    if Path(out or Path("out") / name).resolve() == path.resolve():
+        raise InputError(f"--out {path.resolve()} is the result that is read: give another folder")
+    from rodshell.output.files import reserved
 
-    grid = straight_rods(ends.flat, names=ends.names)
-    with Progress(quiet=quiet) as progress:
-        kept = Kept(
-            pop_up_table(grid, ends.final, rod, progress=progress).archive(takeaway=takeaway, progress=progress),
-            kinds,
-        )
-    return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
+    with output_folder(out, name, ["result.json", "states.npz", *reserved(kinds)], force=force) as place:
+        announce_compilation(quiet=quiet)
+        from rodshell.form import pop_up_table
+        from rodshell.layout import straight_rods
+
+        grid = straight_rods(ends.flat, names=ends.names)
+        with Progress(quiet=quiet) as progress:
+            popped = pop_up_table(grid, ends.final, rod, progress=progress)
+            kept = Kept(popped.archive(takeaway=takeaway, progress=progress), kinds)
+        return deliver(kept, kept.save, place, as_json=as_json, quiet=quiet)
 
 
 def _rods_and_the_rest(path: Path, unit: str | None, given: dict[str, object]) -> "tuple[RodEnds, Rod, Takeaway]":
@@ -63,14 +72,16 @@ def _rods_and_the_rest(path: Path, unit: str | None, given: dict[str, object]) -
     """
     from rodshell.case import case_keys, load_case
     from rodshell.cli.rodends import read_result, read_table
+    from rodshell.output.folder import reading
 
     if path.is_dir():
         if unit is not None:
             raise InputError(f'--unit = "{unit}": {path} is a result, which is in SI; leave --unit out')
         ends = read_result(path)
-        if (path / "case.toml").is_file():
-            case = load_case(path / "case.toml", given)
-            return ends, case.rod.build(), case.takeaway()
+        with reading(path) as file:
+            if file("case.toml").is_file():
+                case = load_case(file("case.toml"), given)
+                return ends, case.rod.build(), case.takeaway()
     elif not path.exists():
         raise InputError(f"there is no file named {shown(str(path))}: give a table of rods, or the folder of a result")
     elif unit is None:

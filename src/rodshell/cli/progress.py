@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Self
 
 import click
 
+from rodshell.cli.interruption import Interruption
+
 if TYPE_CHECKING:
     from rich.status import Status
 
@@ -39,6 +41,7 @@ class Progress:
             self._live = None
 
     def __call__(self, stage: str, detail: str, residual: float) -> None:
+        Interruption.check()
         if self._live is not None:
             from rich.text import Text
 

@@ -6,7 +6,7 @@ from os import PathLike
 from typing import Any
 
 from rodshell.output.csvtext import csv_text
-from rodshell.output.folder import FORMAT, VERSION, replacing
+from rodshell.output.folder import FORMAT, VERSION, ResultFolder, open_folder
 
 Rows = Sequence[tuple[str, ...]]
 
@@ -25,7 +25,7 @@ def result_of(figure: str, status: str, **content: Any) -> dict[str, Any]:
 
 
 def write(
-    folder: str | PathLike[str],
+    folder: str | PathLike[str] | ResultFolder,
     result: dict[str, Any],
     summary: str,
     columns: tuple[str, ...],
@@ -40,16 +40,12 @@ def write(
 
     Raises
     ------
-    OutputError : it cannot be written, or holds other things than a result.
+    OutputError : it cannot be written, or files that rodshell did not write stand where it has to write.
     """
-    with replacing(folder) as temporary:
-        (temporary / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-        (temporary / "table.txt").write_text(summary + "\n", encoding="utf-8")
-        for name, table in {"table": [columns, *rows], **(more or {})}.items():
-            (temporary / f"{name}.csv").write_text(csv_text(table), encoding="utf-8", newline="")
-        for name, picture in pictures.items():
-            (temporary / f"{name}.svg").write_text(picture, encoding="utf-8")
-        for name, text in (texts or {}).items():
-            (temporary / name).write_text(text, encoding="utf-8")
-        for name, text in (texts or {}).items():
-            (temporary / name).write_text(text, encoding="utf-8")
+    files = {"result.json": json.dumps(result, indent=1) + "\n", "table.txt": summary + "\n"}
+    files |= {f"{name}.csv": csv_text(table) for name, table in {"table": [columns, *rows], **(more or {})}.items()}
+    files |= {f"{name}.svg": picture for name, picture in pictures.items()} | dict(texts or {})
+    with open_folder(folder, reserved=list(files)) as place:
+        for name, content in files.items():
+            place.put(name, content)
+        place.commit()
