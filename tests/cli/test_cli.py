@@ -115,10 +115,10 @@ def test_form_asks_for_the_case_and_saves_its_full_input(
 
 
 def test_a_case_file_is_run_into_out_and_its_name(finder: FakeFinder) -> None:
-    Path("shell.toml").write_text("target.radius = '1 m'")
+    Path("shell.toml").write_text("target.radius = '1 m'\nrod.section.radius = '5 mm'\nrod.material.preset = 'gfrp'")
     assert main(["form", "shell.toml"]) == 0
     asked = load_case("shell.toml")
-    assert load_case("out/shell/case.toml") == asked.sized(asked.target.build())
+    assert load_case("out/shell/case.toml") == asked.with_rod(asked.build().rod)
 
 
 def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
@@ -355,13 +355,17 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """So that a wrong unit, or a file without a target, shows."""
-    Path("empty.toml").write_text("")
+    Path("empty.toml").write_text("rod.material.preset = 'rubber'")
     assert main(["form", "empty.toml"]) == 0
-    said = capsys.readouterr().err.splitlines()[0]
-    assert said == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm, rod radius 1 mm"
-    Path("big.toml").write_text("target = { radius = 200 }\nlayout.spacing = 25")
+    sizes, rod = capsys.readouterr().err.splitlines()[:2]
+    assert sizes == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm"
+    assert rod.startswith("rodshell: rod: circle, radius 1 mm; E = 1 MPa")
+    assert rod.endswith("; section was not given: chosen for this target")
+    Path("big.toml").write_text("target = { radius = 200 }\nlayout.spacing = 25\nrod.material.preset = 'rubber'")
     assert main(["form", "big.toml"]) == 0
-    assert capsys.readouterr().err.startswith("rodshell: hemisphere, 400 m wide; edge 4.17 m, rod radius 1 m\n")
+    sizes, rod = capsys.readouterr().err.splitlines()[:2]
+    assert sizes == "rodshell: hemisphere, 400 m wide; edge 4.17 m"
+    assert rod.startswith("rodshell: rod: circle, radius 1000 mm; ")
     assert main(["form", "empty.toml", "--quiet", "--out", "quiet"]) == 0
     assert capsys.readouterr().err == ""
 

@@ -48,11 +48,10 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
     folder = output_folder(out, name)
     if case.seams.lines:
         return _sew(case, folder, only=only, as_json=as_json, quiet=quiet)
-    target, layout, rod, options = case.build()
-    asked, case = case, case.sized(target)
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
-    _announce_sizes(asked, target, layout, rod, quiet=quiet)
+    target, layout, rod, options = case.build()
+    _announce_sizes(case, target, layout, quiet=quiet)
     from rodshell.form import find_form
 
     with Progress(quiet=quiet) as progress:
@@ -61,6 +60,9 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
             found = _search(case, target, layout, rod, progress)
             layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
             case = case.decided(found.best.anchor, found.best.heading)
+            rod = case.rod_on(target, layout, anchor=found.best.anchor)
+        _announce_rod(case, rod, quiet=quiet)
+        case = case.with_rod(rod)
         form = find_form(target, layout, rod, progress=progress, **options)
         kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
     if found and not (quiet or as_json):
@@ -73,11 +75,12 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
 
 def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bool) -> int:
     """Find the form of a case with seams and write it; the exit code."""
-    target, layout, rod, options = case.build_sewn()
-    asked, case = case, case.sized(target)
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
     announce_compilation(quiet=quiet)
-    _announce_sizes(asked, target, layout, rod, quiet=quiet)
+    target, layout, rod, options = case.build_sewn()
+    _announce_sizes(case, target, layout, quiet=quiet)
+    _announce_rod(case, rod, quiet=quiet)
+    case = case.with_rod(rod)
     from rodshell.form import sew
 
     with Progress(quiet=quiet) as progress:
@@ -88,17 +91,24 @@ def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bo
     return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
 
 
-def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", *, quiet: bool) -> None:
+def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet: bool) -> None:
     """Before a job runs, say what it is and which lengths were left to its target's size: a wrong unit shows here."""
-    section = case.rod.section
     lengths = {
         "spacing": min(layout.spacing) if case.layout.spacing == "auto" else None,
         "edge": layout.edge if case.layout.edge == "auto" else None,
-        "rod radius": getattr(rod.section, "radius", None) if getattr(section, "radius", None) == "auto" else None,
     }
     said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
     if said and not quiet:
         click.echo(f"rodshell: {target.name}, {length_text(2 * target.size)} wide; {said}", err=True)
+
+
+def _announce_rod(case: Case, rod: "Rod", *, quiet: bool) -> None:
+    """Name a rod that the case left open, before its form is found."""
+    if case.rod.left_open and not quiet:
+        from rodshell.output.result import rod_table
+        from rodshell.output.summary import chosen, rod_text
+
+        click.echo(f"rodshell: rod: {rod_text(table := rod_table(rod))}; {chosen(case.rod.left_open, table)}", err=True)
 
 
 def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: Progress) -> "Search":

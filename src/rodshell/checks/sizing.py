@@ -1,0 +1,127 @@
+"""A rod that fits its target: the section whose bends on the target's net a material bears."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.checks.bending import fibre_strain
+from rodshell.errors import NetLimitError
+from rodshell.layout import GridLayout
+from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.rods.materials import Material, PresetName
+from rodshell.rods.section import Circle, Rod, Section, Tube
+from rodshell.rods.stock import STOCK, depth, scaled
+from rodshell.targets import Target
+from rodshell.units import rounded_down
+
+Floats = NDArray[np.float64]
+
+WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
+SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
+HALF = 0.5  # of the strength: what bending may use, in the final shape
+OF_NET = 0.8 * HALF  # by the net's bends; pinned shells bend up to 1.15 times as sharply, and axial force adds
+ROOM = 1 / 6  # depth of a rod over the spacing: joints need room
+ANY = Material(1.0, 1.0)  # strains do not depend on it
+PLAN = 41  # points each way at which a target without a net is sampled
+
+
+class Bends(NamedTuple):
+    """Curvatures (k,) [1/m] of the rods of a net: out of the target, along its normal, and within it."""
+
+    normal: Floats
+    geodesic: Floats
+
+
+def default_preset(target: Target) -> PresetName:
+    """The material of a target for which none is given: of those that shells of metres are built of the one that bears
+    the sharpest bends; below a metre the plastic of printers."""
+    return "gfrp" if 2 * target.size > WIDE else "petg"
+
+
+def size_rod(
+    target: Target,
+    layout: GridLayout,
+    material: Material,
+    *,
+    anchor: tuple[float, float] | None = None,
+    strength: float | None = None,
+    shape: Circle | Tube | None = None,
+) -> Rod:
+    """The thickest section whose bends on the net use at most half of the strength.
+
+    Of the sizes in which a preset material is sold; thinner than those, or of a material without a name, in steps of 1,
+    1.5, 2, 3, 5, 7. No thicker than 1/200 of the target's size in radius, nor than a sixth of the spacing. Without a
+    known strength it has that slenderness, as the paper's rods on its hemisphere.
+
+    Parameters
+    ----------
+    strength : in place of the preset's [Pa].
+    shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
+    """
+    strength = strength or material.bending_strength
+    slender = SLENDER * target.size
+    section: Section
+    if strength is None:
+        section = Tube(slender, shape.thickness) if isinstance(shape, Tube) else Circle(slender)
+        return Rod(section, material)
+    bends = bends_of(target, layout, anchor)
+    bears = strength / material.youngs_modulus
+    thickest = min(2 * slender, ROOM * min(layout.spacing))
+    stock = () if shape is not None or material.name is None else STOCK[material.name]
+    fitting = [one for one in stock if depth(one) <= thickest and _strain(one, bends) <= OF_NET * bears]
+    if fitting:
+        section = fitting[-1]
+    else:
+        section = _thinner(shape or (stock[0] if stock else Circle(slender)), bends, OF_NET * bears, thickest)
+    return Rod(section, material)
+
+
+def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
+    """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature."""
+    try:
+        return net_bends(chebyshev_net(target, layout, anchor=anchor))
+    except NetLimitError:  # it is cut by seams, or another anchor is looked for
+        sharpest = np.atleast_1d(_sharpest_of(target))
+        return Bends(sharpest, sharpest)
+
+
+def net_bends(net: ChebyshevNet) -> Bends:
+    """Curvatures of both families at the nodes inside the target, by second differences."""
+    normal, geodesic = list[Floats](), list[Floats]()
+    points, inside = net.net.points, net.net.inside
+    for x, s, mask in ((points, net.net.u, inside), (points.transpose(1, 0, 2), net.net.v, inside.T)):
+        slope = np.diff(x, axis=0) / np.diff(s)[:, None, None]
+        bend = np.diff(slope, axis=0) / (0.5 * (s[2:] - s[:-2]))[:, None, None]
+        known = mask[1:-1] & np.isfinite(bend[:, :, 0])
+        at, bend = x[1:-1][known], bend[known]
+        along = np.einsum("ij,ij->i", bend, net.target.on_surface(at).normal)
+        normal.append(np.abs(along))
+        geodesic.append(np.sqrt(np.maximum(np.einsum("ij,ij->i", bend, bend) - along**2, 0.0)))
+    return Bends(np.concatenate(normal), np.concatenate(geodesic))
+
+
+def _strain(section: Section, bends: Bends) -> float:
+    """Largest bending strain of the section by such bends [-]."""
+    return float(np.max(fibre_strain(Rod(section, ANY), bends.normal, bends.geodesic), initial=0.0))
+
+
+def _thinner(section: Section, bends: Bends, allowed: float, thickest: float) -> Section:
+    """A section like this one, its depth rounded down to a step; of a tube only the radius changes."""
+    deep, strain = depth(section), _strain(section, bends)
+    most = thickest if strain == 0 else min(thickest, deep * allowed / strain)
+    if isinstance(section, Tube):
+        return Tube(max(rounded_down(most / 2), section.thickness), section.thickness)
+    return scaled(section, rounded_down(most) / deep)
+
+
+def _sharpest_of(target: Target) -> float:
+    """The sharpest principal curvature [1/m] of a target, sampled over its plan."""
+    side = np.linspace(-2 * target.size, 2 * target.size, PLAN)
+    x, y = (target.summit[k] + plane.ravel() for k, plane in enumerate(np.meshgrid(side, side)))
+    plan = np.column_stack([x, y])
+    with np.errstate(all="ignore"):
+        points = np.column_stack([plan, target.height(plan)])
+    points = points[np.isfinite(points[:, 2])]
+    points = points[target.margin(points) > 0]
+    return float(np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(initial=0.0))
