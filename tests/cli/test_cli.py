@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -277,6 +278,7 @@ def test_the_first_run_announces_the_compilation(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "rodshell.form", finder)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    numba.config.reload_config()  # type: ignore[attr-defined]
     assert main(["form", "hemisphere", "--out", "a"]) == 0
     assert "compiling kernels, once" in capsys.readouterr().err
     kernel = f"stretch.energy-12.py{sys.version_info.major}{sys.version_info.minor}.nbi"

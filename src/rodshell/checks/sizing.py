@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.checks.bending import fibre_strain
-from rodshell.errors import NetLimitError
+from rodshell.errors import InputError, NetLimitError
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import Circle, Rod, Section, Tube
 from rodshell.rods.stock import STOCK, depth, scaled
 from rodshell.targets import Target
-from rodshell.units import rounded_down
+from rodshell.units import length_text, rounded_down
 
 Floats = NDArray[np.float64]
 
@@ -58,6 +58,10 @@ def size_rod(
     ----------
     strength : in place of the preset's [Pa].
     shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
+
+    Raises
+    ------
+    InputError : the tube's wall is too thick for what the bends allow.
     """
     strength = strength or material.bending_strength
     slender = SLENDER * target.size
@@ -73,7 +77,10 @@ def size_rod(
     if fitting:
         section = fitting[-1]
     else:
-        section = _thinner(shape or (stock[0] if stock else Circle(slender)), bends, OF_NET * bears, thickest)
+        like = shape or (stock[0] if stock else Circle(slender))
+        strain = _strain(like, bends)
+        most = thickest if strain == 0 else min(thickest, depth(like) * OF_NET * bears / strain)
+        section = _of_depth(like, rounded_down(most), wall_stays=shape is not None)
     return Rod(section, material)
 
 
@@ -106,13 +113,16 @@ def _strain(section: Section, bends: Bends) -> float:
     return float(np.max(fibre_strain(Rod(section, ANY), bends.normal, bends.geodesic), initial=0.0))
 
 
-def _thinner(section: Section, bends: Bends, allowed: float, thickest: float) -> Section:
-    """A section like this one, its depth rounded down to a step; of a tube only the radius changes."""
-    deep, strain = depth(section), _strain(section, bends)
-    most = thickest if strain == 0 else min(thickest, deep * allowed / strain)
-    if isinstance(section, Tube):
-        return Tube(max(rounded_down(most / 2), section.thickness), section.thickness)
-    return scaled(section, rounded_down(most) / deep)
+def _of_depth(section: Section, deep: float, *, wall_stays: bool) -> Section:
+    """A section like this one of another depth [m]; the wall of a tube may have to stay as it is."""
+    if not (wall_stays and isinstance(section, Tube)):
+        return scaled(section, deep / depth(section))
+    if deep < 2 * section.thickness:
+        raise InputError(
+            f"a wall of {length_text(section.thickness)}: tubes that bear the bends of this target are at most "
+            f"{length_text(deep)} thick: give a thinner wall, or the radius too"
+        )
+    return Tube(deep / 2, section.thickness)
 
 
 def _sharpest_of(target: Target) -> float:
