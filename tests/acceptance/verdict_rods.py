@@ -29,7 +29,7 @@ LITERATURE: dict[str, tuple[Range, Range, Range]] = {
     "spring-steel": ((190.0, 212.0), (7750, 7900), (800, 1700)),
 }
 ROOF = "3*cos(x/6)*cos(y/5)"
-BECAUSE = "not given: chosen for this target, so that bending uses at most half of the bending strength"
+BECAUSE = "not given: chosen to fit, for bends that use at most half of the bending strength"
 
 
 def preset_rows() -> Iterator[Row]:

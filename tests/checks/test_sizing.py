@@ -8,7 +8,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.case import load_case
-from rodshell.checks.sizing import bends_of, net_bends, size_rod
+from rodshell.checks.sizing import Fit, bends_of, net_bends
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.rods.stock import STOCK, depth
@@ -49,7 +49,7 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
     """Or would be thicker than rods of this target are, or is not thinner than the thinnest in stock."""
     target, layout = half_sphere(radius)
     material = rs.Material.preset(name)
-    rod = size_rod(target, layout, material)
+    section = Fit.on(target, layout).section(material)
     bends = bends_of(target, layout)
 
     def used(section: Any) -> float:
@@ -57,9 +57,9 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
         strain = depth_strain(section, bends.normal, bends.geodesic)
         return strain * material.youngs_modulus / (material.bending_strength or np.nan)
 
-    assert used(rod.section) <= 0.5
-    if rod.section in STOCK[material.name]:  # type: ignore[index]
-        at = STOCK[material.name].index(rod.section)  # type: ignore[index, arg-type]
+    assert used(section) <= 0.5
+    if section in STOCK[material.name]:  # type: ignore[index]
+        at = STOCK[material.name].index(section)  # type: ignore[index, arg-type]
         for thicker in STOCK[material.name][at + 1 : at + 2]:  # type: ignore[index]
             room = min(target.size / 100, min(layout.spacing) / 6)
             assert used(thicker) > 0.4 or depth(thicker) > room
@@ -129,7 +129,9 @@ def test_the_rod_that_was_chosen_is_announced_said_in_the_summary_and_kept(
     out = str(tmp_path / "roof")
     assert main(["form", "heightfield", *options, "clamped", "--only", "csv", "--out", out]) == 0
     said = capsys.readouterr()
-    because = "material and section were not given: chosen for this target, so that bending uses at most half of the "
+    because = (
+        "material and section were not given: chosen to fit, for bends that use at most half of the bending strength"
+    )
     (announced,) = [line for line in said.err.splitlines() if line.startswith("rodshell: rod: ")]
     assert "gfrp, E = 23 GPa" in announced
     assert because in announced
@@ -154,3 +156,12 @@ def test_a_given_strength_wins_over_the_presets(tmp_path: Path, capsys: pytest.C
     bending = form.archive(takeaway=rs.Takeaway(stages=0)).result["bending"]
     assert (bending["strength"], bending["strength_of"]) == (240e6, "gfrp")
     assert bending["clamped"]["utilisation"] == bending["clamped"]["max_stress"] / 240e6
+
+
+def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
+    """A rod whose tangent turns by 0.3 cos(pi s / L) is bent by 0.3 pi / L at its middle; its chord is the integral."""
+    s = (np.arange(1000) + 0.5) / 1000
+    chord = 2.0 * float(np.mean(np.cos(0.3 * np.cos(np.pi * s))))
+    fit = Fit.between(np.array([2.0]), np.array([[[0.0, 0.0, 0.0], [chord, 0.0, 0.0]]]))
+    np.testing.assert_allclose(fit.bends().normal, 0.3 * np.pi / 2.0, rtol=0.01)  # theta^2 / 32 of it
+    assert fit.preset == "gfrp"

@@ -52,12 +52,12 @@ FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
 
-def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object] | None = None) -> Case:
+def load_case(name_or_path: str | PathLike[str] | None, overrides: Mapping[str, object] | None = None) -> Case:
     """The case of this name or in this file, with some keys set anew.
 
     Parameters
     ----------
-    name_or_path : one of `BUILT_IN`, or the path of a TOML file, or of a surface (`BY_SUFFIX`).
+    name_or_path : one of `BUILT_IN`, or the path of a TOML file, or of a surface (`BY_SUFFIX`); None: an empty case.
     overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
         keeps those keys of its table that it has too.
 
@@ -66,7 +66,7 @@ def load_case(name_or_path: str | PathLike[str], overrides: Mapping[str, object]
     InputError : no such case or file, not TOML, an unknown key, a value that cannot be used; in one sentence.
     """
     overrides = dict(overrides or {})
-    raw = _read(name_or_path)
+    raw = {} if name_or_path is None else _read(name_or_path)
     for path in case_tables():
         if not isinstance(_table(raw, path), dict):
             raise InputError(not_a_table(path, _table(raw, path)))

@@ -1,5 +1,6 @@
 """The tables of rods, by their sections and material, and of joints, one for each kind."""
 
+from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
@@ -25,10 +26,9 @@ from rodshell.errors import InputError
 from rodshell.rods.materials import Material, PresetName, preset_values
 
 if TYPE_CHECKING:
+    from rodshell.checks.sizing import Fit
     from rodshell.joints import Joint
-    from rodshell.layout import GridLayout
     from rodshell.rods.section import Circle, GivenSection, Rod, Section, Tube
-    from rodshell.targets import Target
 UNSIZED = 1.0  # m, in place of a radius that is still to be found
 
 
@@ -159,36 +159,29 @@ class RodTable(Table):
         material = self.material is None and section.kind != "given"
         return (*(["material"] if material else []), *(["section"] if sized else []))
 
-    def build(
-        self,
-        target: "Target | None" = None,
-        layout: "GridLayout | None" = None,
-        *,
-        anchor: tuple[float, float] | None = None,
-        strength: float | None = None,
-    ) -> "Rod":
-        """The rod; what is left to the target is chosen by the bends of the layout's net on it.
+    def build(self, fit: "Callable[[], Fit] | None" = None, *, strength: float | None = None) -> "Rod":
+        """The rod.
 
+        fit : what material and section have to fit; called where one is left open.
         strength : of the material, in place of the preset's [Pa].
 
         Raises
         ------
-        InputError : something is left to a target, and there is none.
+        InputError : something is left open, and there is nothing to fit.
         """
         from rodshell.rods.section import Circle, Rod, Tube
 
         section = self.section.build()
-        if isinstance(self.section, GivenTable) or not self.left_open:
+        if not self.left_open:
             return Rod(section, self.material.build() if self.material else None)
-        if target is None or layout is None:
-            raise InputError("rod: there is no target that section and material could be taken from: give both")
-        from rodshell.checks.sizing import default_preset, size_rod
-
-        material = self.material.build() if self.material else Material.preset(default_preset(target))
+        if fit is None:
+            raise InputError("rod: there is no target that material and section could be taken from: give both")
+        room = fit()
+        material = self.material.build() if self.material else Material.preset(room.preset)
         if "section" not in self.left_open:
             return Rod(section, material)
         shape = section if isinstance(section, Circle | Tube) and self.section.kind != "auto" else None
-        return size_rod(target, layout, material, anchor=anchor, strength=strength, shape=shape)
+        return Rod(room.section(material, strength=strength, shape=shape), material)
 
 
 class JointTable(Table):

@@ -39,6 +39,7 @@ from rodshell.errors import InputError
 from rodshell.units import length_text, rounded_down, shown
 
 if TYPE_CHECKING:
+    from rodshell.checks.sizing import Fit
     from rodshell.formfinding.fall import Fall
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.layout import GridLayout
@@ -254,7 +255,13 @@ class Case(Table):
 
     def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
         """The rod; material and section that were left to the target are chosen by the bends of its net."""
-        return self.rod.build(target, layout, anchor=anchor, strength=self.checks.strength)
+
+        def fit() -> "Fit":
+            from rodshell.checks.sizing import Fit
+
+            return Fit.on(target, layout, anchor=anchor)
+
+        return self.rod.build(fit, strength=self.checks.strength)
 
     def with_rod(self, rod: "Rod") -> "Case":
         """The same case with this rod spelled out."""

@@ -1,6 +1,8 @@
 """A rod that fits its target: the section whose bends on the target's net a material bears."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,55 +35,75 @@ class Bends(NamedTuple):
     geodesic: Floats
 
 
-def default_preset(target: Target) -> PresetName:
-    """The material of a target for which none is given: of those that shells of metres are built of the one that bears
-    the sharpest bends; below a metre the plastic of printers."""
-    return "gfrp" if 2 * target.size > WIDE else "petg"
-
-
-def size_rod(
-    target: Target,
-    layout: GridLayout,
-    material: Material,
-    *,
-    anchor: tuple[float, float] | None = None,
-    strength: float | None = None,
-    shape: Circle | Tube | None = None,
-) -> Rod:
-    """The thickest section whose bends on the net use at most half of the strength.
-
-    Of the sizes in which a preset material is sold; thinner than those, or of a material without a name, in steps of 1,
-    1.5, 2, 3, 5, 7. No thicker than 1/200 of the target's size in radius, nor than a sixth of the spacing. Without a
-    known strength it has that slenderness, as the paper's rods on its hemisphere.
+@dataclass(frozen=True)
+class Fit:
+    """What a rod that is not given has to fit.
 
     Parameters
     ----------
-    strength : in place of the preset's [Pa].
-    shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
-
-    Raises
-    ------
-    InputError : the tube's wall is too thick for what the bends allow.
+    width : of the shell [m], by which the material is chosen.
+    slender : radius of a rod as slender as the paper's [m].
+    thickest : largest depth of a rod between its joints [m].
+    bends : called if they are needed.
     """
-    strength = strength or material.bending_strength
-    slender = SLENDER * target.size
-    section: Section
-    if strength is None:
-        section = Tube(slender, shape.thickness) if isinstance(shape, Tube) else Circle(slender)
-        return Rod(section, material)
-    bends = bends_of(target, layout, anchor)
-    bears = strength / material.youngs_modulus
-    thickest = min(2 * slender, ROOM * min(layout.spacing))
-    stock = () if shape is not None or material.name is None else STOCK[material.name]
-    fitting = [one for one in stock if depth(one) <= thickest and _strain(one, bends) <= OF_NET * bears]
-    if fitting:
-        section = fitting[-1]
-    else:
-        like = shape or (stock[0] if stock else Circle(slender))
-        strain = _strain(like, bends)
-        most = thickest if strain == 0 else min(thickest, depth(like) * OF_NET * bears / strain)
-        section = _of_depth(like, rounded_down(most), wall_stays=shape is not None)
-    return Rod(section, material)
+
+    width: float
+    slender: float
+    thickest: float
+    bends: Callable[[], Bends]
+
+    @classmethod
+    def on(cls, target: Target, layout: GridLayout, *, anchor: tuple[float, float] | None = None) -> Self:
+        """By the net of a layout on its target."""
+        slender = SLENDER * target.size
+        thickest = min(2 * slender, ROOM * min(layout.spacing))
+        return cls(2 * target.size, slender, thickest, lambda: bends_of(target, layout, anchor))
+
+    @classmethod
+    def between(cls, lengths: Floats, ends: Floats) -> Self:
+        """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m], as if each bent like a sine."""
+        chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        width = float(np.ptp(ends[:, :, :2], axis=(0, 1)).max())
+        rise = 2 * np.sqrt(np.clip(1 - chords / lengths, 0.0, 1.0))  # amplitude of the tangent's angle [rad]
+        slender = SLENDER * width / 2
+        return cls(width, slender, 2 * slender, lambda: Bends(np.pi * rise / lengths, np.zeros(len(lengths))))
+
+    @property
+    def preset(self) -> PresetName:
+        """The material where none is given: of those that shells of metres are built of the one that bears the sharpest
+        bends; below a metre the plastic of printers."""
+        return "gfrp" if self.width > WIDE else "petg"
+
+    def section(
+        self, material: Material, *, strength: float | None = None, shape: Circle | Tube | None = None
+    ) -> Section:
+        """The thickest section whose bends use at most half of the strength.
+
+        Of the sizes in which a preset material is sold; thinner than those, or of a material without a name, in steps
+        of 1, 1.5, 2, 3, 5, 7. Without a known strength the section is as slender as the paper's rods on its hemisphere,
+        and with one no thicker than that.
+
+        Parameters
+        ----------
+        strength : in place of the preset's [Pa].
+        shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
+
+        Raises
+        ------
+        InputError : the tube's wall is too thick for what the bends allow.
+        """
+        strength = strength or material.bending_strength
+        if strength is None:
+            return Tube(self.slender, shape.thickness) if isinstance(shape, Tube) else Circle(self.slender)
+        bends, allowed = self.bends(), OF_NET * strength / material.youngs_modulus
+        stock = () if shape is not None or material.name is None else STOCK[material.name]
+        fitting = [one for one in stock if depth(one) <= self.thickest and largest_strain(one, bends) <= allowed]
+        if fitting:
+            return fitting[-1]
+        like = shape or (stock[0] if stock else Circle(self.slender))
+        strain = largest_strain(like, bends)
+        most = self.thickest if strain == 0 else min(self.thickest, depth(like) * allowed / strain)
+        return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
 
 
 def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
@@ -108,7 +130,7 @@ def net_bends(net: ChebyshevNet) -> Bends:
     return Bends(np.concatenate(normal), np.concatenate(geodesic))
 
 
-def _strain(section: Section, bends: Bends) -> float:
+def largest_strain(section: Section, bends: Bends) -> float:
     """Largest bending strain of the section by such bends [-]."""
     return float(np.max(fibre_strain(Rod(section, ANY), bends.normal, bends.geodesic), initial=0.0))
 

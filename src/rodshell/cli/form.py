@@ -8,7 +8,7 @@ import click
 
 from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
-from rodshell.cli.outcome import Kept, deliver, output_folder, wanted_kinds
+from rodshell.cli.outcome import Kept, announce_rod, deliver, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.units import length_text
 
@@ -61,7 +61,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
             layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
             case = case.decided(found.best.anchor, found.best.heading)
             rod = case.rod_on(target, layout, anchor=found.best.anchor)
-        _announce_rod(case, rod, quiet=quiet)
+        announce_rod(case, rod, quiet=quiet)
         case = case.with_rod(rod)
         form = find_form(target, layout, rod, progress=progress, **options)
         kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
@@ -79,7 +79,7 @@ def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bo
     announce_compilation(quiet=quiet)
     target, layout, rod, options = case.build_sewn()
     _announce_sizes(case, target, layout, quiet=quiet)
-    _announce_rod(case, rod, quiet=quiet)
+    announce_rod(case, rod, quiet=quiet)
     case = case.with_rod(rod)
     from rodshell.form import sew
 
@@ -100,15 +100,6 @@ def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet
     said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
     if said and not quiet:
         click.echo(f"rodshell: {target.name}, {length_text(2 * target.size)} wide; {said}", err=True)
-
-
-def _announce_rod(case: Case, rod: "Rod", *, quiet: bool) -> None:
-    """Name a rod that the case left open, before its form is found."""
-    if case.rod.left_open and not quiet:
-        from rodshell.output.result import rod_table
-        from rodshell.output.summary import chosen, rod_text
-
-        click.echo(f"rodshell: rod: {rod_text(table := rod_table(rod))}; {chosen(case.rod.left_open, table)}", err=True)
 
 
 def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: Progress) -> "Search":

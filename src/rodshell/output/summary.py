@@ -67,8 +67,8 @@ def chosen(what: Iterable[str], rod: Mapping[str, Any]) -> str:
     missing, verb = " and ".join(parts), "were" if len(parts) > 1 else "was"
     sized = "section" in parts
     known = (rod.get("preset") or {}).get("bending_strength") is not None
-    by = ", so that bending uses at most half of the bending strength in the final shape"
-    return f"{missing} {verb} not given: chosen for this target{by if sized and known else ''}"
+    by = ", for bends that use at most half of the bending strength in the final shape"
+    return f"{missing} {verb} not given: chosen to fit{by if sized and known else ''}"
 
 
 def rod_text(rod: Mapping[str, Any]) -> str:
