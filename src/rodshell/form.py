@@ -188,7 +188,13 @@ def _kept(
     mesh = job.footprint.mesh
     final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    result = workshop_result(result, mesh, checks, made, takeaway.strength)
+    material = job.rod.material
+    preset = material.name if material is not None and takeaway.strength is None else None
+    strength = takeaway.strength or (material.bending_strength if material is not None else None)
+    result = workshop_result(result, mesh, checks, made, strength)
+    result["bending"]["strength_of"] = preset if strength is not None else None
+    if takeaway.rod_chosen:
+        result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
     result["drawings"] = takeaway.drawings.parameters()
     result["verdict"] = verdict(result).table()
     kept = read_inputs(case_toml) if inputs is None else inputs

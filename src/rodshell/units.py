@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
-from math import fmod, inf, isfinite, tau
+from math import floor, fmod, inf, isfinite, log10, tau
 from numbers import Real
 from typing import Literal
 
@@ -203,6 +203,12 @@ def shown(value: object) -> str:
     else:
         text = str(value)
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def rounded_down(length: float) -> float:
+    """The nearest length below of 1, 1.5, 2, 3, 5 or 7 times a power of ten [m]."""
+    decade = 10.0 ** floor(log10(length))
+    return max(decade * step for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if decade * step <= length * (1 + 1e-9))
 
 
 def length_text(metres: float) -> str:

@@ -70,12 +70,14 @@ class Takeaway:
     ----------
     strength : of the rods' material [Pa], by which utilisation is counted; None: it is not counted.
     stages : equilibria of the way up from flat; 0: it is not followed.
+    rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
     """
 
     strength: float | None = None
     stages: int = 8
     fabrication: Fabrication = field(default_factory=Fabrication)
     drawings: DrawingStyle = field(default_factory=DrawingStyle)
+    rod_chosen: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.strength is not None and not self.strength > 0:
