@@ -19,7 +19,7 @@ from rodshell.formfinding.drape import Method, require
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
-from rodshell.joints import Joint
+from rodshell.joints import Ball, Joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output import Archive
 from rodshell.output.result import States, form_result, form_states, table_result, table_states
@@ -113,9 +113,16 @@ class Sewn(SewnForm):
         takeaway = takeaway or Takeaway()
         if case_toml is None:
             case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+        takeaway.require_known_stress(self.rod, self.joint)
         checks = joined_checks(
-            {k: check(one.popped, self.rod, stages=takeaway.stages, progress=progress) for k, one in self.found.items()}
-        )
+            {
+                name: check(
+                    one.popped, self.rod,
+                    stages=takeaway.stages, shear_weight=takeaway.shear_weight, progress=progress,
+                )
+                for name, one in self.found.items()
+            }
+        )  # fmt: skip
         result = with_seam_forces(self.result(), self, checks)
         shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
         return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway)
@@ -129,7 +136,8 @@ class Sewn(SewnForm):
 
 def _archive(job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress) -> Archive:
     """A job's result and states with its checks and its fabrication."""
-    checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
+    takeaway.require_known_stress(job.rod, job.joint if isinstance(job, Form) else Ball())
+    checks = check(job.popped, job.rod, stages=takeaway.stages, shear_weight=takeaway.shear_weight, progress=progress)
     shapes = {ends: shell.positions for ends, shell in job.popped.items()}
     return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway)
 
@@ -141,7 +149,7 @@ def _kept(
     mesh = job.footprint.mesh
     final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    result = workshop_result(result, mesh, checks, made, takeaway.strength)
+    result = workshop_result(result, mesh, checks, made, takeaway.strength, takeaway.shear_strength)
     result["drawings"] = takeaway.drawings.parameters()
     return Archive(result, states | workshop_states(checks), case_toml).as_stored()
 

@@ -192,6 +192,9 @@ class SeamsTable(Table):
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
     stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
+    shear_strength: Stress | None = Field(
+        default=None, description="in shear along the fibres; default: as von Mises has it"
+    )
 
 
 class FabricationTable(Table):
@@ -298,7 +301,9 @@ class Case(Table):
         target = self.target.build()
         layout = self.layout.build(target)
         self._require_stock(layout)
-        return Built(target, layout, self.rod.sized(target).build(), options)
+        rod = self.rod.sized(target).build()
+        self.takeaway().require_known_stress(rod, options["joint"])
+        return Built(target, layout, rod, options)
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
@@ -350,4 +355,5 @@ class Case(Table):
             self.checks.stages,
             Fabrication(**self.fabrication.model_dump()),
             DrawingStyle(**style),
+            self.checks.shear_strength,
         )

@@ -1,6 +1,6 @@
 """Is it safe to build: bending and stress, reactions and their balance, the way up from flat."""
 
-from rodshell.checks.bending import Bending, bending, bending_of, curvatures, fibre_distance, fibre_strain
+from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check, settled_shell
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
@@ -17,8 +17,6 @@ __all__ = [
     "check",
     "curvatures",
     "deploy",
-    "fibre_distance",
-    "fibre_strain",
     "joint_loads",
     "reactions",
     "settled_shell",

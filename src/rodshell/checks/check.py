@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rodshell.checks.bending import Bending, bending, bending_of
+from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
@@ -14,12 +14,14 @@ from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
-from rodshell.units import length_text
+from rodshell.units import length_text, stress_text
 
+WORTH = 0.01  # of the stress: less torsion is not worth a word
 THIN = 0.05  # strain of the outermost fibre up to which rods are thin: radii of ten depths
 
 
@@ -44,9 +46,9 @@ class Checks:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
         bends = [
-            float((bent.strain - np.abs(bent.axial_strain)).max())
+            float(bent.bending_strain.max())
             for bent in (*self.bending.values(), *self.on_the_way)
-            if bent.strain is not None
+            if bent.bending_strain is not None
         ]
         if max(bends, default=0.0) <= THIN:
             return way
@@ -57,7 +59,7 @@ class Checks:
         )
 
     def overstress(self, strength: float | None, mesh: GridMesh) -> tuple[str, ...]:
-        """A sentence where the rods would break, in a final shape or on the way up, with the place.
+        """A sentence where the rods would break, in a final shape or on the way up, with the place and with torsion.
 
         strength : of the rods' material [Pa], or None.
         """
@@ -81,15 +83,34 @@ class Checks:
         only = "" if any(one[0] > 1 for one in final) else ", or close the joints near that place last"
         return (f"the rods would break: {found}; use thinner, softer or stronger rods, or a flatter target{only}",)
 
+    def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
+        """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
+        parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.on_the_way)]
+        sheared = max((float(part.max()) for part in parts if part is not None), default=0.0)
+        if strength is None or sheared <= WORTH * strength:
+            return ()
+        return (
+            f"torsion shears the rods by up to {stress_text(sheared)}, counted by von Mises as in isotropic "
+            "materials; timber and fibre composites bear less along their fibres: give checks.shear_strength",
+        )
 
-def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress: Progress = silent) -> Checks:
+
+def check(
+    popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, shear_weight: float = VON_MISES,
+    progress: Progress = silent,
+) -> Checks:  # fmt: skip
     """Check every shell that converged.
 
-    stages : of the deployment, the way up from flat of the pinned shell; 0: none.
+    Parameters
+    ----------
+    stages : of the deployment from flat of the pinned shell; 0: none.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.fibres`.
     """
     done = {ends: shell for ends, shell in popped.items() if shell.report.converged}
     settled = {ends: settled_shell(shell) for ends, shell in done.items()}
-    bent = {ends: bending_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
+    bent = {
+        ends: bending_of(shell, found.state, rod, shear_weight=shear_weight) for ends, (shell, found) in settled.items()
+    }
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     if "pinned" not in done or not stages:
@@ -99,8 +120,9 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
         last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
         told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
     )  # fmt: skip
-    flat = bending(last.footprint.mesh, deployment.positions[0], rod)
-    on_the_way = (flat, *(bending_of(shell, state, rod) for shell, state in deployment.shells))
+    mesh, laid = last.footprint.mesh, deployment.positions[0]
+    flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
+    on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     return Checks(bent, held, carried, deployment, on_the_way)
 
 
@@ -109,11 +131,16 @@ def _worst(bent: Bending) -> float:
 
 
 def _most_stressed(bent: Bending, mesh: GridMesh) -> str:
-    """The rod, and how far along it."""
+    """The rod, how far along it, and how much of it is torsion."""
     assert bent.stress is not None
+    assert bent.torsion_stress is not None
     at = int(np.argmax(bent.stress))
     rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
-    return f"{rod.name}, {length_text(float(mesh.stations[at]) - rod.start)} from its start"
+    sheared = float(bent.torsion_stress[at])
+    torsion = (
+        f" (with a shear stress of {stress_text(sheared)} of torsion)" if sheared > WORTH * bent.stress[at] else ""
+    )
+    return f"{rod.name}, {length_text(float(mesh.stations[at]) - rod.start)} from its start{torsion}"
 
 
 def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Callable, Iterator, Mapping
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,12 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
         ("mass_kg", True, lambda rod: _number(rod.more.get("mass"), 5)),
         ("joints", True, lambda rod: str(len(rod.joints))),
         ("min_radius_mm", True, lambda rod: _mm(rod.more.get("min_radius"), 1)),
+        ("max_normal_curvature_per_m", False, lambda rod: _figure(rod.more.get("normal_curvature"))),
+        ("max_geodesic_curvature_per_m", False, lambda rod: _figure(rod.more.get("geodesic_curvature"))),
+        ("max_twist_deg_per_m", False, lambda rod: _figure(rod.more.get("twist_rate"), 180 / pi)),
         ("max_strain", True, lambda rod: _number(rod.more.get("max_strain"), 6)),
         ("max_stress_MPa", True, lambda rod: _mpa(rod.more.get("max_stress"))),
+        ("max_torsion_stress_MPa", False, lambda rod: _figure(rod.more.get("torsion_stress"), 1e-6)),
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
         ("utilisation_pop_up", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
         ("splices_at_mm", True, lambda rod: "; ".join(_mm(at) for at in rod.more.get("splices") or ())),
@@ -239,6 +244,10 @@ def _mm(value: float | None, digits: int = 3) -> str:
 
 def _mpa(value: float | None) -> str:
     return "" if value is None else f"{1e-6 * value:.5g}"
+
+
+def _figure(value: float | None, factor: float = 1.0) -> str:
+    return "" if value is None else f"{round(factor * value, 9):.5g}"
 
 
 def _number(value: float | None, digits: int) -> str:
