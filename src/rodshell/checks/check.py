@@ -1,16 +1,18 @@
 """All checks of a popped-up shell in one call."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 
 from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
+from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.formfinding import Popped
-from rodshell.formfinding.popup import Ends
+from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
@@ -33,6 +35,7 @@ class Checks:
     ----------
     bending, reactions, joints : by end condition.
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
+    contact : by end condition; `contact_on_the_way` of the deployment's stages.
     """
 
     bending: dict[Ends, Bending]
@@ -40,11 +43,13 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None
     on_the_way: tuple[Bending, ...]
+    contact: dict[Ends, Contact] = field(default_factory=dict)
+    contact_on_the_way: tuple[Contact, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
-        way = () if self.deployment is None else self.deployment.warnings
+        way = (*(() if self.deployment is None else self.deployment.warnings), *self.touching)
         bends = [
             float(bent.bending_strain.max())
             for bent in (*self.bending.values(), *self.on_the_way)
@@ -56,6 +61,43 @@ class Checks:
             *way,
             f"bending strains the rods by {100 * max(bends):.2g} %: they are too thick for their bends, the theory of "
             f"thin rods holds up to {100 * THIN:.0f} % or so; use thinner rods or a larger target",
+        )
+
+    @property
+    def nearest_on_the_way(self) -> tuple[float, Contact] | None:
+        """The stage of the deployment in which rods are nearest, by its share; None where nothing was checked."""
+        if self.deployment is None or not self.contact_on_the_way:
+            return None
+        pairs = zip(self.deployment.share.tolist(), self.contact_on_the_way, strict=True)
+        return min(pairs, key=lambda pair: inf if pair[1].clearance is None else pair[1].clearance)
+
+    @property
+    def touching(self) -> tuple[str, ...]:
+        """A sentence where rods touch, or come so near to each other that there is no room for joints."""
+        shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
+        if (nearest := self.nearest_on_the_way) is not None and nearest[0] < 1:
+            share, found = nearest
+            shapes.append((found, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid"))
+        near = [(found, where) for found, where in shapes if found.clearance is not None]
+        if not near:
+            return ()
+        worst, where = min(near, key=lambda pair: pair[0].clearance or 0.0)
+        assert worst.clearance is not None
+        assert worst.rods is not None
+        assert worst.where is not None
+        place = "({:.4g}, {:.4g}, {:.4g}) m".format(*worst.where)
+        who = f"rods {worst.rods[0]} and {worst.rods[1]}" if worst.rods[0] != worst.rods[1] else f"rod {worst.rods[0]}"
+        remedy = "use thinner rods (rod.section) or a larger spacing"
+        if not worst.pairs:
+            return (
+                f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near {place}: that "
+                f"leaves hardly any room for joints; {remedy}",
+            )
+        does = "overlap" if who.startswith("rods") else "runs into itself"
+        count = f" (of {worst.pairs} pairs that touch)" if worst.pairs > 1 else ""
+        return (
+            f"{who} {does} by {length_text(-worst.clearance)} {where}, near {place}{count}: rods cannot run through "
+            f"each other; {remedy}",
         )
 
     def overstress(self, strength: float | None, mesh: GridMesh) -> tuple[str, ...]:
@@ -111,10 +153,11 @@ def check(
     bent = {
         ends: bending_of(shell, found.state, rod, shear_weight=shear_weight) for ends, (shell, found) in settled.items()
     }
+    met = {ends: contact_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, ())
+        return Checks(bent, held, carried, None, (), met)
     last = done["pinned"]
     deployment = deploy(
         last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
@@ -123,7 +166,9 @@ def check(
     mesh, laid = last.footprint.mesh, deployment.positions[0]
     flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way)
+    met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
+    met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
+    return Checks(bent, held, carried, deployment, on_the_way, met, met_on_the_way)
 
 
 def _worst(bent: Bending) -> float:

@@ -1,6 +1,7 @@
 """What is kept of checks and fabrication in result.json and states.npz."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,7 @@ def workshop_result(
         "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
         "joint_loads": {ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
         **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
+        "contact": _contact(checks),
         "fabrication": _fabrication(result, mesh, made),
     }
 
@@ -116,6 +118,14 @@ def _bending(checks: Checks, strength: float | None) -> dict[str, Any]:
         table["pop_up"] = _bent(list(checks.on_the_way), everywhere, strength)
         sharpest_stage = int(np.argmax([bent.curvature.max() for bent in checks.on_the_way]))
         table["pop_up"]["share"] = checks.deployment.share[sharpest_stage]
+    return table
+
+
+def _contact(checks: Checks) -> dict[str, Any]:
+    table: dict[str, Any] = {ends: asdict(met) for ends, met in checks.contact.items()}
+    if checks.nearest_on_the_way is not None:
+        share, met = checks.nearest_on_the_way
+        table["deployment"] = {**asdict(met), "share": share}
     return table
 
 
