@@ -20,7 +20,7 @@ from rodshell.formfinding.drape import Method
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
-from rodshell.joints import Joint
+from rodshell.joints import Ball, Joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output import Archive
 from rodshell.output.inputs import read_inputs
@@ -151,9 +151,17 @@ class Sewn(_Judged, SewnForm):
         takeaway = takeaway or Takeaway()
         if case_toml is None:
             case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+        takeaway.require_known_stress(self.rod, self.joint)
+        weight = takeaway.judged_by(self.rod).shear_weight
         checks = joined_checks(
-            {k: check(one.popped, self.rod, stages=takeaway.stages, progress=progress) for k, one in self.found.items()}
-        )
+            {
+                name: check(
+                    one.popped, self.rod,
+                    stages=takeaway.stages, shear_weight=weight, progress=progress,
+                )
+                for name, one in self.found.items()
+            }
+        )  # fmt: skip
         result = with_seam_forces(self.result(), self, checks)
         shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
         return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway, inputs)
@@ -176,7 +184,9 @@ def _archive(
     inputs: Mapping[str, bytes] | None = None,
 ) -> Archive:  # fmt: skip
     """A job's result and states with its checks and its fabrication."""
-    checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
+    takeaway.require_known_stress(job.rod, job.joint if isinstance(job, Form) else Ball())
+    weight = takeaway.judged_by(job.rod).shear_weight
+    checks = check(job.popped, job.rod, stages=takeaway.stages, shear_weight=weight, progress=progress)
     shapes = {ends: shell.positions for ends, shell in job.popped.items()}
     return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway, inputs)
 
@@ -188,11 +198,9 @@ def _kept(
     mesh = job.footprint.mesh
     final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    material = job.rod.material
-    preset = material.name if material is not None and takeaway.strength is None else None
-    strength = takeaway.strength or (material.bending_strength if material is not None else None)
-    result = workshop_result(result, mesh, checks, made, strength)
-    result["bending"]["strength_of"] = preset if strength is not None else None
+    judged = takeaway.judged_by(job.rod)
+    result = workshop_result(result, mesh, checks, made, judged.strength, judged.shear_strength)
+    result["bending"]["strength_of"] = judged.strength_of
     if takeaway.rod_chosen:
         result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
     result["drawings"] = takeaway.drawings.parameters()

@@ -193,6 +193,9 @@ class SeamsTable(Table):
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
     stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
+    shear_strength: Stress | None = Field(
+        default=None, description="in shear along the fibres; default: as von Mises has it"
+    )
 
 
 class FabricationTable(Table):
@@ -307,7 +310,9 @@ class Case(Table):
         target = self.target.build()
         layout = self.layout.build(target)
         self._require_stock(layout)
-        return Built(target, layout, self.rod_on(target, layout, anchor=anchor), options)
+        rod = self.rod_on(target, layout, anchor=anchor)
+        self.takeaway().require_known_stress(rod, options["joint"])
+        return Built(target, layout, rod, options)
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
@@ -360,4 +365,5 @@ class Case(Table):
             Fabrication(**self.fabrication.model_dump()),
             DrawingStyle(**style),
             rod_chosen=self.rod.left_open,
+            shear_strength=self.checks.shear_strength,
         )

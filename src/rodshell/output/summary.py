@@ -9,6 +9,8 @@ from rodshell.output.wording import NAMES, case_rows, percent, rounded, share_of
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
 
+STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
+
 
 def summary_text(result: dict[str, Any]) -> str:
     """What was found, how good it is, and what to read first."""
@@ -116,9 +118,11 @@ def _checked(result: dict[str, Any]) -> list[str]:
             continue
         if isinstance(bent, dict) and bent.get("min_radius") is not None:
             name = "way up" if place == "pop_up" else place
-            line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}"
+            line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}{_curved(bent)}"
             if bent.get("max_stress") is not None:
                 line += f", largest stress {stress(bent['max_stress'])}"
+            if bent.get("torsion_stress"):
+                line += f" (torsion alone {stress(bent['torsion_stress'])})"
             if bent.get("utilisation") is not None:
                 line += f", {percent(bent['utilisation'])} of {strength}"
             if place == "pop_up" and unknown:
@@ -133,6 +137,15 @@ def _checked(result: dict[str, Any]) -> list[str]:
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
         lines.append(f"  reactions {ends:<8}largest {rounded(held['largest_force'])} N; sums of {sums}")
     return lines
+
+
+def _curved(bent: dict[str, Any]) -> str:
+    """How the rods are curved out of the shell and within it, by radii, and twisted."""
+    parts = [("normal_curvature", "out of the shell"), ("geodesic_curvature", "within it")]
+    words = [f"{where} {_mm(1 / bent[key])}" for key, where in parts if (bent.get(key) or 0.0) > STRAIGHT]
+    if (bent.get("twist_rate") or 0.0) > STRAIGHT:
+        words.append(f"twist {rounded(degrees(bent['twist_rate']))} deg/m")
+    return f" ({', '.join(words)})" if words else ""
 
 
 def _mm(metres: float) -> str:
