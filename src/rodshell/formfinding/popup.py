@@ -15,7 +15,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding.carried import carried_edges, carried_nodes
 from rodshell.formfinding.draped import node_normals
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.trim import Boundary, Footprint
+from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.vectors import dot, unit
 from rodshell.joints import Ball, Joint
 from rodshell.model import Shell
@@ -25,6 +25,7 @@ from rodshell.solve.mixed_newton import Equilibrium, find_stable
 from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport
+from rodshell.units import length_text
 
 Floats = NDArray[np.float64]
 Ends = Literal["pinned", "clamped"]
@@ -82,13 +83,24 @@ def pop_up(
         but the displacements and axial forces that it had on the same rods are the first guess. Where that does
         not lead to a stable state nearby, the draped state does.
     joint : what the rods do to each other where they cross: one for all, or one for each crossing; ball joints
-        without. Eccentric rods end half their distance above or below the boundary.
+        without. Eccentric ones lay the rods in two layers: each rod begins on its own line, half of their distance
+        above or below the draped surface, and the boundary's ends lie there.
 
     Raises
     ------
     InputError : `start` is "draped" and the boundary has no draped state; the joints do not fit the grid.
     """
-    job = _PopUp(footprint, boundary, rod, joint or Ball(), progress)
+    joint = joint or Ball()
+    joints = joint if isinstance(joint, Sequence) else (joint,)
+    apart = max((one.eccentricity for one in joints), default=0.0)
+    if apart and not footprint.mesh.layered:
+        footprint, boundary = in_layers(footprint, boundary, apart)
+    elif footprint.mesh.layered and apart != (lie := 2 * float(np.abs(footprint.mesh.heights).max(initial=0.0))):
+        raise InputError(
+            f"the grid's rods lie in two layers {length_text(lie)} apart, and its joints hold them "
+            f"{length_text(apart)} apart: drape it with the same joint"
+        )
+    job = _PopUp(footprint, boundary, rod, joint, progress)
     if start == "draped" or isinstance(start, Popped):
         shell, found = (job.again(start) if isinstance(start, Popped) else None) or job.release(ends)
         start = "draped"
@@ -124,9 +136,13 @@ class _PopUp:
         supports = Supports(free) if goals is None else Supports(free, moved, goals)
         return Problem(shell.elements, shell.stretch, supports, self.length, places=shell.places)
 
-    def upright(self, shell: Shell, positions: Floats, tangents: Floats | None = None) -> Floats:
-        """The state at these node positions (n, 3), the rods' first directors along the normals of the surface."""
-        normals = node_normals(self.footprint.mesh, positions) if shell.angles else None
+    def upright(
+        self, shell: Shell, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None
+    ) -> Floats:
+        """The state at these node positions (n, 3), the rods' first directors along the normals of the surface: those
+        (n, 3) given, or what the crossings of the rods tell of them."""
+        if normals is None and shell.angles:
+            normals = node_normals(self.footprint.mesh, positions)
         return shell.state(positions, tangents, normals)
 
     def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
@@ -134,7 +150,7 @@ class _PopUp:
         if self.boundary.draped is None:
             raise InputError('this boundary has no draped state to start from: use start="flat"')
         shell = self.shell(ends)
-        state = self.upright(shell, self.boundary.draped, self.boundary.tangents)
+        state = self.upright(shell, self.boundary.draped, self.boundary.tangents, self.boundary.normals)
         forces = np.zeros(len(self.footprint.mesh.edges))
         at_once = find_stable(
             self.problem(shell),
@@ -183,12 +199,9 @@ class _PopUp:
         mesh, boundary = self.footprint.mesh, self.boundary
         shell = self.shell("pinned")
         flat = aligned(mesh.flat, mesh.flat[mesh.ends.ravel()], boundary.points)
-        first, up = flat[mesh.ends.ravel()], UP
-        if boundary.draped is not None:
-            up = node_normals(mesh, boundary.draped)[mesh.ends.ravel()]
-        last = boundary.points + shell.lift[shell.ends] * up
+        first = flat[mesh.ends.ravel()]
         found = follow(
-            lambda t: self.problem(shell, (1 - t) * (first + shell.lift[shell.ends] * UP) + t * last),
+            lambda t: self.problem(shell, (1 - t) * first + t * boundary.points),
             self.upright(shell, arched(self.footprint, flat, first, boundary)),
             np.zeros(len(mesh.edges)),
             first_step=FIRST_RISE,
@@ -231,7 +244,7 @@ def aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     result = np.empty_like(flat)
     result[:, :2] = (flat - centre)[:, :2] @ turn.T + there[:2]
-    result[:, 2] = there[2]
+    result[:, 2] = there[2] + flat[:, 2]
     return result
 
 
@@ -254,4 +267,9 @@ def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary
         chord[:, 2] += height * np.sin(np.pi * share[:, 0])
         raised[nodes] += chord
         weight[nodes] += 1
-    return raised / weight[:, None]
+    raised /= weight[:, None]
+    if mesh.layered:  # rods of a joint meet half-way here, too
+        pairs = mesh.joint_pairs
+        middle = raised[pairs].mean(axis=1)
+        raised[pairs] = middle[:, None] + mesh.heights[pairs][:, :, None] * UP
+    return raised
