@@ -16,7 +16,9 @@ from rodshell.contact.bound import BoundToTarget
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.natural import with_natural_ends
 from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.thickness import layers_left_out, sideways
 from rodshell.geometry.vectors import dot
+from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import whole_rods
 from rodshell.layout.mesh import nodes_along
@@ -45,11 +47,12 @@ def bound_drape(
     *,
     anchor: tuple[float, float] | None = None,
     near: Draped | None = None,
-    eccentricity: float = 0.0,
+    joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Drape `layout` over `target` by its net; see `drape`."""
     progress("net", "marching", 0.0)
+    eccentricity = joint.eccentricity if joint else 0.0
     net = chebyshev_net(target, layout, anchor=anchor, near=near.net if near else None, eccentricity=eccentricity)
     grid = with_apron(net, CLEARANCE * layout.edge)
     cuts = [list[FlatRod]() for _ in grid.rods]
@@ -76,6 +79,14 @@ def bound_drape(
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
     warnings = [*target.warnings, *net.warnings]
+    on = np.zeros(mesh.node_count, dtype=bool)
+    on[on_target] = True
+    edges, bends = (np.asarray(on[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
+    wide = sideways(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
+    if wide is not None:
+        warnings += wide.warnings
+    if not eccentricity:
+        warnings += layers_left_out(target, mesh, found.state, edges, rod, min(layout.spacing))
     if found.report.negative_modes:
         warnings.append(
             f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
@@ -107,6 +118,7 @@ def bound_drape(
         gravity=0.0,
         net=net,
         eccentricity=eccentricity,
+        sideways=wide,
         dropped=net.dropped,
         warnings=tuple(warnings),
     )
