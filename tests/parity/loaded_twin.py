@@ -6,6 +6,8 @@ are, and the rods' EA, EI, GJ and mass per length; nothing of the library's ener
 alike in all directions, or they are laths with a twist angle for each edge. Joints are balls.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
@@ -18,7 +20,7 @@ GRAVITY = 9.81
 
 
 class LoadedTwin:
-    """Unknowns in a row: nodes, ghosts of the clamps past the ends, twist angles of edges (and ghost edges) of laths."""
+    """Unknowns in a row: nodes, ghosts of the clamps past the ends, twist angles of laths' edges and ghost edges."""
 
     def __init__(self, popped, rod, *, gravity=GRAVITY):
         mesh = popped.footprint.mesh
@@ -29,9 +31,9 @@ class LoadedTwin:
         edges, rest, bends, voronoi, pairs, at = [], [], [], [], [], 0
         for k, s in enumerate(stations):
             row, lengths = list(mesh.nodes_of(k)), list(np.diff(s))
-            edges += zip(row[:-1], row[1:], strict=True)
+            edges += pairwise(row)
             rest += lengths
-            reach = [(a + b) / 2 for a, b in zip(lengths[:-1], lengths[1:], strict=True)]
+            reach = [(a + b) / 2 for a, b in pairwise(lengths)]
             if len(ghosts):  # half of the end's Voronoi length lies in the clamp
                 row = [ghosts[2 * k], *row, ghosts[2 * k + 1]]
                 reach = [lengths[0] / 2, *reach, lengths[-1] / 2]
@@ -204,7 +206,7 @@ class LathBends:
             upright = np.array([0.0, 0.0, 1.0]) - t[2] * t
             self.directors[row[top]] = upright / np.linalg.norm(upright)
             for chain in (row[top:], row[top::-1]):
-                for here, there in zip(chain[:-1], chain[1:], strict=True):
+                for here, there in pairwise(chain):
                     carried = _carried(self.directors[here], self.tangents[here], self.tangents[there])
                     self.directors[there] = carried
 

@@ -1,4 +1,4 @@
-"""Popped-up shells, unloaded and under their weight, against `LoadedTwin`, which shares no mechanics with the library."""
+"""Popped-up shells, unloaded and under their weight, against `LoadedTwin`, which shares none of our mechanics."""
 
 from functools import cache
 
@@ -62,13 +62,14 @@ def test_equilibrium_inertia_and_reactions_agree(name, ends):
 
 
 @pytest.mark.parametrize("name", SHELLS)
-def test_the_share_of_its_own_weight_that_a_shell_bears_agrees(name, ends="pinned"):
-    found = self_weight(*settled_shell(shell(name).popped[ends]), most=2e3)
-    factor, at_one = twin(name, ends).load_factor(COARSE)
+def test_the_share_of_its_own_weight_that_a_shell_bears_agrees(name):
+    found = self_weight(*settled_shell(shell(name).popped["pinned"]), most=2e3)
+    other = twin(name, "pinned")
+    factor, at_one = other.load_factor(COARSE)
     assert (1 - COARSE) * factor < found.load_factor / (1 - CLOSE)  # never less than stable,
     assert found.load_factor < (1 + 2 * COARSE) * factor  # nor more than the truth
     if factor < 1:
         assert found.deflection is None
     else:
-        moved = (at_one - twin(name, ends).state)[: 3 * twin(name, ends).nodes].reshape(-1, 3)
+        moved = (at_one - other.state)[: 3 * other.nodes].reshape(-1, 3)
         assert found.deflection == pytest.approx(np.linalg.norm(moved, axis=1).max(), rel=1e-6)
