@@ -30,8 +30,9 @@ CROSS = [
 
 
 class FakeArchive:
-    def __init__(self, status: str, case_toml: str) -> None:
-        self.result = {"format": "rodshell-result", "status": status}
+    def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
+        verdict = {"level": level, "reasons": ["the rods touch"]}
+        self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, more: dict[str, str] | None = None) -> None:
@@ -44,11 +45,11 @@ class FakeArchive:
 
 
 class FakeForm:
-    def __init__(self, status: str) -> None:
-        self.status = status
+    def __init__(self, status: str, level: str) -> None:
+        self.status, self.level = status, level
 
     def archive(self, case_toml: str = "", **options: Any) -> FakeArchive:
-        return FakeArchive(self.status, case_toml)
+        return FakeArchive(self.status, case_toml, self.level)
 
 
 class FakeFinder(ModuleType):
@@ -57,7 +58,7 @@ class FakeFinder(ModuleType):
     def __init__(self) -> None:
         super().__init__("rodshell.form")
         self.calls = list[tuple[tuple[Any, ...], dict[str, Any]]]()
-        self.status = "converged"
+        self.status, self.level = "converged", "good"
         self.fault: BaseException | None = None
 
     def find_form(self, *args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
@@ -66,7 +67,7 @@ class FakeFinder(ModuleType):
             progress(stage, f"iteration {iteration}", 1e-3)
         if self.fault:
             raise self.fault
-        return FakeForm(self.status)
+        return FakeForm(self.status, self.level)
 
     pop_up_table = find_form
 
@@ -247,6 +248,22 @@ def test_a_file_that_comes_into_the_way_while_the_job_runs_sends_the_result_else
     assert load_case("dome-2/case.toml") == load_case("hemisphere")
 
 
+@pytest.mark.parametrize(
+    ("status", "level", "code"),
+    [("converged", "good", 0), ("converged", "check", 0), ("converged", "unbuildable", 4), ("stalled", "check", 3),
+     ("stalled", "unbuildable", 3)],
+)  # fmt: skip
+def test_the_exit_code_is_the_verdict_s_and_not_converged_wins(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], status: str, level: str, code: int
+) -> None:
+    finder.status, finder.level = status, level
+    assert main(["form", "hemisphere", "--quiet"]) == code
+    said = {0: "", 3: "rodshell: NOT CONVERGED: stalled", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
+    err = capsys.readouterr().err
+    assert err.startswith(said)
+    assert (err == "") == (code == 0)
+
+
 def test_not_converged_saves_says_so_and_ends_with_3(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     finder.status = "stopped after 8 factorisations"
     assert main(["form", "hemisphere"]) == 3
@@ -275,6 +292,7 @@ def test_json_is_the_result_and_nothing_else_on_stdout(finder: FakeFinder, capsy
         "out": str(Path("out/hemisphere").resolve()),
         "format": "rodshell-result",
         "status": "converged",
+        "verdict": {"level": "good", "reasons": ["the rods touch"]},
     }
 
 
@@ -507,7 +525,7 @@ sys.exit(main(["form", "hemisphere"]))
 
 
 def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it() -> None:
-    pty = pytest.importorskip("pty")
+    pty = pytest.importorskip("pty", reason="no terminals: run on Linux or macOS")
     ours, theirs = pty.openpty()
     job = subprocess.Popen(
         [sys.executable, "-c", WAITING],

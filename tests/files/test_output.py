@@ -18,6 +18,7 @@ from sample_archive import sample_archive, table_archive
 
 from rodshell.errors import OutputError
 from rodshell.output import Archive, picture_svg, read, write
+from rodshell.output.archive import export
 from rodshell.output.labels import boxes_meet, lines_meet, place
 from rodshell.output.plan import flat_plan
 
@@ -309,8 +310,7 @@ def test_report_needs_nothing_else(which: str, request: pytest.FixtureRequest) -
 
 def test_report_gives_the_verdict_first(out: Path) -> None:
     page = (out / "report.html").read_text()
-    verdict = page.index("Converged and stable")
-    assert verdict < page.index("<h2>")
+    assert page.index('aria-label="Verdict"') < page.index("<strong>Check: ") < page.index("<h2>")
     assert "A support that holds the rod&#39;s direction (clamped) is worth it" in page
     assert "Design aid, not code compliance" in page
     assert page.count("<figure>") == 7
@@ -324,11 +324,12 @@ def test_report_puts_failure_and_warnings_before_all(archive: Archive, tmp_path:
     }
     words = {"warnings": ["<script>alert(1)</script>"], "dropped": [{"id": "U99", "reason": "no two ends"}]}
     result = {**archive.result, "status": "stalled", "pop_up": shells, **words}
-    page = (write(replace(archive, result=result), tmp_path / "bad") / "report.html").read_text()
-    assert "Converged and stable" not in page
-    assert page.index("&lt;script&gt;alert(1)") < page.index("Not converged: do not build") < page.index("<h2>")
+    export(replace(archive, result=result), tmp_path, ["report"])
+    page = (tmp_path / "report.html").read_text()
+    first = "Not buildable: the pop-up with pinned ends did not converge: stalled"
+    assert page.index(first) < page.index("&lt;script&gt;alert(1)") < page.index("<h2>")
     assert "<script>alert" not in page
-    assert "With clamped ends the shell would snap away from this unstable equilibrium (1 buckling mode)." in page
+    assert "with clamped ends the shell is unstable (1 buckling mode) and would snap to another shape" in page
     assert "With pinned ends the shell stays" not in page  # a shell that did not converge has no gap
     assert "U99: no two ends" in page
 
@@ -352,7 +353,7 @@ def test_least_result_is_written(tmp_path: Path) -> None:
     full = sample_archive()
     result = {key: full.result[key] for key in ("format", "version", "units", "rods")}
     out = write(Archive({**result, "status": "diverged"}, {"flat": full.states["flat"]}, ""), tmp_path / "least")
-    assert "Not converged" in (out / "report.html").read_text()
+    assert "Not buildable: it did not converge: diverged" in (out / "report.html").read_text()
     assert len(rows(out, "rods.csv")) == 18
     assert rows(out, "joints.csv")[0]["final_deg"] == ""
 
@@ -390,8 +391,8 @@ def test_table_is_coloured_by_height() -> None:
 
 
 def test_report_of_60_by_60_rods_stays_below_5_megabytes(tmp_path: Path) -> None:
-    out = write(sample_archive(60, 6), tmp_path / "large")
-    assert (out / "report.html").stat().st_size < 5e6
+    export(sample_archive(60, 6), tmp_path, ["report"])
+    assert (tmp_path / "report.html").stat().st_size < 5e6
 
 
 def test_read_gives_back_what_was_written(out: Path, archive: Archive) -> None:

@@ -21,6 +21,7 @@ from rodshell.case.values import (
     Coordinate,
     Counts,
     Duration,
+    IsoDate,
     Length,
     LengthOrAuto,
     Lengths,
@@ -218,8 +219,11 @@ class DrawingsTable(Table):
     paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(default="A3", description="of the PDF's sheets, landscape")
     project: str = Field(default="", description="for the title block")
     revision: str = Field(default="", description="for the title block")
-    tolerance: Length | None = Field(default=None, description="of lengths, for the title block")
+    tolerance: Length | None = Field(default=None, description="of lengths; they are shown to a tenth of it or finer")
     layers: LayersTable = LayersTable()
+    name: str = Field(default="", description="title of the drawings; default: the target's name")
+    author: str = Field(default="", description="for the title block: who drew or answers for the drawings")
+    date: IsoDate = Field(default="", description='for the title block, "2026-11-22"; default: the day of writing')
 
 
 class Built(NamedTuple):
@@ -292,7 +296,8 @@ class Case(Table):
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "gravity": drape.gravity, "ends": ends}
+        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "ends": ends}
+        options["gravity"] = None if drape.method == "bound" else drape.gravity
         options["fall"] = drape.fall() if drape.method == "paper" else None
         options["joint"] = self.joint.build()
         target = self.target.build()

@@ -1,10 +1,11 @@
-"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat."""
+"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat, its own weight."""
 
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures, fibre_distance, fibre_strain
 from rodshell.checks.check import Checks, check, settled_shell
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.checks.self_weight import SelfWeight, self_weight
 
 __all__ = [
     "Bending",
@@ -12,6 +13,7 @@ __all__ = [
     "Deployment",
     "JointLoads",
     "Reactions",
+    "SelfWeight",
     "bending",
     "bending_of",
     "check",
@@ -21,5 +23,6 @@ __all__ = [
     "fibre_strain",
     "joint_loads",
     "reactions",
+    "self_weight",
     "settled_shell",
 ]

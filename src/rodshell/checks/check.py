@@ -9,6 +9,7 @@ from rodshell.checks.bending import Bending, bending, bending_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
 from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
@@ -31,6 +32,7 @@ class Checks:
     ----------
     bending, reactions, joints : by end condition.
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
+    self_weight : by end condition, what share of its own weight the shell bears.
     """
 
     bending: dict[Ends, Bending]
@@ -38,11 +40,13 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None
     on_the_way: tuple[Bending, ...]
+    self_weight: dict[Ends, SelfWeight]
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
+        way = (*way, *unknown_weights(self.self_weight))
         bends = [
             float((bent.strain - np.abs(bent.axial_strain)).max())
             for bent in (*self.bending.values(), *self.on_the_way)
@@ -92,8 +96,12 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
     bent = {ends: bending_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
+    weighed = dict[Ends, SelfWeight]()
+    for ends, pair in settled.items():
+        progress("self-weight", f"{ends} ends", 0.0)
+        weighed[ends] = self_weight(*pair)
     if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, ())
+        return Checks(bent, held, carried, None, (), weighed)
     last = done["pinned"]
     deployment = deploy(
         last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
@@ -101,7 +109,7 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
     )  # fmt: skip
     flat = bending(last.footprint.mesh, deployment.positions[0], rod)
     on_the_way = (flat, *(bending_of(shell, state, rod) for shell, state in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way)
+    return Checks(bent, held, carried, deployment, on_the_way, weighed)
 
 
 def _worst(bent: Bending) -> float:

@@ -13,7 +13,8 @@ RARELY = 500_000  # objects made since Python last looked for garbage that holds
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns its exit code.
 
-    0 done, 2 bad input, 3 not converged or out of time, 130 interrupted by Ctrl-C, 143 by SIGTERM.
+    0 found, 2 bad input, 3 not converged or out of time, 4 found but not buildable, 130 interrupted by Ctrl-C, 143 by
+    SIGTERM.
     """
     with Interruption() as interruption:
         try:

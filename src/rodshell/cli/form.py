@@ -1,6 +1,7 @@
 """`rodshell form`: the main job. Its options are the keys of the case file."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -9,6 +10,7 @@ from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
 from rodshell.cli.outcome import Kept, deliver, force_option, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
+from rodshell.output.inputs import kept_case, read_inputs
 from rodshell.units import length_text
 
 if TYPE_CHECKING:
@@ -54,7 +56,9 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, force: bool
     from rodshell.output.files import reserved
 
     kinds = wanted_kinds(only)
-    names = [*ARCHIVE, *reserved(kinds), *([SEARCH] if case.undecided else [])]
+    asked = case.to_toml()
+    inputs = kept_case(asked, read_inputs(asked), Path())[1]
+    names = [*ARCHIVE, *inputs, *reserved(kinds), *([SEARCH] if case.undecided else [])]
     with output_folder(out, name, names, force=force) as place:
         work = _sew if case.seams.lines else _form
         found, picture = work(case, quiet=quiet, table=not (quiet or as_json))
@@ -65,7 +69,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, force: bool
 def _form(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
     """The form of a case, and the picture of its search; `table` prints that."""
     target, layout, rod, options = case.build()
-    asked, case = case, case.sized(target)
+    asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway = case.takeaway()
     announce_compilation(quiet=quiet)
     _announce_sizes(asked, target, layout, rod, quiet=quiet)
@@ -78,7 +82,7 @@ def _form(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, 
             layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
             case = case.decided(found.best.anchor, found.best.heading)
         form = find_form(target, layout, rod, progress=progress, **options)
-        archive = form.archive(case.to_toml(), takeaway=takeaway, progress=progress)
+        archive = form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress)
     if found and table:
         click.echo(found.table())
     return archive, {SEARCH: _picture(found)} if found else {}
@@ -87,7 +91,7 @@ def _form(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, 
 def _sew(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
     """The form of a case with seams."""
     target, layout, rod, options = case.build_sewn()
-    asked, case = case, case.sized(target)
+    asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway = case.takeaway()
     announce_compilation(quiet=quiet)
     _announce_sizes(asked, target, layout, rod, quiet=quiet)
@@ -97,7 +101,7 @@ def _sew(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, s
         search = case.layout.rotate == "auto"
         form = sew(target, layout=layout, rod=rod, search=search, progress=progress, **options)
         case = case.headed(form.layout.rotate)
-        return form.archive(case.to_toml(), takeaway=takeaway, progress=progress), {}
+        return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), {}
 
 
 def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", *, quiet: bool) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rodshell.output import Archive
     from rodshell.output.folder import ResultFolder
 
-CONVERGED, NOT_CONVERGED = 0, 3
+FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
 
 
 class Result(Protocol):
@@ -93,7 +93,7 @@ def wanted_kinds(only: str | None) -> list[str] | None:
 def deliver(
     result: Result, save: "Callable[[ResultFolder], object]", place: "ResultFolder", *, as_json: bool, quiet: bool
 ) -> int:
-    """Save a result, print its summary, and return the exit code."""
+    """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
     Interruption.check()
     folder = _saved(save, place)
     if as_json:
@@ -101,10 +101,14 @@ def deliver(
     elif not quiet:
         click.echo(result.summary())
         click.echo(f"written to {folder}")
-    if result.status == "converged":
-        return CONVERGED
-    click.echo(f"rodshell: NOT CONVERGED: {result.status}; partial results are in {folder}", err=True)
-    return NOT_CONVERGED
+    if result.status != "converged":
+        click.echo(f"rodshell: NOT CONVERGED: {result.status}; partial results are in {folder}", err=True)
+        return NOT_CONVERGED
+    verdict = result.result().get("verdict")
+    if verdict and verdict["level"] == "unbuildable":
+        click.echo(f"rodshell: NOT BUILDABLE: {verdict['reasons'][0]}; results are in {folder}", err=True)
+        return UNBUILDABLE
+    return FOUND
 
 
 def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:

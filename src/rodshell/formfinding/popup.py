@@ -6,7 +6,7 @@ hold the direction of the draped rods as well. The end condition decides the sha
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from rodshell.formfinding.draped import node_normals
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint
 from rodshell.geometry.vectors import dot, unit
-from rodshell.joints import Ball, Joint
+from rodshell.joints import Ball, Joint, require_joint
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
@@ -25,10 +25,13 @@ from rodshell.solve.mixed_newton import Equilibrium, find_stable
 from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport
+from rodshell.validation import choice
 
 Floats = NDArray[np.float64]
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
+ENDS: tuple[Ends, ...] = get_args(Ends)
+STARTS: tuple[Start, ...] = get_args(Start)
 
 UP = np.array([0.0, 0.0, 1.0])
 FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
@@ -88,6 +91,10 @@ def pop_up(
     ------
     InputError : `start` is "draped" and the boundary has no draped state; the joints do not fit the grid.
     """
+    choice("ends", ends, ENDS)
+    if not isinstance(start, Popped):
+        choice("start", start, STARTS)
+    require_joint(joint)
     job = _PopUp(footprint, boundary, rod, joint or Ball(), progress)
     if start == "draped" or isinstance(start, Popped):
         shell, found = (job.again(start) if isinstance(start, Popped) else None) or job.release(ends)

@@ -26,7 +26,7 @@ from rodshell.targets import Target
 
 Floats = NDArray[np.float64]
 
-SMALLEST_ANGLE = 10.0  # degrees; no rodshell can be built beyond
+SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
 SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further
 LOOSE = 0.05  # spacings: ends known no better than that are warned of
 GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count

@@ -8,13 +8,17 @@ from functools import wraps
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import OutputError
 from rodshell.output.folder import ResultFolder, open_folder, read_json, reading
+from rodshell.output.inputs import kept_case, opened_case
+
+if TYPE_CHECKING:
+    from rodshell.output.verdict import Verdict
 
 ARCHIVE = ("result.json", "case.toml", "states.npz")  # from which every other file can be made again
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
@@ -34,11 +38,13 @@ class Archive:
         "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
         missing.
     case_toml : the full resolved input; empty if there was none.
+    inputs : contents of the files that it names and that are kept with the result, by their path in it.
     """
 
     result: dict[str, Any]
     states: dict[str, NDArray[Any]]
     case_toml: str = ""
+    inputs: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def as_stored(self) -> "Archive":
@@ -61,6 +67,13 @@ class Archive:
     ) -> Path:
         """As `write`."""
         return write(self, folder, kinds, force=force, more=more)
+
+    @property
+    def verdict(self) -> "Verdict":
+        """What the result is worth: good, check or unbuildable, with the reasons."""
+        from rodshell.output.verdict import verdict_of
+
+        return verdict_of(self.result)
 
     @property
     def name(self) -> str:
@@ -116,12 +129,15 @@ def write(
     with open_folder(folder, reserved=[*names, *reserved(wanted), *(more or ())], force=force) as place:
         place.put("result.json", text)
         if archive.case_toml:
-            place.put("case.toml", archive.case_toml)
+            case_toml, copies = kept_case(archive.case_toml, archive.inputs, place.path)
+            place.put("case.toml", case_toml)
+            for name, content in copies.items():
+                place.put(name, content)
         stream = BytesIO()
         np.savez_compressed(stream, allow_pickle=False, **archive.states)
         place.put("states.npz", stream.getvalue())
-        for name, content in (*files_of(archive, wanted), *(more or {}).items()):
-            place.put(name, content)
+        for name, text_or_bytes in (*files_of(archive, wanted), *(more or {}).items()):
+            place.put(name, text_or_bytes)
         place.commit()
         return place.path
 
@@ -166,10 +182,10 @@ def read(folder: str | os.PathLike[str]) -> Archive:
             with np.load(file("states.npz"), allow_pickle=False) as stored:
                 states = {name: stored[name] for name in stored.files}
             case = file("case.toml")
-            case_toml = case.read_text(encoding="utf-8") if case.exists() else ""
+            case_toml, inputs = opened_case(case.read_text(encoding="utf-8") if case.exists() else "", file)
         except Exception as error:  # numpy and zipfile have many ways to say that a file is broken
             raise OutputError(f"cannot read the result in {Path(folder).expanduser()}: {error}") from error
-    return Archive(result, states, case_toml)
+    return Archive(result, states, case_toml, inputs)
 
 
 def json_text(result: Mapping[str, Any]) -> str:
@@ -185,8 +201,8 @@ def json_text(result: Mapping[str, Any]) -> str:
 
 
 def printable(text: str) -> str:
-    """`text` on one line, without the control characters that drawings and models cannot hold."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
+    """`text` on one line, without the control characters and lone surrogates that no file of text can hold."""
+    return text if text.isprintable() else "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _dumps(value: Any) -> str:
@@ -194,13 +210,13 @@ def _dumps(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """`value` in JSON's own types; NumPy's arrays and numbers are converted."""
+    """`value` in JSON's own types; NumPy's arrays and numbers are converted, texts are printable."""
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):
-        return value
+        return printable(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {printable(str(key)): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, list | tuple):

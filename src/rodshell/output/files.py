@@ -83,6 +83,7 @@ def _pdf(content: Content) -> Files:
 
 def _csv(content: Content) -> Files:
     from rodshell.output import schedules
+    from rodshell.output.csvtext import csv_text
 
     archive = content.archive
     made = archive.result.get("fabrication") or {}
@@ -96,7 +97,8 @@ def _csv(content: Content) -> Files:
     tables |= {"seams": schedules.seams_table} if archive.result.get("seams") else {}
     tables |= {"end_paths": schedules.end_paths_table} if "history" in archive.states else {}
     for name, table in tables.items():
-        yield f"schedule/{name}.csv", schedules.table_csv(table(archive))
+        columns, rows = table(archive)
+        yield f"schedule/{name}.csv", csv_text([columns, *rows])
 
 
 def _obj(content: Content) -> Files:

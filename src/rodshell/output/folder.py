@@ -200,6 +200,8 @@ def read_json(path: Path) -> dict[str, Any]:
     version = result.get("version")
     if not isinstance(version, int) or version > VERSION:
         raise OutputError(f"{path} has version {version}, this rodshell reads {VERSION}: install a newer one")
+    if "version_gridshell" in result:
+        result["version_rodshell"] = result.pop("version_gridshell")
     return result
 
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from math import degrees
 from typing import Any
 
-from rodshell.output.verdict import unknown_below, utilisation
-from rodshell.output.wording import NAMES, case_rows, percent, rounded, stage, stress
+from rodshell.output.verdict import unknown_below, verdict_of
+from rodshell.output.wording import NAMES, case_rows, percent, rounded, share_of_weight, stage, stress
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1], what a case has by default
 
@@ -14,10 +14,10 @@ def summary_text(result: dict[str, Any]) -> str:
     """What was found, how good it is, and what to read first."""
     rods = result["rods"]
     joints = sum(len(rod["joints"]) for rod in rods) // 2
-    verdict = "converged" if result["status"] == "converged" else f"NOT CONVERGED: {result['status']}"
-    if (utilisation(result) or 0.0) > 1:
-        verdict += ", but the rods would break"
-    lines = [f"{result['name']}: {verdict}", f"  grid      {len(rods)} rods, {joints} joints"]
+    verdict = verdict_of(result)
+    lines = [f"{result['name']}: {verdict.headline}"]
+    lines += [f"            {reason}" for reason in verdict.reasons[1:]]
+    lines.append(f"  grid      {len(rods)} rods, {joints} joints")
     lines += _rod(result["rod"])
     lines += _sewn(result)
     if net := result.get("net"):
@@ -35,7 +35,7 @@ def summary_text(result: dict[str, Any]) -> str:
         if own := drape.get("own_ends"):
             lines.append(f"            its own rod ends within {_mm(own['max'])}, median {_mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
-        state = "stable" if shell["stable"] else shell["status"] + ", NOT STABLE"
+        state = "stable, unloaded" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
         if gap := result.get("agreement", {}).get(ends):
             line += f"; gap max {_mm(gap['max'])} ({percent(gap['max_relative'])}), "
@@ -45,7 +45,6 @@ def summary_text(result: dict[str, Any]) -> str:
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
     if len(result["dropped"]) > 6:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
-    lines += [f"  WARNING   {warning}" for warning in result["warnings"]]
     return "\n".join(lines)
 
 
@@ -80,7 +79,7 @@ def _sewn(result: dict[str, Any]) -> Iterator[str]:
 
 
 def _checked(result: dict[str, Any]) -> list[str]:
-    """Bending and reactions, in a line each."""
+    """Bending, own weight and reactions, in a line each."""
     lines, unknown = [], unknown_below(result)
     for place, bent in result.get("bending", {}).items():
         if place == "pop_up" and unknown >= 1:
@@ -95,6 +94,11 @@ def _checked(result: dict[str, Any]) -> list[str]:
             if place == "pop_up" and unknown:
                 line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
+    for ends, weighed in result.get("self_weight", {}).items():
+        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}"
+        if weighed.get("deflection") is not None:
+            line += f"; sinks by {_mm(weighed['deflection'])} under it"
+        lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
         lines.append(f"  reactions {ends:<8}largest {rounded(held['largest_force'])} N; sums of {sums}")

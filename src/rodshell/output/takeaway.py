@@ -1,5 +1,6 @@
 """What checks, workshop and drawings are told that does not decide the form."""
 
+import datetime
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -7,10 +8,10 @@ from typing import Any
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.output.drawing import LAYERS
+from rodshell.output.dxf import FORBIDDEN
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 MOST_STAGES = 1000
-FORBIDDEN = '<>/\\\\":;?*|=`'  # in a layer's name, by the DXF reference
 
 
 @dataclass(frozen=True)
@@ -21,8 +22,11 @@ class DrawingStyle:
     ----------
     paper : of the PDF's sheets, landscape: A4 to A0.
     project, revision : for the title block.
-    tolerance : to which lengths are to be kept [m]; None: the title block says that it is not given.
+    tolerance : to which lengths are to be kept [m], and by which they are rounded (see `rounding.rounding_of`); None:
+        the title block says that it is not given.
     layers : for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name.
+    name : of the drawings; "": the target's. author : for the title block.
+    date : for the title block, "2026-11-22"; "": the day on which the drawings are written.
     """
 
     paper: str = "A3"
@@ -30,10 +34,19 @@ class DrawingStyle:
     revision: str = ""
     tolerance: float | None = None
     layers: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
+    author: str = ""
+    date: str = ""
 
     def __post_init__(self) -> None:
         if self.paper not in PAPERS:
             raise InputError(f'drawings cannot be on "{self.paper}": use {", ".join(PAPERS)}')
+        if self.tolerance is not None and not self.tolerance > 0:
+            raise InputError(f"the tolerance of drawings must be positive, not {self.tolerance} m")
+        try:
+            datetime.date.fromisoformat(self.date or "2000-01-01")
+        except ValueError:
+            raise InputError(f'the date of drawings cannot be "{self.date}": write a day as "2026-11-22"') from None
         for layer, name in self.layers.items():
             if layer not in LAYERS:
                 raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')

@@ -1,6 +1,6 @@
 """Numbers as they stand in a report, with their units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite, pi
 from typing import Any
 
@@ -52,6 +52,19 @@ def percent(share: float | None) -> str:
     if abs(share) < 1e-9:
         return "0 %"
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+def share_of_weight(found: Mapping[str, Any]) -> str:
+    """What an entry of `self_weight` says: how much of its own weight a shell bears."""
+    factor, limit = found.get("load_factor"), found.get("limit")
+    if limit == "no mass":
+        return "unknown: no mass was given"
+    if factor is None:
+        return "more than 100 times"
+    if factor == 0:
+        return "none: unstable unloaded"
+    least = "at least " if limit == "not followed" else ""
+    return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
 
 
 def stage(share: float) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.checks import Bending, Checks, JointLoads, Reactions
+from rodshell.checks import Bending, Checks, JointLoads, Reactions, SelfWeight
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 
@@ -44,6 +44,7 @@ def workshop_result(
         "bending": _bending(checks, strength),
         "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
         "joint_loads": {ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
+        "self_weight": {ends: _self_weight(one) for ends, one in checks.self_weight.items()},
         **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
         "fabrication": _fabrication(result, mesh, made),
     }
@@ -105,6 +106,10 @@ def _reactions(held: Reactions) -> dict[str, Any]:
         "forces": held.forces,
         "moments": held.moments,
     }
+
+
+def _self_weight(weighed: SelfWeight) -> dict[str, Any]:
+    return {"load_factor": weighed.load_factor, "deflection": weighed.deflection, "limit": weighed.limit}
 
 
 def _joint_loads(mesh: GridMesh, loads: JointLoads) -> list[dict[str, Any]]:

@@ -1,12 +1,11 @@
 """A figure's table as text, and its files: every figure has result.json, table.txt, table.csv and its pictures."""
 
-import csv
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from io import StringIO
 from os import PathLike
 from typing import Any
 
+from rodshell.output.csvtext import csv_text
 from rodshell.output.folder import FORMAT, VERSION, ResultFolder, open_folder
 
 Rows = Sequence[tuple[str, ...]]
@@ -44,15 +43,9 @@ def write(
     OutputError : it cannot be written, or files that rodshell did not write stand where it has to write.
     """
     files = {"result.json": json.dumps(result, indent=1) + "\n", "table.txt": summary + "\n"}
-    files |= {f"{name}.csv": _csv(table) for name, table in {"table": [columns, *rows], **(more or {})}.items()}
+    files |= {f"{name}.csv": csv_text(table) for name, table in {"table": [columns, *rows], **(more or {})}.items()}
     files |= {f"{name}.svg": picture for name, picture in pictures.items()} | dict(texts or {})
     with open_folder(folder, reserved=list(files)) as place:
         for name, content in files.items():
             place.put(name, content)
         place.commit()
-
-
-def _csv(table: Iterable[Sequence[object]]) -> str:
-    text = StringIO()
-    csv.writer(text).writerows(table)
-    return text.getvalue()

@@ -9,6 +9,7 @@ from functools import cached_property
 from math import inf, isfinite, pi, tanh
 
 from rodshell.errors import InputError
+from rodshell.validation import instance
 
 
 class _Round:
@@ -191,6 +192,7 @@ class GivenSection:
 
 
 Section = Circle | Tube | Ellipse | RectangularSection
+SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 
 
 @dataclass(frozen=True)
@@ -235,6 +237,9 @@ class Rod:
     material: Material | None = None
 
     def __post_init__(self) -> None:
+        instance("section", self.section, Section | GivenSection, SECTIONS)
+        if self.material is not None:
+            instance("material", self.material, Material)
         if isinstance(self.section, GivenSection):
             if self.material is not None:
                 raise InputError("a given section says all stiffnesses and masses itself: leave the material out")
