@@ -20,7 +20,7 @@ from rodshell.formfinding.drape import Method
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
-from rodshell.joints import Joint
+from rodshell.joints import Ball, Joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output import Archive
 from rodshell.output.inputs import read_inputs
@@ -99,8 +99,6 @@ class Form(_Judged, FoundForm):
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
-        Parameters
-        ----------
         kinds : of files beside the archive, such as "dxf", "csv"; default: all that every installation can.
         force : also replace files that rodshell did not write, or that were changed since, where it has to write.
 
@@ -153,9 +151,17 @@ class Sewn(_Judged, SewnForm):
         takeaway = takeaway or Takeaway()
         if case_toml is None:
             case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+        takeaway.require_known_stress(self.rod, self.joint)
+        weight = takeaway.judged_by(self.rod).shear_weight
         checks = joined_checks(
-            {k: check(one.popped, self.rod, stages=takeaway.stages, progress=progress) for k, one in self.found.items()}
-        )
+            {
+                name: check(
+                    one.popped, self.rod,
+                    stages=takeaway.stages, shear_weight=weight, progress=progress,
+                )
+                for name, one in self.found.items()
+            }
+        )  # fmt: skip
         result = with_seam_forces(self.result(), self, checks)
         shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
         return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway, inputs)
@@ -178,7 +184,9 @@ def _archive(
     inputs: Mapping[str, bytes] | None = None,
 ) -> Archive:  # fmt: skip
     """A job's result and states with its checks and its fabrication."""
-    checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
+    takeaway.require_known_stress(job.rod, job.joint if isinstance(job, Form) else Ball())
+    weight = takeaway.judged_by(job.rod).shear_weight
+    checks = check(job.popped, job.rod, stages=takeaway.stages, shear_weight=weight, progress=progress)
     shapes = {ends: shell.positions for ends, shell in job.popped.items()}
     return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway, inputs)
 
@@ -190,7 +198,11 @@ def _kept(
     mesh = job.footprint.mesh
     final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    result = workshop_result(result, mesh, checks, made, takeaway.strength)
+    judged = takeaway.judged_by(job.rod)
+    result = workshop_result(result, mesh, checks, made, judged.strength, judged.shear_strength)
+    result["bending"]["strength_of"] = judged.strength_of
+    if takeaway.rod_chosen:
+        result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
     result["drawings"] = takeaway.drawings.parameters()
     result["verdict"] = verdict(result).table()
     kept = read_inputs(case_toml) if inputs is None else inputs

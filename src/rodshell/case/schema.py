@@ -3,7 +3,6 @@
 Those of targets, and of rods and joints, have modules of their own.
 """
 
-from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
@@ -38,9 +37,10 @@ from rodshell.case.values import (
     unit,
 )
 from rodshell.errors import InputError
-from rodshell.units import length_text, shown
+from rodshell.units import length_text, rounded_down, shown
 
 if TYPE_CHECKING:
+    from rodshell.checks.sizing import Fit
     from rodshell.formfinding.fall import Fall
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.layout import GridLayout
@@ -65,7 +65,7 @@ class LayoutTable(Table):
 
         spacing = self.spacing
         if spacing == "auto":
-            spacing = (_round((target.size if target else 0.2) / 8),) * 2
+            spacing = (rounded_down((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
         return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "rotate": rotate})
 
@@ -193,6 +193,9 @@ class SeamsTable(Table):
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
     stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
+    shear_strength: Stress | None = Field(
+        default=None, description="in shear along the fibres; default: as von Mises has it"
+    )
 
 
 class FabricationTable(Table):
@@ -235,12 +238,6 @@ class Built(NamedTuple):
     drape_options: dict[str, Any]
 
 
-def _round(length: float) -> float:
-    """The nearest length below of 1, 1.5, 2, 3, 5 or 7 times a power of ten [m]."""
-    decade = 10.0 ** floor(log10(length))
-    return max(decade * step for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if decade * step <= length * (1 + 1e-9))
-
-
 class Case(Table):
     """Everything that decides one job, complete and in SI. Make one with `load_case`."""
 
@@ -263,9 +260,19 @@ class Case(Table):
                 content["target"][key] = str(Path(content["target"][key]).absolute())
         return toml_text(content)
 
-    def sized(self, target: "Target") -> "Case":
-        """The same case with a rod that fits its target, where that was left to it."""
-        return self.model_copy(update={"rod": self.rod.sized(target)})
+    def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
+        """The rod; material and section that were left to the target are chosen by the bends of its net."""
+
+        def fit() -> "Fit":
+            from rodshell.checks.sizing import Fit
+
+            return Fit.on(target, layout, anchor=anchor)
+
+        return self.rod.build(fit, strength=self.checks.strength)
+
+    def with_rod(self, rod: "Rod") -> "Case":
+        """The same case with this rod spelled out."""
+        return self.model_copy(update={"rod": RodTable.model_validate(rod.parameters())})
 
     @property
     def undecided(self) -> bool:
@@ -303,7 +310,9 @@ class Case(Table):
         target = self.target.build()
         layout = self.layout.build(target)
         self._require_stock(layout)
-        return Built(target, layout, self.rod.sized(target).build(), options)
+        rod = self.rod_on(target, layout, anchor=anchor)
+        self.takeaway().require_known_stress(rod, options["joint"])
+        return Built(target, layout, rod, options)
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
@@ -355,4 +364,6 @@ class Case(Table):
             self.checks.stages,
             Fabrication(**self.fabrication.model_dump()),
             DrawingStyle(**style),
+            rod_chosen=self.rod.left_open,
+            shear_strength=self.checks.shear_strength,
         )

@@ -1,7 +1,8 @@
 """Is it safe to build: bending and stress, reactions and their balance, the way up from flat, its own weight."""
 
-from rodshell.checks.bending import Bending, bending, bending_of, curvatures, fibre_distance, fibre_strain
+from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check, settled_shell
+from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
@@ -10,6 +11,7 @@ from rodshell.checks.self_weight import SelfWeight, self_weight
 __all__ = [
     "Bending",
     "Checks",
+    "Contact",
     "Deployment",
     "JointLoads",
     "Reactions",
@@ -17,10 +19,10 @@ __all__ = [
     "bending",
     "bending_of",
     "check",
+    "contact",
+    "contact_of",
     "curvatures",
     "deploy",
-    "fibre_distance",
-    "fibre_strain",
     "joint_loads",
     "reactions",
     "self_weight",

@@ -8,7 +8,7 @@ import click
 
 from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
-from rodshell.cli.outcome import Kept, deliver, force_option, output_folder, wanted_kinds
+from rodshell.cli.outcome import Kept, announce_rod, deliver, force_option, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.output.inputs import kept_case, read_inputs
 from rodshell.units import length_text
@@ -56,23 +56,22 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, force: bool
     from rodshell.output.files import reserved
 
     kinds = wanted_kinds(only)
-    asked = case.to_toml()
-    inputs = kept_case(asked, read_inputs(asked), Path())[1]
-    names = [*ARCHIVE, *inputs, *reserved(kinds), *([SEARCH] if case.undecided else [])]
+    inputs = read_inputs(case.to_toml())
+    copies = kept_case(case.to_toml(), inputs, Path())[1]
+    names = [*ARCHIVE, *copies, *reserved(kinds), *([SEARCH] if case.undecided else [])]
     with output_folder(out, name, names, force=force) as place:
         work = _sew if case.seams.lines else _form
-        found, picture = work(case, quiet=quiet, table=not (quiet or as_json))
+        found, picture = work(case, inputs, quiet=quiet, table=not (quiet or as_json))
         kept = Kept(found, kinds, picture)
         return deliver(kept, kept.save, place, as_json=as_json, quiet=quiet)
 
 
-def _form(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
+def _form(case: Case, inputs: dict[str, bytes], *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
     """The form of a case, and the picture of its search; `table` prints that."""
-    target, layout, rod, options = case.build()
-    asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway = case.takeaway()
     announce_compilation(quiet=quiet)
-    _announce_sizes(asked, target, layout, rod, quiet=quiet)
+    target, layout, rod, options = case.build()
+    _announce_sizes(case, target, layout, quiet=quiet)
     from rodshell.form import find_form
 
     with Progress(quiet=quiet) as progress:
@@ -81,6 +80,9 @@ def _form(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, 
             found = _search(case, target, layout, rod, progress)
             layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
             case = case.decided(found.best.anchor, found.best.heading)
+            rod = case.rod_on(target, layout, anchor=found.best.anchor)
+        announce_rod(case, rod, quiet=quiet)
+        case = case.with_rod(rod)
         form = find_form(target, layout, rod, progress=progress, **options)
         archive = form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress)
     if found and table:
@@ -88,13 +90,14 @@ def _form(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, 
     return archive, {SEARCH: _picture(found)} if found else {}
 
 
-def _sew(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
+def _sew(case: Case, inputs: dict[str, bytes], *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
     """The form of a case with seams."""
-    target, layout, rod, options = case.build_sewn()
-    asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway = case.takeaway()
     announce_compilation(quiet=quiet)
-    _announce_sizes(asked, target, layout, rod, quiet=quiet)
+    target, layout, rod, options = case.build_sewn()
+    _announce_sizes(case, target, layout, quiet=quiet)
+    announce_rod(case, rod, quiet=quiet)
+    case = case.with_rod(rod)
     from rodshell.form import sew
 
     with Progress(quiet=quiet) as progress:
@@ -104,13 +107,11 @@ def _sew(case: Case, *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, s
         return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), {}
 
 
-def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", *, quiet: bool) -> None:
+def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet: bool) -> None:
     """Before a job runs, say what it is and which lengths were left to its target's size: a wrong unit shows here."""
-    section = case.rod.section
     lengths = {
         "spacing": min(layout.spacing) if case.layout.spacing == "auto" else None,
         "edge": layout.edge if case.layout.edge == "auto" else None,
-        "rod radius": getattr(rod.section, "radius", None) if getattr(section, "radius", None) == "auto" else None,
     }
     said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
     if said and not quiet:

@@ -14,8 +14,10 @@ import click
 from rodshell.cli.interruption import Interruption
 
 if TYPE_CHECKING:
+    from rodshell.case import Case
     from rodshell.output import Archive
     from rodshell.output.folder import ResultFolder
+    from rodshell.rods.section import Rod
 
 FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
 
@@ -88,6 +90,16 @@ def wanted_kinds(only: str | None) -> list[str] | None:
     from rodshell.output.files import read_kinds
 
     return None if only is None else read_kinds(only)
+
+
+def announce_rod(case: "Case", rod: "Rod", *, quiet: bool) -> None:
+    """Name a rod of which the case left something open, before the job runs."""
+    if case.rod.left_open and not quiet:
+        from rodshell.output.result import rod_table
+        from rodshell.output.summary import chosen, rod_text
+
+        table = rod_table(rod)
+        click.echo(f"rodshell: rod: {rod_text(table)}; {chosen(case.rod.left_open, table)}", err=True)
 
 
 def deliver(

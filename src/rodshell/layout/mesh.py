@@ -1,7 +1,7 @@
 """Nodes and edges on a flat grid: a node at every joint and rod end, and equal edges between them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +34,12 @@ class GridMesh:
     rod_start: Ints
     stations: Floats
     joint_nodes: Ints
+
+    @cached_property
+    def apart(self) -> "GridMesh":
+        """The same rods, each with nodes of its own, k in all, in the order of `rod_nodes`; joints have none."""
+        nodes = np.arange(len(self.rod_nodes))
+        return replace(self, flat=self.flat[self.rod_nodes], rod_nodes=nodes, joint_nodes=np.arange(0))
 
     @property
     def node_count(self) -> int:

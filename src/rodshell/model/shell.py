@@ -211,10 +211,7 @@ class _Builder:
         if needed and not self.twist:
             raise InputError("these rods and joints turn frames: they cannot go without twist angles")
         self.apart = not isinstance(coupling, SharedDofs) or any(one.eccentricity for one in self.joints)
-        self.parts = mesh
-        if self.apart:
-            k = len(mesh.rod_nodes)
-            self.parts = replace(mesh, flat=mesh.flat[mesh.rod_nodes], rod_nodes=np.arange(k), joint_nodes=np.arange(0))
+        self.parts = mesh.apart if self.apart else mesh
         n = self.parts.node_count
         ends = 2 * len(mesh.grid.rods)
         self.ghosts = n + np.arange(ends if clamped else 0)

@@ -125,19 +125,17 @@ def write(
     text = json_text(archive.result)
     archive = replace(archive, result=json.loads(text))
     wanted = None if kinds is None else list(kinds)
+    copies = kept_case(archive.case_toml, archive.inputs, Path())[1]
     names = [name for name in ARCHIVE if name != "case.toml" or archive.case_toml]
-    with open_folder(folder, reserved=[*names, *reserved(wanted), *(more or ())], force=force) as place:
+    with open_folder(folder, reserved=[*names, *copies, *reserved(wanted), *(more or ())], force=force) as place:
         place.put("result.json", text)
         if archive.case_toml:
-            case_toml, copies = kept_case(archive.case_toml, archive.inputs, place.path)
-            place.put("case.toml", case_toml)
-            for name, content in copies.items():
-                place.put(name, content)
+            place.put("case.toml", kept_case(archive.case_toml, archive.inputs, place.path)[0])
         stream = BytesIO()
         np.savez_compressed(stream, allow_pickle=False, **archive.states)
         place.put("states.npz", stream.getvalue())
-        for name, text_or_bytes in (*files_of(archive, wanted), *(more or {}).items()):
-            place.put(name, text_or_bytes)
+        for name, content in (*copies.items(), *files_of(archive, wanted), *(more or {}).items()):
+            place.put(name, content)
         place.commit()
         return place.path
 

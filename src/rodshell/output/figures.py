@@ -49,8 +49,12 @@ _DRAPE: tuple[Entry, ...] = (
 )
 _BENDING: tuple[Entry, ...] = (
     ("Smallest radius of curvature", "min_radius", wording.millimetres),
+    ("\N{EN DASH} largest curvature out of the shell", "normal_curvature", wording.curvature),
+    ("\N{EN DASH} largest curvature within the shell", "geodesic_curvature", wording.curvature),
+    ("Largest twist of a rod", "twist_rate", wording.twist_rate),
     ("Largest strain, bending and axial", "max_strain", wording.percent),
-    ("Largest stress, bending and axial", "max_stress", wording.stress),
+    ("Largest stress, bending, axial and torsion", "max_stress", wording.stress),
+    ("\N{EN DASH} of torsion alone", "torsion_stress", wording.stress),
     ("Utilisation of the strength", "utilisation", wording.percent),
     ("Sharpest at this share of the way", "share", wording.stage),
 )

@@ -17,14 +17,14 @@ NAMED = re.compile(r'^(file|boundary) = (".*")$', re.MULTILINE)  # in the text o
 PARTS = ".gltf"
 
 
-def read_inputs(case_toml: str, place: Callable[[str], Path] = Path) -> dict[str, bytes]:
+def read_inputs(case_toml: str, where: Callable[[str], Path] = Path) -> dict[str, bytes]:
     """The contents of the files that a case names and that are to be kept with its result, by the path in the case.
 
-    place : where a path leads; default: from the working folder.
+    where : the place of a file by its path in the case.
     """
     found = {}
     for name in _names(case_toml):
-        path = place(name)
+        path = where(name)
         if path.is_file() and path.suffix.lower() != PARTS and path.stat().st_size <= LARGEST:
             found[name] = path.read_bytes()
     return found
@@ -42,13 +42,13 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
     return _renamed(case_toml, places), copies
 
 
-def opened_case(case_toml: str, place: Callable[[str], Path]) -> tuple[str, dict[str, bytes]]:
+def opened_case(case_toml: str, where: Callable[[str], Path]) -> tuple[str, dict[str, bytes]]:
     """The case of a result folder and the contents of its inputs; files that were not copied are named absolutely.
 
-    place : where a path relative to the folder leads.
+    where : as of `read_inputs`.
     """
-    inputs = read_inputs(case_toml, place)
-    outside = {name: str(place(name).absolute()) for name in _names(case_toml) if name not in inputs}
+    inputs = read_inputs(case_toml, where)
+    outside = {name: str(where(name).absolute()) for name in _names(case_toml) if name not in inputs}
     return _renamed(case_toml, outside), inputs
 
 

@@ -1,6 +1,7 @@
 """Schedules as tables and as CSV: what to cut, where to drill, where each end goes. Millimetres, degrees, kg, MPa."""
 
 from collections.abc import Callable, Iterator, Mapping
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,12 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
         ("mass_kg", True, lambda rod: _significant(rod.more.get("mass"))),
         ("joints", True, lambda rod: str(len(rod.joints))),
         ("min_radius_mm", True, lambda rod: mm(rod.more.get("min_radius"))),
+        ("max_normal_curvature_per_m", False, lambda rod: _figure(rod.more.get("normal_curvature"))),
+        ("max_geodesic_curvature_per_m", False, lambda rod: _figure(rod.more.get("geodesic_curvature"))),
+        ("max_twist_deg_per_m", False, lambda rod: _figure(rod.more.get("twist_rate"), 180 / pi)),
         ("max_strain", True, lambda rod: _number(rod.more.get("max_strain"), 6)),
         ("max_stress_MPa", True, lambda rod: _mpa(rod.more.get("max_stress"))),
+        ("max_torsion_stress_MPa", False, lambda rod: _figure(rod.more.get("torsion_stress"), 1e-6)),
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
         ("utilisation_pop_up", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
         ("splices_at_mm", True, lambda rod: "; ".join(mm(at) for at in rod.more.get("splices") or ())),
@@ -246,6 +251,10 @@ def _mpa(value: float | None) -> str:
 def _significant(value: float | None) -> str:
     """Four figures, as a balance has them."""
     return "" if value is None else f"{float(f'{value:.4g}'):.10f}".rstrip("0").rstrip(".")
+
+
+def _figure(value: float | None, factor: float = 1.0) -> str:
+    return "" if value is None else f"{round(factor * value, 9):.5g}"
 
 
 def _number(value: float | None, digits: int) -> str:

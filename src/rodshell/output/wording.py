@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from math import isfinite, pi
 from typing import Any
 
+from rodshell.units import stress_text
+
 UNKNOWN = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
-PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of the case, by its key
     **dict.fromkeys(
         ("radius", "height", "base", "size", "reference_size", "a", "b", "c", "spacing", "length"), (1e3, "mm")
@@ -82,8 +83,15 @@ def newton_metres(moment: float) -> str:
 
 def stress(pascals: float) -> str:
     """A stress [Pa] in a unit of its size."""
-    unit, name = next((one for one in PRESSURES if abs(pascals) >= one[0]), PRESSURES[-1])
-    return f"{rounded(pascals / unit)} {name}"
+    return stress_text(pascals)
+
+
+def curvature(value: float) -> str:
+    return f"{rounded(value)} 1/m"
+
+
+def twist_rate(value: float) -> str:
+    return f"{rounded(value * 180 / pi)}\N{DEGREE SIGN}/m"
 
 
 def seconds(time: float) -> str:

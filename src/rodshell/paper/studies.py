@@ -24,7 +24,8 @@ from rodshell.output.folder import ResultFolder
 from rodshell.paper.drapes import EDGE, HEIGHT, LENGTH, ROD, Progress
 from rodshell.paper.studies_pictures import studies_svg
 from rodshell.paper.tables import aligned, result_of, write
-from rodshell.rods.section import Circle, GivenSection, Material, Rod
+from rodshell.rods.materials import Material
+from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere
 
 Floats = NDArray[np.float64]
