@@ -44,7 +44,7 @@ def drape(
     anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
     gravity : acceleration [m/s2], for methods "gravity" and "paper"; default: 9.81.
     joint : what the rods do to each other where they cross, for methods "gravity" and "paper"; ball joints
-        without. The bound drape has none: its net is a matter of geometry.
+        without. The bound drape's net is a matter of geometry: the joint's eccentricity lays its rods in two layers.
     fall : height, time stepping, coupling, friction and drag, for method "paper".
     start : a grid draped before. Method "bound" looks for the net near the one found then, which changes nothing but
         the time. The others always fall from flat: without friction a grid that starts where another lay may turn
@@ -63,7 +63,7 @@ def drape(
     _uses_all(choice("method", method, METHODS), gravity, fall)
     gravity = STANDARD_GRAVITY if gravity is None else gravity
     if method == "bound":
-        return bound_drape(target, layout, rod, anchor=anchor, near=start, progress=progress)
+        return bound_drape(target, layout, rod, anchor=anchor, near=start, joint=joint, progress=progress)
     if method == "gravity":
         return gravity_drape(target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, progress=progress)
     from rodshell.formfinding.falling import falling_drape  # with the dynamics

@@ -74,7 +74,8 @@ class FoundForm:
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
         stretched = _stretched(self.draped)
-        off = _springs_off(self.agreement, advise=not stretched)
+        wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
+        off = _springs_off(self.agreement, advise=not (stretched or wide))
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
         return (*self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
 
