@@ -204,6 +204,7 @@ def _kept(
     if takeaway.rod_chosen:
         result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
     result["drawings"] = takeaway.drawings.parameters()
+    result["name"] = takeaway.drawings.name or result["name"]
     result["verdict"] = verdict(result).table()
     kept = read_inputs(case_toml) if inputs is None else inputs
     return Archive(result, states | workshop_states(checks), case_toml, kept).as_stored()
