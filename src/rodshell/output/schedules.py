@@ -26,6 +26,12 @@ def head(column: str) -> tuple[str, str]:
     return (f"angle {name}" if unit == "deg" else name), UNITS.get(unit, "")
 
 
+def heading(column: str) -> str:
+    """The same in one line: "cut length [mm]"."""
+    name, unit = head(column)
+    return f"{name} [{unit}]" if unit else name
+
+
 def rods_table(archive: Archive, *, brief: bool = False) -> Table:
     """One row a rod; `joints_at_mm` lists every joint at its distance from the rod's start (ends: 0, 1).
 

@@ -1,11 +1,12 @@
 """One screen of text about a result."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import degrees
 from typing import Any
 
+from rodshell.output.rounding import rounding_of
 from rodshell.output.verdict import unknown_below, utilisation
-from rodshell.output.wording import NAMES, case_rows, percent, rounded, stage, stress
+from rodshell.output.wording import NAMES, case_rows, millimetres, percent, rounded, stage, stress
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1], what a case has by default
 
@@ -13,7 +14,7 @@ RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK s
 def summary_text(result: dict[str, Any]) -> str:
     """What was found, how good it is, and what to read first."""
     rods = result["rods"]
-    joints = sum(len(rod["joints"]) for rod in rods) // 2
+    joints, mm = sum(len(rod["joints"]) for rod in rods) // 2, _lengths(result)
     verdict = "converged" if result["status"] == "converged" else f"NOT CONVERGED: {result['status']}"
     if (utilisation(result) or 0.0) > 1:
         verdict += ", but the rods would break"
@@ -22,7 +23,7 @@ def summary_text(result: dict[str, Any]) -> str:
     lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
-            f"  footprint known within {_mm(net['error_estimate'])} before extrapolation; "
+            f"  footprint known within {mm(net['error_estimate'])} before extrapolation; "
             f"smallest angle {net['min_angle_deg']:.1f} deg"
         )
     if drape := result.get("drape"):
@@ -30,16 +31,16 @@ def summary_text(result: dict[str, Any]) -> str:
         line = f"  drape     {drape['method']}: {drape['dofs']} unknowns, {work} factorisations, "
         line += f"{drape['seconds']:.2f} s, "
         gap = "gap" if drape["method"] == "bound" else "deepest node inside by"
-        line += f"{gap} {_mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
+        line += f"{gap} {mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
         lines.append(line + f"negative modes {drape['negative_modes']}")
         if own := drape.get("own_ends"):
-            lines.append(f"            its own rod ends within {_mm(own['max'])}, median {_mm(own['median'])}")
+            lines.append(f"            its own rod ends within {mm(own['max'])}, median {mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
         state = "stable" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
         if gap := result.get("agreement", {}).get(ends):
-            line += f"; gap max {_mm(gap['max'])} ({percent(gap['max_relative'])}), "
-            line += f"rms {_mm(gap['rms'])} ({percent(gap['rms_relative'])})"
+            line += f"; gap max {mm(gap['max'])} ({percent(gap['max_relative'])}), "
+            line += f"rms {mm(gap['rms'])} ({percent(gap['rms_relative'])})"
         lines.append(line)
     lines += _checked(result)
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
@@ -65,6 +66,7 @@ def _rod(rod: dict[str, Any]) -> Iterator[str]:
 
 def _sewn(result: dict[str, Any]) -> Iterator[str]:
     """Each patch and each seam in a line of the summary."""
+    mm = _lengths(result)
     for patch in result.get("patches") or []:
         line = f"  patch {patch['id']:<4}{patch['rods']} rods, heading {degrees(patch['rotate']):.1f} deg; "
         line += f"smallest angle {patch['net']['min_angle_deg']:.1f} deg"
@@ -73,7 +75,7 @@ def _sewn(result: dict[str, Any]) -> Iterator[str]:
         yield line
     moved = max((patch["ends_moved"] for patch in result.get("patches") or []), default=0.0)
     for number, seam in enumerate(result.get("seams") or [], start=1):
-        line = f"  seam {number:<5}{len(seam['meetings'])} rods of either side meet, ends moved by {_mm(moved)} at most"
+        line = f"  seam {number:<5}{len(seam['meetings'])} rods of either side meet, ends moved by {mm(moved)} at most"
         for ends, force in (seam.get("forces") or {}).items():
             line += f"; {ends} it carries {rounded(force['largest'])} N at most"
         yield line
@@ -81,13 +83,13 @@ def _sewn(result: dict[str, Any]) -> Iterator[str]:
 
 def _checked(result: dict[str, Any]) -> list[str]:
     """Bending and reactions, in a line each."""
-    lines, unknown = [], unknown_below(result)
+    lines, unknown, mm = [], unknown_below(result), _lengths(result)
     for place, bent in result.get("bending", {}).items():
         if place == "pop_up" and unknown >= 1:
             continue
         if isinstance(bent, dict) and bent.get("min_radius") is not None:
             name = "way up" if place == "pop_up" else place
-            line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}"
+            line = f"  bending   {name:<8}smallest radius {mm(bent['min_radius'])}"
             if bent.get("max_stress") is not None:
                 line += f", largest stress {stress(bent['max_stress'])}"
             if bent.get("utilisation") is not None:
@@ -101,7 +103,13 @@ def _checked(result: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _mm(metres: float) -> str:
-    if abs(metres) >= 1.0:
-        return f"{rounded(metres)} m"
-    return f"{1e3 * metres:.3g} mm" if abs(metres) >= 1e-9 else "0 mm"
+def _lengths(result: dict[str, Any]) -> Callable[[float], str]:
+    """How lengths [m] are shown: to three figures, no finer than on the drawings."""
+    rounding = rounding_of(result)
+
+    def shown(metres: float) -> str:
+        if abs(metres) >= 1.0:
+            return f"{rounded(metres)} m"
+        return millimetres(metres, rounding=rounding) if abs(metres) >= 1e-9 else "0 mm"
+
+    return shown
