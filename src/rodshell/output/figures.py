@@ -71,7 +71,9 @@ def _shown(show: Callable[[Any], str], value: Any, rounding: Rounding) -> str:
     """A value in words; a length no finer than the result's rounding."""
     if value is None:
         return wording.UNKNOWN
-    return wording.millimetres(value, rounding=rounding) if show is wording.millimetres else show(value)
+    if show is wording.millimetres:
+        return wording.millimetres(value, rounding=rounding)
+    return wording.place(value, rounding) if show is wording.place else show(value)
 
 
 def supports_table(result: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -49,7 +49,7 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
         ("cut_length_mm", True, lambda rod: mm(rod.cut_length)),
         ("mass_kg", True, lambda rod: _significant(rod.more.get("mass"))),
         ("joints", True, lambda rod: str(len(rod.joints))),
-        ("min_radius_mm", True, lambda rod: mm(rod.more.get("min_radius"))),
+        ("min_radius_mm", True, lambda rod: _significant(rod.more.get("min_radius"), 1e3)),
         ("max_strain", True, lambda rod: _number(rod.more.get("max_strain"), 6)),
         ("max_stress_MPa", True, lambda rod: _mpa(rod.more.get("max_stress"))),
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
@@ -246,12 +246,12 @@ def _degrees(a: Floats, b: Floats) -> float:
 
 
 def _mpa(value: float | None) -> str:
-    return "" if value is None else f"{1e-6 * value:.5g}"
+    return _significant(value, 1e-6)
 
 
-def _significant(value: float | None) -> str:
-    """Four figures, as a balance has them."""
-    return "" if value is None else f"{float(f'{value:.4g}'):.10f}".rstrip("0").rstrip(".")
+def _significant(value: float | None, unit: float = 1.0) -> str:
+    """What is weighed or computed, over a unit: four figures, never as 2.55e+04."""
+    return "" if value is None else f"{float(f'{unit * value:.4g}'):.10f}".rstrip("0").rstrip(".")
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -88,10 +88,10 @@ def small(value: float) -> str:
     return f"{value:.1e}"
 
 
-def place(point: Sequence[float | None]) -> str:
+def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
     """A point (3,) [m] in mm."""
-    known = [round(1e3 * x, 1) + 0.0 for x in point if x is not None]
-    return ", ".join(f"{x:.1f}".replace("-", MINUS) for x in known) + " mm" if len(known) == 3 else UNKNOWN
+    known = [rounding.mm(x).replace("-", MINUS) for x in point if x is not None]
+    return f"{', '.join(known)} mm" if len(known) == 3 else UNKNOWN
 
 
 def yes_or_no(value: object) -> str:

@@ -103,7 +103,9 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     pencil.line([(left, y + 1.6 * size), (right, y + 1.6 * size)], "TITLE")
     pencil.write(f"{block.name}: {drawing.title.lower()}, 1:1", (left, y), 1.4 * size, "TITLE", bold=True)
     rows = [block.entries[k : k + COLUMNS] for k in range(0, len(block.entries), COLUMNS)]
-    lines = ["   ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(drawing)
+    lines = [" \N{MIDDLE DOT} ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(
+        drawing
+    )
     for k, line in enumerate(lines, start=1):
         pencil.write(line, (left, y - 1.5 * k * size), size, "TITLE")
     end = left + max(right - left, 0.25 * (right - left) + 4 * size)
