@@ -22,6 +22,7 @@ from rodshell.cli import main
 from rodshell.cli.options import ALIASES
 from rodshell.cli.rodends import COLUMNS
 from rodshell.errors import NetLimitError
+from rodshell.output.folder import ResultFolder
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -31,25 +32,26 @@ CROSS = [
 
 
 class FakeArchive:
-    def __init__(self, status: str, case_toml: str) -> None:
-        self.result = {"format": "rodshell-result", "status": status}
+    def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
+        verdict = {"level": level, "reasons": ["the rods touch"]}
+        self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
-    def save(self, folder: Path, kinds: list[str] | None = None) -> None:
+    def save(self, folder: ResultFolder, kinds: list[str] | None = None, more: dict[str, str] | None = None) -> None:
         self.kinds = kinds
-        folder.mkdir(parents=True)
-        (folder / "case.toml").write_text(self.case_toml)
+        folder.put("case.toml", self.case_toml)
+        folder.commit()
 
     def summary(self) -> str:
         return "agreement 0.01 mm"
 
 
 class FakeForm:
-    def __init__(self, status: str) -> None:
-        self.status = status
+    def __init__(self, status: str, level: str) -> None:
+        self.status, self.level = status, level
 
     def archive(self, case_toml: str = "", **options: Any) -> FakeArchive:
-        return FakeArchive(self.status, case_toml)
+        return FakeArchive(self.status, case_toml, self.level)
 
 
 class FakeFinder(ModuleType):
@@ -58,7 +60,7 @@ class FakeFinder(ModuleType):
     def __init__(self) -> None:
         super().__init__("rodshell.form")
         self.calls = list[tuple[tuple[Any, ...], dict[str, Any]]]()
-        self.status = "converged"
+        self.status, self.level = "converged", "good"
         self.fault: BaseException | None = None
 
     def find_form(self, *args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
@@ -67,7 +69,7 @@ class FakeFinder(ModuleType):
             progress(stage, f"iteration {iteration}", 1e-3)
         if self.fault:
             raise self.fault
-        return FakeForm(self.status)
+        return FakeForm(self.status, self.level)
 
     pop_up_table = find_form
 
@@ -137,7 +139,8 @@ def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
         assert f"--{key}, {alias} " in shown
 
 
-ANY_WORDS = ("drawings.layers.", "drawings.project", "drawings.revision", "drape.frames")
+DRAWN = ("layers.", "project", "revision", "name", "author", "date")
+ANY_WORDS = (*(f"drawings.{key}" for key in DRAWN), "drape.frames")
 WORDS = [key for key in case_keys() if key.startswith(ANY_WORDS)]
 
 
@@ -206,9 +209,9 @@ def test_an_output_folder_that_cannot_be_written_is_refused_before_the_solve(
     assert "file is a file" in refused(capsys, "form", "hemisphere", "--out", "file/dome")
     assert "file: it is a file" in refused(capsys, "form", "hemisphere", "--out", "file")
     Path("thesis").mkdir()
-    Path("thesis/chapter.tex").write_text("")
-    assert "thesis: it is not empty" in refused(capsys, "form", "hemisphere", "--out", "thesis")
-    assert "thesis: it is not empty" in refused(
+    Path("thesis/report.html").write_text("")
+    assert "will not replace report.html" in refused(capsys, "form", "hemisphere", "--out", "thesis")
+    assert "will not replace report.html" in refused(
         capsys, "popup", write_table(Path("rods.csv"), CROSS), "--unit", "m", "--out", "thesis"
     )
     assert "in /proc; choose another folder" in refused(capsys, "form", "hemisphere", "--out", "/proc/dome")
@@ -221,12 +224,47 @@ def test_the_output_folder_is_left_alone_by_the_check(finder: FakeFinder) -> Non
     assert list(Path.cwd().iterdir()) == []
 
 
-def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
-    Path("dome").mkdir()
+def test_an_earlier_result_is_replaced_and_a_copied_one_by_force(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
     Path("dome/result.json").write_text('{"format": "rodshell-result", "version": 1}')
-    finder.fault = NetLimitError("no net")
-    assert main(["form", "hemisphere", "--out", "dome"]) == 2
-    assert len(finder.calls) == 1
+    assert "will not replace result.json" in refused(capsys, "form", "hemisphere", "--out", "dome")
+    assert len(finder.calls) == 2
+    assert main(["form", "hemisphere", "--out", "dome", "--force", "-q"]) == 0
+
+
+def test_a_file_that_comes_into_the_way_while_the_job_runs_sends_the_result_elsewhere(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save = FakeArchive.save
+
+    def late(self: FakeArchive, folder: ResultFolder, *arguments: Any, **options: Any) -> None:
+        (folder.path / "case.toml").write_text("mine")
+        save(self, folder, *arguments, **options)
+
+    monkeypatch.setattr(FakeArchive, "save", late)
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    assert "dome-2 instead: will not replace case.toml" in capsys.readouterr().err
+    assert Path("dome/case.toml").read_text() == "mine"
+    assert load_case("dome-2/case.toml") == load_case("hemisphere")
+
+
+@pytest.mark.parametrize(
+    ("status", "level", "code"),
+    [("converged", "good", 0), ("converged", "check", 0), ("converged", "unbuildable", 4), ("stalled", "check", 3),
+     ("stalled", "unbuildable", 3)],
+)  # fmt: skip
+def test_the_exit_code_is_the_verdict_s_and_not_converged_wins(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], status: str, level: str, code: int
+) -> None:
+    finder.status, finder.level = status, level
+    assert main(["form", "hemisphere", "--quiet"]) == code
+    said = {0: "", 3: "rodshell: NOT CONVERGED: stalled", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
+    err = capsys.readouterr().err
+    assert err.startswith(said)
+    assert (err == "") == (code == 0)
 
 
 def test_not_converged_saves_says_so_and_ends_with_3(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
@@ -257,6 +295,7 @@ def test_json_is_the_result_and_nothing_else_on_stdout(finder: FakeFinder, capsy
         "out": str(Path("out/hemisphere").resolve()),
         "format": "rodshell-result",
         "status": "converged",
+        "verdict": {"level": "good", "reasons": ["the rods touch"]},
     }
 
 
@@ -497,7 +536,7 @@ sys.exit(main(["form", "hemisphere"]))
 
 
 def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it() -> None:
-    pty = pytest.importorskip("pty")
+    pty = pytest.importorskip("pty", reason="no terminals: run on Linux or macOS")
     ours, theirs = pty.openpty()
     job = subprocess.Popen(
         [sys.executable, "-c", WAITING],

@@ -119,7 +119,7 @@ def test_pdf_is_true_to_scale(tmp_path: Path) -> None:
 
 
 def test_pdf_opens_in_another_reader(tmp_path: Path) -> None:
-    pypdf = pytest.importorskip("pypdf", reason="pypdf reads the PDF where it is installed")
+    pypdf = pytest.importorskip("pypdf", reason="no pypdf: pip install pypdf")
     export(wished(), tmp_path, ["pdf"])
     reader = pypdf.PdfReader(tmp_path / "drawings/drawings.pdf", strict=True)
     assert reader.metadata.title == "hemisphere"

@@ -17,8 +17,10 @@ from rodshell.case.values import (
     InertiaPerLength,
     Length,
     LengthOrAuto,
+    Lengths,
     MassPerLength,
     PoissonRatio,
+    SectionModulus,
     Stiffness,
     Stress,
 )
@@ -96,6 +98,13 @@ class GivenTable(Table):
     GJ: BendingStiffness = Field(description="twist stiffness")
     mass: MassPerLength = Field(default=0.0, description="mass per length")
     rotary_inertia: InertiaPerLength = Field(default=0.0, description="rotary inertia about the rod's line, per length")
+    fibre_distances: Lengths | None = Field(
+        default=None, description="from the axis to the outermost fibres, across the grid and within it"
+    )
+    fibre_modulus: Stress | None = Field(default=None, description="Young's modulus of the outermost fibres")
+    torsion_modulus: SectionModulus | None = Field(
+        default=None, description="twisting moment over the largest shear stress that it causes"
+    )
 
     def build(self) -> "GivenSection":
         from rodshell.rods.section import GivenSection

@@ -20,6 +20,7 @@ from rodshell.case.values import (
     Coordinate,
     Counts,
     Duration,
+    IsoDate,
     Length,
     LengthOrAuto,
     Lengths,
@@ -192,6 +193,9 @@ class SeamsTable(Table):
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
     stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
+    shear_strength: Stress | None = Field(
+        default=None, description="in shear along the fibres; default: as von Mises has it"
+    )
 
 
 class FabricationTable(Table):
@@ -218,8 +222,11 @@ class DrawingsTable(Table):
     paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(default="A3", description="of the PDF's sheets, landscape")
     project: str = Field(default="", description="for the title block")
     revision: str = Field(default="", description="for the title block")
-    tolerance: Length | None = Field(default=None, description="of lengths, for the title block")
+    tolerance: Length | None = Field(default=None, description="of lengths; they are shown to a tenth of it or finer")
     layers: LayersTable = LayersTable()
+    name: str = Field(default="", description="title of the drawings; default: the target's name")
+    author: str = Field(default="", description="for the title block: who drew or answers for the drawings")
+    date: IsoDate = Field(default="", description='for the title block, "2026-11-22"; default: the day of writing')
 
 
 class Built(NamedTuple):
@@ -296,13 +303,16 @@ class Case(Table):
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "gravity": drape.gravity, "ends": ends}
+        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "ends": ends}
+        options["gravity"] = None if drape.method == "bound" else drape.gravity
         options["fall"] = drape.fall() if drape.method == "paper" else None
         options["joint"] = self.joint.build()
         target = self.target.build()
         layout = self.layout.build(target)
         self._require_stock(layout)
-        return Built(target, layout, self.rod_on(target, layout, anchor=anchor), options)
+        rod = self.rod_on(target, layout, anchor=anchor)
+        self.takeaway().require_known_stress(rod, options["joint"])
+        return Built(target, layout, rod, options)
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
@@ -355,4 +365,5 @@ class Case(Table):
             Fabrication(**self.fabrication.model_dump()),
             DrawingStyle(**style),
             rod_chosen=self.rod.left_open,
+            shear_strength=self.checks.shear_strength,
         )

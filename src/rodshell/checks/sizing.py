@@ -7,10 +7,10 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.checks.bending import fibre_strain
 from rodshell.errors import InputError, NetLimitError
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.rods.fibres import fibre_strain
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import Circle, Rod, Section, Tube
 from rodshell.rods.stock import STOCK, depth, scaled

@@ -14,8 +14,8 @@ from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
 from rodshell.output.shapes import CAPTIONS
 from rodshell.output.svg import drawing_svg, inline
-from rodshell.output.verdict import unknown_below, verdict
-from rodshell.output.viewer import viewer_json
+from rodshell.output.verdict import facts, unknown_below
+from rodshell.output.viewer import viewer_data, viewer_json
 from rodshell.output.wording import percent, stage
 
 IN_PAGE = ("supports", "elevations", "erection")
@@ -49,8 +49,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         name=archive.name,
         note=NOTE,
         summary=plan.summary,
-        warnings=[str(word) for word in result.get("warnings") or []],
-        verdict=verdict(archive),
+        verdict=archive.verdict,
+        facts=facts(result),
         dropped=result.get("dropped") or [],
         view=_view(archive),
         supports=supports_table(result),
@@ -70,18 +70,18 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
 
 
 def _view(archive: Archive) -> dict[str, Any] | None:
-    """The 3D view's data and script; what they hold cannot end a script element."""
+    """The 3D view's data and script."""
     from markupsafe import Markup
 
-    data = viewer_json(archive)
+    data = viewer_data(archive)
     if data is None:
         return None
     script = files("rodshell.output").joinpath("templates/view.js").read_text(encoding="utf-8")
     return {
-        "data": Markup(data),
+        "data": Markup(viewer_json(data)),
         "script": Markup(script),
-        "frames": data.count('"places":'),
-        "colours": [kind for kind in ("stress", "gap") if f'"{kind}":{{' in data],
+        "frames": len(data["frames"]),
+        "colours": sorted(data["names"].items(), reverse=True),  # stress first
         "note": _note(archive),
     }
 

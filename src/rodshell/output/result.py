@@ -66,7 +66,7 @@ def form_states(form: FoundForm) -> States:
     target = form.target
     states = _mesh_states(form.footprint)
     states["draped"] = form.trimmed.positions
-    states["gap_draped"] = target.gap(form.trimmed.positions).distance
+    states["gap_draped"] = target.gap(form.trimmed.positions).distance - form.trimmed.mesh.heights
     for ends, shell in form.popped.items():
         states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:

@@ -5,11 +5,11 @@ No factor for duration of load, moisture or safety is applied: reduce them as th
 """
 
 from dataclasses import asdict, dataclass
-from math import inf, isfinite
 from typing import Any, Literal, Self, get_args
 
 from rodshell.errors import InputError
 from rodshell.units import shown
+from rodshell.validation import positive
 
 PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]
 
@@ -199,9 +199,3 @@ def preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
     if "poisson_ratio" in changed or known.shear is None:
         del values["shear"]
     return values | changed
-
-
-def positive(name: str, value: float, unit: str) -> None:
-    """InputError where a value is not a positive number."""
-    if not (isfinite(value) and 0 < value < inf):
-        raise InputError(f"{name} must be positive, not {value} {unit}")

@@ -10,7 +10,7 @@ from math import inf, pi, tanh
 
 from rodshell.errors import InputError
 from rodshell.rods.materials import Material as Material
-from rodshell.rods.materials import positive
+from rodshell.validation import instance, positive
 
 
 class _Round:
@@ -171,6 +171,10 @@ class GivenSection:
     GJ : twist stiffness [N m2].
     mass : per length [kg/m].
     rotary_inertia : about the tangent, per length [kg m]; wanted by dynamics with twist only.
+    fibre_distances : of the outermost fibres from the axis, along m1 and m2 [m]. With this and the next two its stress
+        is known, which a strength needs.
+    fibre_modulus : Young's modulus of the outermost fibres [Pa].
+    torsion_modulus : twisting moment over the largest shear stress that it causes [m3]; of rods that are twisted.
     """
 
     EA: float
@@ -179,20 +183,30 @@ class GivenSection:
     GJ: float
     mass: float = 0.0
     rotary_inertia: float = 0.0
+    fibre_distances: tuple[float, float] | None = None
+    fibre_modulus: float | None = None
+    torsion_modulus: float | None = None
 
     def __post_init__(self) -> None:
         for name, unit in (("EA", "N"), ("EI1", "N m2"), ("EI2", "N m2"), ("GJ", "N m2")):
             positive(name, getattr(self, name), unit)
+        for distance in self.fibre_distances or ():
+            positive("fibre distance", distance, "m")
+        for name, unit in (("fibre_modulus", "Pa"), ("torsion_modulus", "m3")):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name), unit)
         for name, unit in (("mass", "kg/m"), ("rotary_inertia", "kg m")):
             if not 0 <= getattr(self, name) < inf:
                 raise InputError(f"{name} must not be negative, but is {getattr(self, name)} {unit}")
 
     def parameters(self) -> dict[str, object]:
         """The section's kind and numbers in SI, as they stand in a case file."""
-        return {"kind": "given", **asdict(self)}
+        known = {name: value for name, value in asdict(self).items() if value is not None}
+        return {"kind": "given", **known}
 
 
 Section = Circle | Tube | Ellipse | RectangularSection
+SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 
 
 @dataclass(frozen=True)
@@ -203,6 +217,9 @@ class Rod:
     material: Material | None = None
 
     def __post_init__(self) -> None:
+        instance("section", self.section, Section | GivenSection, SECTIONS)
+        if self.material is not None:
+            instance("material", self.material, Material)
         if isinstance(self.section, GivenSection):
             if self.material is not None:
                 raise InputError("a given section says all stiffnesses and masses itself: leave the material out")
