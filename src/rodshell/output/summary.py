@@ -21,7 +21,7 @@ def summary_text(result: dict[str, Any]) -> str:
     lines = [f"{result['name']}: {verdict.headline}"]
     lines += [f"            {reason}" for reason in verdict.reasons[1:]]
     lines.append(f"  grid      {len(rods)} rods, {joints} joints")
-    lines += _rod(result["rod"])
+    lines += _rod(result["rod"], (result.get("bending") or {}).get("strength"))
     lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
@@ -51,11 +51,11 @@ def summary_text(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _rod(rod: dict[str, Any]) -> Iterator[str]:
+def _rod(rod: dict[str, Any], strength: float | None) -> Iterator[str]:
     """Section and material in a line; what is known of a preset, and what the program chose, in lines of their own."""
     yield f"  rod       {rod_text(rod)}"
     if chosen_here := rod.get("chosen"):
-        yield f"            {chosen(chosen_here, rod)}"
+        yield f"            {chosen(chosen_here, strength)}"
     if known := rod.get("preset"):
         line = f"            {known['name']}: {known['grade']}"
         if known["bending_strength"] is not None:
@@ -63,14 +63,18 @@ def _rod(rod: dict[str, Any]) -> Iterator[str]:
         yield line
 
 
-def chosen(what: Iterable[str], rod: Mapping[str, Any]) -> str:
-    """That the program chose a rod's material, section or both, and by what."""
+def chosen(what: Iterable[str], strength: float | None) -> str:
+    """That the program chose a rod's material, section or both, and by what.
+
+    strength : by which the rods are judged [Pa], or None.
+    """
     parts = list(what)
-    missing, verb = " and ".join(parts), "were" if len(parts) > 1 else "was"
-    sized = "section" in parts
-    known = (rod.get("preset") or {}).get("bending_strength") is not None
-    by = ", for bends that use at most half of the bending strength in the final shape"
-    return f"{missing} {verb} not given: chosen to fit{by if sized and known else ''}"
+    line = f"{' and '.join(parts)} {'were' if len(parts) > 1 else 'was'} not given: chosen to fit"
+    if "section" not in parts:
+        return line
+    if strength is None:
+        return line + ", as slender as the paper's rods, since no strength is known"
+    return line + ", for bends that use at most half of the bending strength in the final shape"
 
 
 def rod_text(rod: Mapping[str, Any]) -> str:
