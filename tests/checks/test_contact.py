@@ -9,9 +9,18 @@ from shells import dome
 from test_bending import rods_of_length
 
 import rodshell as rs
-from rodshell.checks import Contact, check, contact, contact_of
-from rodshell.checks.contact import _Edges, _Outline, joined_contact, nearest_points
+from rodshell.checks import Contact, check, contact_of
+from rodshell.checks.contact import (
+    _crossing_lines,
+    _Edges,
+    _Outline,
+    contact,
+    contact_of_patches,
+    joined_contact,
+    nearest_points,
+)
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout.side_by_side import side_by_side as side_by_side_meshes
 
 MATERIAL = rs.Material(youngs_modulus=1e9, density=1e3)
 
@@ -236,7 +245,8 @@ def test_the_work_grows_with_the_rods_not_with_their_square() -> None:
         rods = [FlatRod.u(f"U{k}", y, 0.0, 0.1 * size) for k, y in enumerate(offsets)]
         rods += [FlatRod.v(f"V{k}", x, 0.0, 0.1 * size) for k, x in enumerate(offsets)]
         mesh = mesh_grid(FlatGrid.of(rods), 0.02)
-        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], _Outline(0.024, 0.024, False), None)
+        outline = _Outline(0.024, 0.024, False)
+        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], outline, None, _crossing_lines(rods, outline))
         counts.append(len(edges.candidates()[0]) / len(mesh.edges))
     assert counts[2] < 1.2 * counts[1] < 1.5 * counts[0]
 
@@ -281,3 +291,25 @@ def test_a_section_without_an_outline_is_not_judged() -> None:
     boxed = rs.Rod(rs.GivenSection(**given, fibre_distances=(0.01, 0.02)))
     found = contact(mesh, places, boxed, directors=np.tile([0.0, 0.0, 1.0], (len(mesh.edges), 1)))
     assert found.clearance == pytest.approx(-0.02)  # the least way out is up
+
+
+def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are() -> None:
+    """Two strips side by side whose U rods end together on the seam at y = 0.3, at angles; then one moved over."""
+    rods = [FlatRod.v(f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
+    meshes = {"A": mesh_grid(FlatGrid.of(rods), 0.02), "B": mesh_grid(FlatGrid.of(rods), 0.02)}
+    joined = side_by_side_meshes(meshes, 0.2).mesh
+    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
+    flat = [mesh.flat.copy() for mesh in meshes.values()]
+    there = flat[1] + [0.0, 0.3, 0.0]
+    there[:, 2] = 0.4 * flat[1][:, 1]  # a ridge at the seam
+    met = contact_of_patches(joined, list(zip(shells, (flat[0], there), strict=True)), round_rod(5e-3))
+    assert met == Contact()
+    moved = there + [0.03, -0.05, 0.0]  # past the seam, between the others
+    beside = contact_of_patches(joined, list(zip(shells, (flat[0], moved), strict=True)), round_rod(1.4e-2))
+    assert beside.clearance == pytest.approx(0.03 - 0.028, abs=1e-3)
+    assert beside.rods is not None
+    assert {name[0] for name in beside.rods} == {"A", "B"}
+    through = there + [0.0, -0.05, -0.02]
+    crossing = contact_of_patches(joined, list(zip(shells, (flat[0], through), strict=True)), round_rod(5e-3))
+    assert crossing.pairs == 4
+    assert crossing.clearance == pytest.approx(-0.01)

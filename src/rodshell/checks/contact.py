@@ -8,13 +8,16 @@ otherwise a lower bound of it.
 
 Rods whose lines cross in the flat grid meet there by design, at a joint, or over one another next to a rod's end.
 About such a place nothing is checked as far along both rods as two straight rods of their breadths overlap,
-(w_u + w_v) / (2 sin angle). A rod can touch itself only farther along its line than half around its section.
-Sections that are not round stand as the rods' material frames say, and without these upright on the shell.
+(w_u + w_v) / (2 sin angle), by the smaller of the angles there and between the two edges, a breadth being that of the
+section at its widest. The same holds where rods of two patches end together, no farther apart than a breadth. A rod can
+touch itself only farther along its line than half around its section. Sections that are not round stand as the rods'
+material frames say, and without these upright on the shell.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +27,14 @@ from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
 from rodshell.geometry.frames import adapted
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import FlatGrid, GridMesh
-from rodshell.layout.flatgrid import Crossings
+from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-FLATTEST = 0.1  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
+FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
 SLACK = 0.05  # of the rods' breadth: crossing rods that bend together overlap for longer than straight ones
 ACROSS = 0.1  # cosine to a rod's axis up to which a direction is across it
 UP = (0.0, 0.0, 1.0)
@@ -63,18 +66,49 @@ def contact_of(shell: Shell, state: Floats, rod: Rod) -> Contact:
     return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
 
 
-def contact(mesh: GridMesh, places: Floats, rod: Rod, *, directors: Floats | None = None) -> Contact:
+def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], rod: Rod) -> Contact:
+    """Contact of shells of equal rods, each in its state, among each other too.
+
+    Parameters
+    ----------
+    mesh : all their meshes as one, in the order of the patches.
+    """
+    outline = _Outline.of(rod)
+    if outline is None:
+        return Contact()
+    sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
+    parts = [_crossing_lines(mesh.grid.rods[a:b], outline) for a, b in pairwise(sizes)]
+    places = np.concatenate([state[shell.node_blocks] for shell, state in patches])
+    ends = places[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
+    together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
+    patch = np.repeat(np.arange(len(patches)), 2 * np.diff(sizes))
+    together = together[patch[together[:, 0]] != patch[together[:, 1]]]
+    stations = np.array([(one.start, one.end) for one in mesh.grid.rods]).ravel()
+    crossings = Crossings(
+        np.concatenate([*(one.rods + by for one, by in zip(parts, sizes, strict=False)), together // 2]),
+        np.concatenate([*(one.at for one in parts), stations[together]]),
+    )
+    frames = [(shell, rod_frames(shell), state) for shell, state in patches]
+    turned = [edge_directors(shell, one, state) for shell, one, state in frames if one is not None]
+    directors = np.concatenate(turned) if len(turned) == len(patches) else None
+    return contact(mesh, places, rod, directors=directors, crossings=crossings)
+
+
+def contact(
+    mesh: GridMesh, places: Floats, rod: Rod, *, directors: Floats | None = None, crossings: Crossings | None = None
+) -> Contact:
     """Contact of the rods of `mesh`.
 
     Parameters
     ----------
     places : (k, 3) of each entry of `rod_nodes` [m].
     directors : (e, 3) first material director of each edge; without, the normal of the shell.
+    crossings : where rods meet by design; without, wherever their lines cross in the flat grid.
     """
     outline = _Outline.of(rod)
     if outline is None:
         return Contact()
-    edges = _Edges(mesh, places, outline, directors)
+    edges = _Edges(mesh, places, outline, directors, crossings or _crossing_lines(mesh.grid.rods, outline))
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
     counted = gap <= limit
@@ -138,11 +172,21 @@ class _Outline:
         return parts[0] + parts[1] if self.box else np.hypot(*parts)
 
 
+def _crossing_lines(rods: Sequence[FlatRod], outline: _Outline) -> Crossings:
+    """Where lines of rods cross in the flat grid, joined or not, or would if the rods were a little longer."""
+    return FlatGrid.of(rods, margin=-4 * outline.reach / FLATTEST).crossings
+
+
 class _Edges:
     """All edges of a shape as prisms."""
 
-    def __init__(self, mesh: GridMesh, places: Floats, outline: _Outline, directors: Floats | None) -> None:
+    def __init__(
+        self, mesh: GridMesh, places: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings
+    ) -> None:
         self.mesh, self.outline = mesh, outline
+        rods = np.sort(crossings.rods, axis=1)
+        swapped = (rods != crossings.rods)[:, :1]
+        self.crossings = Crossings(rods, np.where(swapped, crossings.at[:, ::-1], crossings.at))
         begins = np.delete(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
         self.start, self.stop = places[begins], places[begins + 1]
         self.station = 0.5 * (mesh.stations[begins] + mesh.stations[begins + 1])  # of the middles
@@ -170,20 +214,37 @@ class _Edges:
         first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
         rods = mesh.edge_rods[first], mesh.edge_rods[second]
         own = rods[0] == rods[1]
-        crossing = self._crossing_of(*rods)
         cut = np.zeros(len(own), dtype=bool)
         apart = np.abs(self.station[first] - self.station[second])[own]
         between = 0.5 * (mesh.edge_lengths[first] + mesh.edge_lengths[second])[own]
         cut[own] = apart - between <= np.pi * reach
-        crossed = np.flatnonzero(crossing >= 0)
-        which = crossing[crossed]
-        cut[crossed] = True
-        for side, edge in enumerate((first[crossed], second[crossed])):
-            away = np.abs(self.station[edge] - self.crossings.at[which, side]) - 0.5 * mesh.edge_lengths[edge]
-            cut[crossed] &= away <= self._overlaps[which]
+        meeting = np.zeros(len(own), dtype=bool)
+        for pairs, crossings in self._met(*rods):
+            meeting[pairs] = True
+            cut[pairs] |= self._overlap(first[pairs], second[pairs], crossings)
         kept = ~cut
-        limit = np.where(crossing >= 0, -2 * SLACK * reach, np.where(own, 0.0, self.outline.near))
+        limit = np.where(meeting, -2 * SLACK * reach, np.where(own, 0.0, self.outline.near))
         return first[kept], second[kept], limit[kept]
+
+    def _met(self, low: Ints, high: Ints) -> Iterator[tuple[Ints, Ints]]:
+        """Which pairs of rods meet at which crossings, over and over: patches' rods may meet at both their ends."""
+        count = len(self.mesh.grid.rods)
+        known = self.crossings.rods @ [count, 1]
+        order, wanted = np.argsort(known, kind="stable"), low * count + high
+        first, last = (np.searchsorted(known[order], wanted, side=side) for side in ("left", "right"))
+        while (here := np.flatnonzero(first < last)).size:
+            yield here, order[first[here]]
+            first += 1
+
+    def _overlap(self, first: Ints, second: Ints, crossings: Ints) -> NDArray[np.bool_]:
+        """Whether both edges lie so near to the crossing of their rods that they overlap there by design."""
+        tangents = self.tangent[first], self.tangent[second]
+        sine = np.minimum(np.linalg.norm(cross(*tangents), axis=1), self._sines[crossings])
+        result = np.ones(len(first), dtype=bool)
+        for side, edge in enumerate((first, second)):
+            away = np.abs(self.station[edge] - self.crossings.at[crossings, side]) - 0.5 * self.mesh.edge_lengths[edge]
+            result &= away <= 2 * self.outline.reach / np.maximum(sine, FLATTEST)
+        return result
 
     def near(self) -> tuple[Ints, Ints, Floats, Floats, Floats]:
         """Of the candidates those that are near by their axes: first, second, nearest points on each, and limit."""
@@ -223,16 +284,10 @@ class _Edges:
         return self.outline.half_width(dot(n, m1[edges]), dot(n, m2[edges]))
 
     @cached_property
-    def crossings(self) -> Crossings:
-        """Where lines of rods cross in the flat grid, joined or not, or would if the rods were a little longer."""
-        return FlatGrid.of(self.mesh.grid.rods, margin=-4 * self.outline.reach / FLATTEST).crossings
-
-    @cached_property
-    def _overlaps(self) -> Floats:
-        """(c,) how far along the rods they overlap at each crossing, from it [m]."""
+    def _sines(self) -> Floats:
+        """(c,) sine of the angle between the rods at each crossing."""
         tangents = [self.tangent[self._edge_at(self.crossings.rods[:, k], self.crossings.at[:, k])] for k in (0, 1)]
-        sine = np.linalg.norm(cross(*tangents), axis=1)
-        return 2 * self.outline.reach / np.maximum(sine, FLATTEST)
+        return np.linalg.norm(cross(*tangents), axis=1)
 
     def _edge_at(self, rods: Ints, at: Floats) -> Ints:
         """Edge of each rod at a material coordinate."""
@@ -242,15 +297,6 @@ class _Edges:
         first, last = self.mesh.rod_start - np.arange(len(self.mesh.rod_start)), self.mesh.rod_stop - 2
         last = last - np.arange(len(last))
         return np.clip(after, first[rods], last[rods])
-
-    def _crossing_of(self, low: Ints, high: Ints) -> Ints:
-        """Crossing of each pair of rods, or -1."""
-        count = len(self.mesh.grid.rods)
-        known = np.append(self.crossings.rods @ [count, 1], count * count)
-        order = np.argsort(known, kind="stable")
-        wanted = low * count + high
-        at = np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)
-        return np.where(known[order[at]] == wanted, order[at], -1)
 
 
 def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[Floats, Floats]:
