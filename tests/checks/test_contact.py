@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from shells import dome
+from stress_twin import distance
 from test_bending import rods_of_length
 
 import rodshell as rs
@@ -27,21 +28,6 @@ MATERIAL = rs.Material(youngs_modulus=1e9, density=1e3)
 
 def round_rod(radius: float) -> rs.Rod:
     return rs.Rod(rs.Circle(radius), MATERIAL)
-
-
-def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
-    """Of the segments ab and cd: the least over both ends of each against the other, and over the lines' own."""
-
-    def to_segment(p: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
-        share = np.clip((p - x) @ (y - x) / ((y - x) @ (y - x)), 0, 1)
-        return float(np.linalg.norm(p - x - share * (y - x)))
-
-    found = [to_segment(p, c, d) for p in (a, b)] + [to_segment(p, a, b) for p in (c, d)]
-    u, v = b - a, d - c
-    shares, _, rank, _ = np.linalg.lstsq(np.column_stack([u, -v]), c - a, rcond=1e-9)
-    if rank == 2 and (shares >= 0).all() and (shares <= 1).all():
-        found.append(float(np.linalg.norm(a + shares[0] * u - c - shares[1] * v)))
-    return min(found)
 
 
 def test_nearest_points_of_segments_are_the_nearest() -> None:
