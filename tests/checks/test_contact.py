@@ -249,7 +249,7 @@ def test_every_shape_is_checked_and_the_nearest_rods_are_named() -> None:
     worst = min(checks.contact.values(), key=lambda found: found.clearance or 0.0)
     assert worst.rods is not None
     assert words.startswith(f"rods {worst.rods[0]} and {worst.rods[1]} overlap by ")
-    assert f"of {worst.pairs} pairs" in words
+    assert f"the worst of {worst.pairs} pairs" in words
     assert words in checks.warnings
     wider = check(dome().popped, round_rod(0.035), stages=2)
     assert wider.contact_on_the_way[0].pairs == 12
@@ -299,3 +299,31 @@ def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are()
     crossing = contact_of_patches(joined, list(zip(shells, (flat[0], through), strict=True)), round_rod(5e-3))
     assert crossing.pairs == 4
     assert crossing.clearance == pytest.approx(-0.01)
+
+
+def test_rods_that_meet_at_both_their_ends_are_no_contact() -> None:
+    """Of two patches each has one arch; they stand on the same points and lean apart."""
+    rods = [FlatRod.u("U1", 0.0, 0.0, 0.5)]
+    meshes = {"A": mesh_grid(FlatGrid.of(rods), 0.01), "B": mesh_grid(FlatGrid.of(rods), 0.01)}
+    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
+    arch = meshes["A"].flat.copy()
+    height = 0.6 * arch[:, 0] * (0.5 - arch[:, 0]) / 0.5
+    arch[:, 1:] = height[:, None] * [-1.0, 1.0]
+    other = arch * [1.0, -1.0, 1.0]
+    joined = side_by_side_meshes(meshes, 0.2).mesh
+    assert contact_of_patches(joined, list(zip(shells, (arch, other), strict=True)), round_rod(5e-3)) == Contact()
+
+
+def test_fine_meshes_of_thick_rods_find_what_coarse_ones_do() -> None:
+    """Edges a twentieth of the thickness are taken together: fewer pairs, and the same clearance to its sag."""
+    found, sizes, outline = [], [], _Outline(0.02, 0.02, False)
+    for edge in (0.02, 0.002):
+        mesh = rods_of_length(0.5, 0.5, edge=edge)
+        t = mesh.stations / 0.4
+        places = np.column_stack([0.4 * np.sin(t), 0 * t, 0.4 * np.cos(t)])
+        places[mesh.rod_slice(1), 1] = 0.05 + 0.1 * (t[mesh.rod_slice(1)] - 0.6) ** 2
+        found.append(contact(mesh, places, round_rod(0.02)))
+        sizes.append(len(_Edges(mesh, places, outline, None, _crossing_lines(mesh.grid.rods, outline)).rods))
+    assert sizes[1] < 3 * sizes[0]
+    assert found[0].clearance == pytest.approx(0.01, abs=2e-4)
+    assert found[1].clearance == pytest.approx(0.01, abs=2e-4)

@@ -181,7 +181,7 @@ def test_ball_joints_twist_no_round_rods() -> None:
     np.testing.assert_allclose(np.median(np.abs(bent.normal_curvature)), 5.0, rtol=2e-2)
 
 
-@pytest.mark.parametrize("name", ["laths with pins", "laths with balls", "square battens with pins"])
+@pytest.mark.parametrize("name", ["laths with pins", "tubes with pins", "square battens with pins"])
 def test_stress_of_a_shell_is_that_of_the_twin(name: str) -> None:
     rod, form = twisted_shells()[name]
     popped = form.popped["pinned"]
@@ -192,6 +192,18 @@ def test_stress_of_a_shell_is_that_of_the_twin(name: str) -> None:
     assert bent.torsion_stress is not None
     assert bent.torsion_stress.max() > 0.01 * bent.stress.max()
     np.testing.assert_allclose(bent.stress, expected, atol=5e-3 * expected.max())
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 2e-3])
+def test_rods_a_distance_apart_are_bent_along_their_own_lines(eccentricity: float) -> None:
+    """On a sphere rods of two layers have its curvature, by their distance from its middle; not a zigzag at joints."""
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.015)
+    form = rs.find_form(rs.Hemisphere(0.2), layout, ROD, ends=())
+    mesh, x = form.footprint.mesh, form.trimmed.positions
+    shell = rs.Shell.of(mesh, ROD, joint=rs.Pin(eccentricity=eccentricity))
+    bent = bending_of(shell, shell.state(x, None, x / 0.2), ROD)
+    straight = bending_of(rs.Shell.of(mesh, ROD), x, ROD)
+    np.testing.assert_allclose(bent.curvature, straight.curvature, atol=0.01 * 5 + 0.02 * 5 * (eccentricity > 0))
 
 
 GIVEN = {"EA": 1e5, "EI1": 1.0, "EI2": 1.0, "GJ": 0.7}

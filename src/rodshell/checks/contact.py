@@ -1,10 +1,10 @@
 """Contact: rods that touch or run into each other where they should not, and how near the others come.
 
-Each edge of a rod is a prism of the rod's section. Pairs of edges that can be near are found by a tree over the edges'
-middles. Two prisms are apart by the widest gap between them, seen along any of a few directions: from one axis to the
-other where these are nearest, along both axes and across both, and along the sides of both sections. A gap along any
-direction keeps them apart, so that no contact is missed; it is the distance of round rods that run side by side, and
-otherwise a lower bound of it.
+Each edge of a rod is a prism of the rod's section; edges much shorter than the rod is thick are taken together. Pairs
+of edges that can be near are found by a tree over their middles. Two prisms are apart by the widest gap between them,
+seen along any of a few directions: from one axis to the other where these are nearest, along both axes and across both,
+and along the sides of both sections. A gap along any direction keeps them apart, so that no contact is missed; it is
+the distance of round rods that run side by side, and otherwise a lower bound of it.
 
 Rods whose lines cross in the flat grid meet there by design, at a joint, or over one another next to a rod's end.
 About such a place nothing is checked as far along both rods as two straight rods of their breadths overlap,
@@ -35,6 +35,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
+SHORT = 0.5  # of a section's reach: edges are taken together up to this length, which leaves 0.2 % of it as sag
 SLACK = 0.05  # of the rods' breadth: crossing rods that bend together overlap for longer than straight ones
 ACROSS = 0.1  # cosine to a rod's axis up to which a direction is across it
 UP = (0.0, 0.0, 1.0)
@@ -114,7 +115,7 @@ def contact(
     counted = gap <= limit
     if not counted.any():
         return Contact()
-    rods = np.sort(np.column_stack([mesh.edge_rods[first], mesh.edge_rods[second]]), axis=1)
+    rods = np.sort(np.column_stack([edges.rods[first], edges.rods[second]]), axis=1)
     worst = int(np.argmin(np.where(counted, gap, np.inf)))
     a, b = (mesh.grid.rods[k].name for k in rods[worst])
     x, y, z = (0.5 * (p + q)[worst]).tolist()
@@ -187,17 +188,26 @@ class _Edges:
         rods = np.sort(crossings.rods, axis=1)
         swapped = (rods != crossings.rods)[:, :1]
         self.crossings = Crossings(rods, np.where(swapped, crossings.at[:, ::-1], crossings.at))
-        begins = np.delete(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
-        self.start, self.stop = places[begins], places[begins + 1]
-        self.station = 0.5 * (mesh.stations[begins] + mesh.stations[begins + 1])  # of the middles
+        rod_of = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+        together = max(1, int(SHORT * outline.reach / mesh.edge_lengths.max()))
+        kept = (np.arange(len(rod_of)) - mesh.rod_start[rod_of]) % together == 0
+        kept[mesh.rod_stop - 1] = True
+        entries = np.flatnonzero(kept)
+        own = rod_of[entries[1:]] == rod_of[entries[:-1]]
+        begins, ends = entries[:-1][own], entries[1:][own]
+        self.rods, self.start, self.stop = rod_of[begins], places[begins], places[ends]
+        self.station = 0.5 * (mesh.stations[begins] + mesh.stations[ends])  # of the middles
+        self.lengths = mesh.stations[ends] - mesh.stations[begins]
         self.tangent = unit(self.stop - self.start)
-        self._directors, self._places, self._begins = directors, places, begins
+        self._directors = None if directors is None else directors[begins - self.rods]
+        self._places, self._begins = places, begins
 
     @cached_property
     def across(self) -> tuple[Floats, Floats]:
         """(e, 3) directors m1 and m2 of each edge."""
-        m1 = self._directors
-        if m1 is None:
+        if self._directors is not None:
+            m1 = adapted(self._directors, self.tangent)
+        else:
             nodes = np.zeros((self.mesh.node_count, 3))
             nodes[self.mesh.rod_nodes] = self._places
             normals = shell_normals(self.mesh, nodes)
@@ -208,15 +218,15 @@ class _Edges:
     def candidates(self) -> tuple[Ints, Ints, Floats]:
         """Pairs of edges that may be near, but for those that meet by design: first, second, and the gap from which
         they count as near [m]; crossing rods, and parts of one rod, only when they touch away from there."""
-        mesh, reach = self.mesh, self.outline.reach
+        reach = self.outline.reach
         radius = np.linalg.norm(self.stop - self.start, axis=1).max() + 2 * reach + self.outline.near
         found = cKDTree(0.5 * (self.start + self.stop)).query_pairs(radius, output_type="ndarray")
         first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
-        rods = mesh.edge_rods[first], mesh.edge_rods[second]
+        rods = self.rods[first], self.rods[second]
         own = rods[0] == rods[1]
         cut = np.zeros(len(own), dtype=bool)
         apart = np.abs(self.station[first] - self.station[second])[own]
-        between = 0.5 * (mesh.edge_lengths[first] + mesh.edge_lengths[second])[own]
+        between = 0.5 * (self.lengths[first] + self.lengths[second])[own]
         cut[own] = apart - between <= np.pi * reach
         meeting = np.zeros(len(own), dtype=bool)
         for pairs, crossings in self._met(*rods):
@@ -242,7 +252,7 @@ class _Edges:
         sine = np.minimum(np.linalg.norm(cross(*tangents), axis=1), self._sines[crossings])
         result = np.ones(len(first), dtype=bool)
         for side, edge in enumerate((first, second)):
-            away = np.abs(self.station[edge] - self.crossings.at[crossings, side]) - 0.5 * self.mesh.edge_lengths[edge]
+            away = np.abs(self.station[edge] - self.crossings.at[crossings, side]) - 0.5 * self.lengths[edge]
             result &= away <= 2 * self.outline.reach / np.maximum(sine, FLATTEST)
         return result
 
@@ -292,11 +302,10 @@ class _Edges:
     def _edge_at(self, rods: Ints, at: Floats) -> Ints:
         """Edge of each rod at a material coordinate."""
         low, span = self.station.min(), np.ptp(self.mesh.stations) + 1.0
-        keys = self.mesh.edge_rods * span + (self.station - low)
+        keys = self.rods * span + (self.station + 0.5 * self.lengths - low)
         after = np.searchsorted(keys, rods * span + (at - low))
-        first, last = self.mesh.rod_start - np.arange(len(self.mesh.rod_start)), self.mesh.rod_stop - 2
-        last = last - np.arange(len(last))
-        return np.clip(after, first[rods], last[rods])
+        first, stop = (np.searchsorted(self.rods, rods, side=side) for side in ("left", "right"))
+        return np.clip(after, first, stop - 1)
 
 
 def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[Floats, Floats]:
