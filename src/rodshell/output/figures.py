@@ -116,6 +116,11 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
         values = [bent[column].get(key) for column in columns]
         if any(value is not None for value in values):
             rows.append((title, [_shown(show, value, rounding) for value in values]))
+    met = result.get("contact") or {}
+    near = [(met.get("deployment" if column == "pop_up" else column) or {}).get("clearance") for column in columns]
+    if any(clear is not None for clear in near):
+        shown = [_shown(wording.millimetres, clear, rounding) for clear in near]
+        rows.append(("Clearance of the nearest rods", shown))
     for title, key, show in _REACTIONS:
         values = [(held.get(column) or {}).get(key) for column in columns]
         if any(value is not None for value in values):

@@ -19,7 +19,9 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     **dict.fromkeys(("EI", "EI1", "EI2", "GJ"), (1.0, "N m\N{SUPERSCRIPT TWO}")),
     **dict.fromkeys(("mass", "mass_per_length"), (1.0, "kg/m")),
     "EA": (1.0, "N"),
-    **dict.fromkeys(("youngs_modulus", "shear"), (1e-6, "MPa")),
+    **dict.fromkeys(("youngs_modulus", "shear", "fibre_modulus"), (1e-6, "MPa")),
+    "fibre_distances": (1e3, "mm"),
+    "torsion_modulus": (1e6, "cm\N{SUPERSCRIPT THREE}"),
     "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
     "rotate": (180 / pi, "\N{DEGREE SIGN}"),
 }
