@@ -16,6 +16,7 @@ from rodshell.case.values import (
     InertiaPerLength,
     Length,
     LengthOrAuto,
+    Mass,
     MassPerLength,
     PoissonRatio,
     Stiffness,
@@ -147,6 +148,8 @@ class RodTable(Table):
 
 class JointTable(Table):
     """Keys of every joint; `build` takes the kind from the table's own."""
+
+    mass: Mass = Field(default=0.0, description="mass of one joint: its bolt, coupler or clamp")
 
     def build(self) -> "Joint":
         from rodshell import joints
