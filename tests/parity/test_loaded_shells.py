@@ -36,7 +36,9 @@ def shell(name: str) -> rs.Form:
         return rs.find_form(rs.Cap(radius=10.0, base=4.0), grid(3.0, 1.5), TUBE)
     if name == "laths":
         return rs.find_form(rs.Paraboloid(radius=8.0, height=4.0), grid(3.0, 1.5), LARCH)
-    return rs.find_form(rs.Ellipsoid(a=0.2, b=0.15, c=0.12), grid(0.05, 0.025, rotate=0.4, offset=(0.01, 0.02)), STIFFER)
+    return rs.find_form(
+        rs.Ellipsoid(a=0.2, b=0.15, c=0.12), grid(0.05, 0.025, rotate=0.4, offset=(0.01, 0.02)), STIFFER
+    )
 
 
 SHELLS = ("dome", "steel", "tubes", "laths", "oval")
