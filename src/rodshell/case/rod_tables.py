@@ -17,7 +17,11 @@ from rodshell.case.values import (
     InertiaPerLength,
     Length,
     LengthOrAuto,
+<<<<<<< HEAD
     Lengths,
+=======
+    Mass,
+>>>>>>> weight
     MassPerLength,
     PoissonRatio,
     SectionModulus,
@@ -195,6 +199,8 @@ class RodTable(Table):
 
 class JointTable(Table):
     """Keys of every joint; `build` takes the kind from the table's own."""
+
+    mass: Mass = Field(default=0.0, description="mass of one joint: its bolt, coupler or clamp")
 
     def build(self) -> "Joint":
         from rodshell import joints

@@ -66,7 +66,7 @@ def share_of_weight(found: Mapping[str, Any]) -> str:
         return "unknown: no mass was given"
     if factor is None:
         return "more than 100 times"
-    if factor == 0:
+    if limit == "unstable unloaded":
         return "none: unstable unloaded"
     least = "at least " if limit == "not followed" else ""
     return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
