@@ -20,11 +20,8 @@ Kind = Literal[
     "rotational stiffness",
     "force",
     "bending stiffness",
-<<<<<<< HEAD
     "section modulus",
-=======
     "mass",
->>>>>>> weight
     "mass per length",
     "inertia per length",
     "time",
@@ -103,11 +100,8 @@ _KINDS: dict[Kind, _Units] = {
         '"2.5 kN m2"',
         _factors("1 Nm2", "1000 kNm2", "1e6 MNm2", "0.000001 Nmm2", "0.001 kNmm2", "1e-4 Ncm2", "0.1 kNcm2"),
     ),
-<<<<<<< HEAD
     "section modulus": _Units("a section modulus", '"1.2 cm3"', _factors("1 m3", "0.000001 cm3", "1e-9 mm3")),
-=======
     "mass": _Units("a mass", '"1.2 kg"', _factors("1 kg", "0.001 g", "1000 t", "0.45359237 lb")),
->>>>>>> weight
     "mass per length": _Units("a mass per length", '"1.2 kg/m"', _factors("1 kg/m", "0.001 g/m", "1 g/mm")),
     "inertia per length": _Units("an inertia per length", '"0.001 kg m"', _factors("1 kgm", "0.001 gm", "0.001 kgmm")),
     "number": _Units("a plain number", "0.5", {}),

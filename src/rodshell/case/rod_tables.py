@@ -17,11 +17,8 @@ from rodshell.case.values import (
     InertiaPerLength,
     Length,
     LengthOrAuto,
-<<<<<<< HEAD
     Lengths,
-=======
     Mass,
->>>>>>> weight
     MassPerLength,
     PoissonRatio,
     SectionModulus,

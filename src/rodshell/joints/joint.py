@@ -126,15 +126,12 @@ class Spring:
                 )
         _check_rest_angle(self.rest_angle)
         _check_eccentricity(self.eccentricity)
-<<<<<<< HEAD
         if self.eccentricity and not (self.out_of_plane and self.twist):
             raise InputError(
                 "rods that lie one above the other roll over each other where a spring resists neither: give an "
                 'eccentric spring an out-of-plane and a twist stiffness, or use kind = "pin", which is rigid in both'
             )
-=======
         _check_mass(self.mass)
->>>>>>> weight
 
     @property
     def turns_frames(self) -> bool:
