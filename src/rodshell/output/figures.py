@@ -102,7 +102,8 @@ def _weight_rows(result: Mapping[str, Any], ends: Sequence[str], rounding: Round
         return []
     shares = [wording.share_of_weight(one) if one else wording.UNKNOWN for one in found]
     sunk = [_shown(wording.millimetres, one.get("deflection") if one else None, rounding) for one in found]
-    rows = [("Own weight that it bears", shares)]
+    whose = "the weakest patch, its seam held," if result.get("patches") else "it"
+    rows = [(f"Own weight that {whose} bears", shares)]
     return rows if set(sunk) == {wording.UNKNOWN} else [*rows, ("Largest deflection under its own weight", sunk)]
 
 
