@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError, NetLimitError
+from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.rods.fibres import fibre_strain
@@ -35,6 +36,10 @@ class Bends(NamedTuple):
     normal: Floats
     geodesic: Floats
 
+    def rolled(self) -> "Bends":
+        """The same of laths that are free to turn about their own axes: they bend towards their thin side alone."""
+        return Bends(np.hypot(self.normal, self.geodesic), np.zeros_like(self.geodesic))
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -54,11 +59,26 @@ class Fit:
     bends: Callable[[], Bends]
 
     @classmethod
-    def on(cls, target: Target, layout: GridLayout, *, anchor: tuple[float, float] | None = None) -> Self:
-        """By the net of a layout on its target."""
+    def on(
+        cls,
+        target: Target,
+        layout: GridLayout,
+        *,
+        anchor: tuple[float, float] | None = None,
+        joint: Joint | None = None,
+    ) -> Self:
+        """By the net of a layout on its target.
+
+        joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
+        """
         slender = SLENDER * target.size
         thickest = min(2 * slender, ROOM * min(layout.spacing))
-        return cls(2 * target.size, slender, thickest, lambda: bends_of(target, layout, anchor))
+
+        def bends() -> Bends:
+            found = bends_of(target, layout, anchor)
+            return found if (joint or Ball()).holds_normals else found.rolled()
+
+        return cls(2 * target.size, slender, thickest, bends)
 
     @classmethod
     def between(cls, lengths: Floats, ends: Floats) -> Self:
