@@ -175,3 +175,8 @@ def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
     fit = Fit.between(np.array([2.0]), np.array([[[0.0, 0.0, 0.0], [chord, 0.0, 0.0]]]))
     np.testing.assert_allclose(fit.bends().normal, 0.3 * np.pi / 2.0, rtol=0.01)  # theta^2 / 32 of it
     assert fit.preset == "gfrp"
+
+
+def test_a_table_whose_rods_bend_to_rings_still_has_a_size() -> None:
+    fit = Fit.between(np.array([2.0]), np.zeros((1, 2, 3)))
+    assert 0 < depth(fit.section(rs.Material.preset("petg"))) < 0.01

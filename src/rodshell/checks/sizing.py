@@ -84,7 +84,8 @@ class Fit:
     def between(cls, lengths: Floats, ends: Floats) -> Self:
         """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m], as if each bent like a sine."""
         chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        width = float(np.ptp(ends[:, :, :2], axis=(0, 1)).max())
+        ring = float(lengths.max()) / np.pi  # of a rod whose ends meet
+        width = max(float(np.ptp(ends[:, :, :2], axis=(0, 1)).max()), ring)
         rise = 2 * np.sqrt(np.clip(1 - chords / lengths, 0.0, 1.0))  # amplitude of the tangent's angle [rad]
         slender = SLENDER * width / 2
         return cls(width, slender, 2 * slender, lambda: Bends(np.pi * rise / lengths, np.zeros(len(lengths))))
