@@ -21,8 +21,8 @@ def test_a_mesh_gives_the_form_of_its_analytic_target(name: str) -> None:
 
 
 def test_a_nurbs_gives_the_form_of_its_analytic_target() -> None:
-    pytest.importorskip("rhino3dm")
-    pytest.importorskip("OCP")
+    pytest.importorskip("rhino3dm", reason="no rhino3dm: pip install rhino3dm")
+    pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     check_reached(nurbs_rows())
 
 

@@ -1,6 +1,10 @@
-"""A browser without a window and without a network, to open reports in; tests that want it skip without it."""
+"""A browser without a window and without a network, to open reports in.
+
+Tests that want it skip without it, unless RODSHELL_BROWSER=required, as in CI: then they fail.
+"""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -12,7 +16,10 @@ import pytest
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
 )
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here: the report is not opened in a browser")
+needs_browser = pytest.mark.skipif(
+    CHROMIUM is None and os.environ.get("RODSHELL_BROWSER") != "required",
+    reason="no browser: install Chromium (Debian: apt-get install chromium)",
+)
 
 PROBE = """
 <script>
@@ -30,10 +37,23 @@ addEventListener("load", () => {
         found.stages.push([document.getElementById("view-caption").textContent, picture()]);
       }
       const choice = document.getElementById("view-colour");
+      found.legends = [];
+      const stages = found.stages.map((_, k) => k), bar = document.getElementById("view-bar");
+      for (const { value: kind } of choice.options) {
+        choice.value = kind; choice.dispatchEvent(new Event("change"));
+        for (const k of [...stages, ...stages.toReversed()]) {
+          slider.value = k; slider.dispatchEvent(new Event("input")); await wait();
+          const visible = getComputedStyle(bar).visibility === "visible", what = bar.querySelector(".what").textContent;
+          const ticks = [...bar.querySelectorAll(".ticks span")];
+          const places = ticks.map(tick => [parseFloat(tick.style.left) / 100, tick.textContent]);
+          found.legends.push([kind, k, visible ? what : "", places]);
+        }
+      }
+      found.kinds = Object.fromEntries([...choice.options].map(({ value, textContent }) => [value, textContent]));
+      slider.value = slider.max; slider.dispatchEvent(new Event("input"));
       choice.value = "gap"; choice.dispatchEvent(new Event("change")); await wait(); found.gap = picture();
       choice.value = "stress"; choice.dispatchEvent(new Event("change")); await wait();
       found.stress = picture();
-      found.bar = document.querySelector("#view-bar .what").textContent;
       const at = (type, x, y) => new PointerEvent(type, { pointerId: 1, clientX: x, clientY: y });
       view.setPointerCapture = () => {};
       view.dispatchEvent(at("pointerdown", 300, 300)); view.dispatchEvent(at("pointermove", 380, 340));
@@ -56,6 +76,7 @@ addEventListener("load", () => {
 
 def open_report(page: Path, folder: Path) -> tuple[dict[str, Any], list[str]]:
     """What a user finds who moves and clicks everything, and all that the console says."""
+    assert CHROMIUM, "no browser, and RODSHELL_BROWSER=required: install Chromium (Debian: apt-get install chromium)"
     probed = folder / "probed.html"
     probed.write_text(page.read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"), encoding="utf-8")
     command = [

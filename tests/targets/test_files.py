@@ -1,10 +1,12 @@
 """Targets from files: every format gives the same surface, and the command line takes the file alone."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import rodshell as rs
 from rodshell.case import load_case
@@ -86,10 +88,9 @@ def test_a_table_of_heights_is_its_surface(tmp_path):
 
 
 def test_a_grey_image_is_heights_between_black_and_white(tmp_path):
-    image = pytest.importorskip("PIL.Image")
     x, y = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(1, -1, 40))
     share = 0.9 - 0.4 * x**2 - 0.3 * y**2 + 0.1 * x
-    image.fromarray(np.rint(65535 * share).astype(np.uint16)).save(tmp_path / "roof.png")
+    Image.fromarray(np.rint(65535 * share).astype(np.uint16)).save(tmp_path / "roof.png")
     target = rs.heights_from(tmp_path / "roof.png", size=(0.6, 0.4), height=0.2)
     assert target.height(np.array([[0.15, 0.1], [-0.15, -0.1]])) == pytest.approx(
         0.2 * (0.9 - 0.1 - 0.075 + 0.05 * np.array([1, -1])), abs=2e-5
@@ -98,7 +99,7 @@ def test_a_grey_image_is_heights_between_black_and_white(tmp_path):
 
 def test_a_nurbs_patch_is_met_and_its_trim_bounds_it(tmp_path):
     """A plane trimmed to a circle, and the same plane whole: the surface of both goes on past the trim."""
-    rhino3dm = pytest.importorskip("rhino3dm")
+    rhino3dm = pytest.importorskip("rhino3dm", reason="no rhino3dm: pip install rhino3dm")
     circle = rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 150.0).ToNurbsCurve()
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
@@ -186,14 +187,32 @@ def test_broken_files_are_refused_in_one_sentence(tmp_path):
         ("noise.glb", b"glTF" + bytes(range(200))),
     ],
 )  # fmt: skip
-def test_what_went_wrong_inside_a_reader_is_not_the_users_business(name, content, tmp_path):
+def test_a_file_that_cannot_be_read_is_refused_with_the_readers_own_words_in_one_line(name, content, tmp_path):
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(rs.InputError) as caught:
         rs.surface_from(path, unit=1.0)
-    assert f"cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export" in str(
-        caught.value
-    )
+    words = f"cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export it anew "
+    assert re.search(re.escape(words) + r"\(the reader says: \w+(: .+)?\)$", str(caught.value))
+
+
+def test_a_fault_of_the_reader_itself_is_not_hidden_behind_the_file(bowl, tmp_path, monkeypatch):
+    (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
+    monkeypatch.delattr("trimesh.load_scene")  # as in its versions before 4.6
+    with pytest.raises(rs.InputError, match="module 'trimesh' has no attribute 'load_scene'"):
+        rs.surface_from(tmp_path / "bowl.obj", unit=1.0)
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+def test_names_and_comments_may_be_written_in_any_usual_code(code, bowl, tmp_path):
+    text = WRITERS["obj"](*bowl).decode()
+    (tmp_path / "bowl.obj").write_bytes(f"# gro\xdf\no K\xfcppel\n{text}".encode(code))
+    assert rs.surface_from(tmp_path / "bowl.obj", unit=1.0, name="K\xfcppel").size > 0
+    comments = {"off": ("OFF\n", "OFF\n# gro\xdf\n"), "ply": ("ascii 1.0\n", "ascii 1.0\ncomment gro\xdf\n")}
+    for kind, (line, longer) in comments.items() if code != "utf-16" else ():
+        written = WRITERS[kind](*bowl).decode().replace(line, longer)
+        (tmp_path / f"bowl.{kind}").write_bytes(written.encode(code.removesuffix("-sig")))
+        assert rs.surface_from(tmp_path / f"bowl.{kind}", unit=1.0).size > 0
 
 
 @pytest.mark.parametrize(

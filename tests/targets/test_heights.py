@@ -1,7 +1,12 @@
 """Tables and images of heights: however the same surface is written down, the same surface is read."""
 
+import struct
+import warnings
+import zlib
+
 import numpy as np
 import pytest
+from PIL import Image
 
 import rodshell as rs
 from rodshell.targets.greyimage import read_image, smoothed
@@ -132,10 +137,9 @@ def test_planes_and_what_is_no_terrace_are_left_alone():
 
 @pytest.mark.parametrize(("mode", "white", "coarse"), [("L", 255, True), ("RGB", 255, True), ("I;16", 65535, False)])
 def test_an_image_of_8_bits_is_told_and_one_of_16_bits_is_taken_as_it_is(mode, white, coarse, tmp_path):
-    image = pytest.importorskip("PIL.Image")
     true = dome(40)
     stored = np.round(white * true).astype(np.uint16 if white > 255 else np.uint8)
-    image.fromarray(np.repeat(stored[:, :, None], 3, axis=2) if mode == "RGB" else stored).save(tmp_path / "roof.png")
+    Image.fromarray(np.repeat(stored[:, :, None], 3, axis=2) if mode == "RGB" else stored).save(tmp_path / "roof.png")
     heights, step = read_image(tmp_path / "roof.png")
     assert (step is not None) == coarse
     vertices, _, notes = read_heights(tmp_path / "roof.png", SIZE, 3.0)
@@ -152,10 +156,30 @@ def test_an_image_of_8_bits_is_told_and_one_of_16_bits_is_taken_as_it_is(mode, w
 
 def test_a_grid_forms_on_an_image_of_8_bits(tmp_path):
     """Its terraces had no drape without smoothing."""
-    image = pytest.importorskip("PIL.Image")
-    image.fromarray(np.round(255 * dome(80)).astype(np.uint8)).save(tmp_path / "roof.png")
+    Image.fromarray(np.round(255 * dome(80)).astype(np.uint8)).save(tmp_path / "roof.png")
     target = rs.heights_from(tmp_path / "roof.png", size=SIZE, height=3.0)
     rod = rs.Rod(rs.Circle(radius=0.03), rs.Material(youngs_modulus=1e6, density=1e3))
     draped = rs.drape(rs.GridLayout.orthogonal(spacing=1.0), rod, target)
     assert draped.report.converged
     assert draped.report.negative_modes == 0
+
+
+@pytest.mark.parametrize(("width", "height"), [(1501, 1000), (5000, 4000), (12000, 12000), (60000, 60000)])
+def test_an_image_of_too_many_pixels_is_refused_before_they_are_decoded(width, height, tmp_path):
+    """There are none: only the header."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    chunks = head, b"IDAT" + zlib.compress(b""), b"IEND"
+    data = b"".join(struct.pack(">I", len(c) - 4) + c + struct.pack(">I", zlib.crc32(c)) for c in chunks)
+    (tmp_path / "roof.png").write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(rs.InputError, match=r"(x \d+ heights|far too many pixels): scale it down to 1.5 million"):
+            read_image(tmp_path / "roof.png")
+
+
+@pytest.mark.parametrize("line", ["0," * 1300 + "0", "0,0,0"])
+def test_a_table_of_too_many_heights_is_refused_before_its_numbers_are_read(line, tmp_path):
+    rows = 1_500_001 // (line.count(",") + 1 if len(line) > 5 else 1) + 1
+    (tmp_path / "roof.csv").write_text("\n".join([line, *["x"] * rows]))
+    with pytest.raises(rs.InputError, match=r"heights: scale it down to 1.5 million or fewer"):
+        read_table(tmp_path / "roof.csv", SIZE)

@@ -30,7 +30,7 @@ def plan(reach: float) -> Floats:
 
 
 def test_a_face_is_its_surface(tmp_path):
-    pytest.importorskip("OCP")
+    pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     target = rs.surface_from(written(tmp_path / "saddle.step", saddle()))
     xy = plan(0.18)
     assert target.height(xy) == pytest.approx((xy[:, 0] ** 2 - xy[:, 1] ** 2) / 0.8, abs=2e-7)
@@ -43,7 +43,7 @@ def test_a_face_is_its_surface(tmp_path):
 
 def test_splines_with_inner_knots_are_met(tmp_path):
     """A plane as a cubic of two spans each way, raised at the control point in the middle."""
-    pytest.importorskip("OCP")
+    pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     knots, at = [0.0, 1.0, 2.0], np.array([0.0, 1 / 3, 1.0, 5 / 3, 2.0])  # Greville points reproduce the plane
     x, y = np.meshgrid(at - 1, at - 1, indexing="ij")
     controls = np.stack([x, y, 0 * x], axis=2)
@@ -56,7 +56,7 @@ def test_splines_with_inner_knots_are_met(tmp_path):
 
 def test_a_face_ends_where_its_edge_is(tmp_path):
     """On a sphere at the circle that bounds it, on a plane at the trim; the file is in millimetres."""
-    pytest.importorskip("OCP")
+    pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     file = StepFile("mm")
     file.cap(200.0, 50.0, "cap")
     file.disc(150.0, "disc")
@@ -74,7 +74,7 @@ def test_a_face_ends_where_its_edge_is(tmp_path):
 
 
 def test_of_several_faces_one_is_chosen_by_name_or_number(tmp_path):
-    pytest.importorskip("OCP")
+    pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     file = saddle(name="roof")
     file.cap(0.2, 0.05, "cap")
     path = written(tmp_path / "house.step", file)

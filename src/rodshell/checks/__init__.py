@@ -1,4 +1,4 @@
-"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat."""
+"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat, its own weight."""
 
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check, settled_shell
@@ -6,6 +6,7 @@ from rodshell.checks.contact import Contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.checks.self_weight import SelfWeight, self_weight
 
 __all__ = [
     "Bending",
@@ -14,6 +15,7 @@ __all__ = [
     "Deployment",
     "JointLoads",
     "Reactions",
+    "SelfWeight",
     "bending",
     "bending_of",
     "check",
@@ -22,5 +24,6 @@ __all__ = [
     "deploy",
     "joint_loads",
     "reactions",
+    "self_weight",
     "settled_shell",
 ]

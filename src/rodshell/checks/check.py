@@ -11,6 +11,7 @@ from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
 from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
@@ -35,6 +36,7 @@ class Checks:
     ----------
     bending, reactions, joints : by end condition.
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
+    self_weight : by end condition, what share of its own weight the shell bears.
     contact : by end condition; `contact_on_the_way` of the deployment's stages.
     """
 
@@ -43,13 +45,15 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None
     on_the_way: tuple[Bending, ...]
+    self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
     contact_on_the_way: tuple[Contact, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
-        way = (*(() if self.deployment is None else self.deployment.warnings), *self.touching)
+        way = () if self.deployment is None else self.deployment.warnings
+        way = (*way, *unknown_weights(self.self_weight), *self.touching)
         bends = [
             float(bent.bending_strain.max())
             for bent in (*self.bending.values(), *self.on_the_way)
@@ -156,8 +160,12 @@ def check(
     met = {ends: contact_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
+    weighed = dict[Ends, SelfWeight]()
+    for ends, pair in settled.items():
+        progress("self-weight", f"{ends} ends", 0.0)
+        weighed[ends] = self_weight(*pair)
     if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, (), met)
+        return Checks(bent, held, carried, None, (), weighed, met)
     last = done["pinned"]
     deployment = deploy(
         last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
@@ -168,7 +176,7 @@ def check(
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, met, met_on_the_way)
+    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way)
 
 
 def _worst(bent: Bending) -> float:

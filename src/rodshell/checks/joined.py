@@ -9,6 +9,7 @@ import numpy as np
 from rodshell.checks.check import Checks
 from rodshell.checks.contact import Contact, joined_contact
 from rodshell.checks.deployment import Deployment
+from rodshell.checks.self_weight import weakest
 from rodshell.formfinding.popup import Ends
 
 
@@ -32,7 +33,8 @@ class JoinedChecks(Checks):
 def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> JoinedChecks:
     """Of shells that share nothing: what all were checked for, one after the other.
 
-    The way up has the stages that all were followed through.
+    The deployment has the stages that all were followed through. Each shell bears its own weight by itself, what they
+    share being held as supports are: of all the smallest factor counts.
 
     contacts : of all final shapes together, by end condition; in a deployment each shell is looked at by itself.
     """
@@ -42,10 +44,11 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
     def each(table: str) -> dict[Ends, Any]:
         return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
 
+    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in ends}
     contact = {end: contacts[end] for end in ends}
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), contact, named=named)
+        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), weighed, contact, named=named)
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(
@@ -56,7 +59,9 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
         name: [part.contact_on_the_way[k] for k in row] for (name, part), row in zip(named.items(), rows, strict=True)
     }
     met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
-    return JoinedChecks(each("bending"), each("reactions"), each("joints"), way, bent, contact, met, named=named)
+    return JoinedChecks(
+        each("bending"), each("reactions"), each("joints"), way, bent, weighed, contact, met, named=named
+    )
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:

@@ -12,7 +12,7 @@ from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import Method, drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
-from rodshell.formfinding.popup import Ends, Popped, pop_up
+from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.roll import roll
 from rodshell.formfinding.trim import (
@@ -25,12 +25,13 @@ from rodshell.formfinding.trim import (
     trim,
     untrimmed,
 )
-from rodshell.joints import Ball, Joint
+from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.units import length_text
+from rodshell.validation import choices_of
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +74,8 @@ class FoundForm:
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
         stretched = _stretched(self.draped)
-        off = _springs_off(self.agreement, advise=not stretched)
+        wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
+        off = _springs_off(self.agreement, advise=not (stretched or wide))
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
         return (*self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
 
@@ -105,10 +107,10 @@ def find_stages(
     *,
     method: Method = "bound",
     anchor: tuple[float, float] | None = None,
-    gravity: float = 9.81,
+    gravity: float | None = None,
     joint: Joint | None = None,
     fall: Fall | None = None,
-    ends: Sequence[Ends] = ("pinned", "clamped"),
+    ends: Ends | Sequence[Ends] = ENDS,
     start: FoundForm | None = None,
     cut: Callable[[Draped], Trimmed] = trim,
     progress: Progress = silent,
@@ -117,6 +119,8 @@ def find_stages(
 
     cut : how the draped shell is trimmed.
     """
+    ends = choices_of("ends", ends, ENDS)
+    require_joint(joint)
     joint = joint or Ball()
     draped = drape(
         layout, rod, target,

@@ -9,13 +9,13 @@ from rodshell.output.drawing import Drawing
 from rodshell.output.figures import checks_table, key_figures, levels_table, supports_table
 from rodshell.output.pictures import picture_svg
 from rodshell.output.plan import NOTE, FlatPlan
-from rodshell.output.schedules import Table, rods_table, seams_table, stock_table
+from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
 from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
 from rodshell.output.shapes import CAPTIONS
 from rodshell.output.svg import drawing_svg, inline
-from rodshell.output.verdict import unknown_below, verdict
-from rodshell.output.viewer import viewer_json
+from rodshell.output.verdict import facts, unknown_below
+from rodshell.output.viewer import viewer_data, viewer_json
 from rodshell.output.wording import percent, stage
 
 IN_PAGE = ("supports", "elevations", "erection")
@@ -43,14 +43,14 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    result = archive.result
+    result, tables = archive.result, _tables(archive)
     states = [state for state in CAPTIONS if state in archive.states and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,
         note=NOTE,
         summary=plan.summary,
-        warnings=[str(word) for word in result.get("warnings") or []],
-        verdict=verdict(archive),
+        verdict=archive.verdict,
+        facts=facts(result),
         dropped=result.get("dropped") or [],
         view=_view(archive),
         supports=supports_table(result),
@@ -61,7 +61,9 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         levels=levels_table(result),
         plan=shown(drawing_svg(drawings["plan"])),
         drawings=[(drawings[name].title, shown(drawing_svg(drawings[name]))) for name in IN_PAGE if name in drawings],
-        tables=_tables(archive),
+        tables=[
+            (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
+        ],
         case=archive.case_toml,
         version=str(result.get("version_rodshell") or "unknown"),
         versions=", ".join(f"{name} {number}" for name, number in (result.get("versions") or {}).items()),
@@ -70,18 +72,18 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
 
 
 def _view(archive: Archive) -> dict[str, Any] | None:
-    """The 3D view's data and script; what they hold cannot end a script element."""
+    """The 3D view's data and script."""
     from markupsafe import Markup
 
-    data = viewer_json(archive)
+    data = viewer_data(archive)
     if data is None:
         return None
     script = files("rodshell.output").joinpath("templates/view.js").read_text(encoding="utf-8")
     return {
-        "data": Markup(data),
+        "data": Markup(viewer_json(data)),
         "script": Markup(script),
-        "frames": data.count('"places":'),
-        "colours": [kind for kind in ("stress", "gap") if f'"{kind}":{{' in data],
+        "frames": len(data["frames"]),
+        "colours": sorted(data["names"].items(), reverse=True),  # stress first
         "note": _note(archive),
     }
 

@@ -20,8 +20,8 @@ from rodshell.output.shapes import Shape, shape_names, shape_of
 STEPS = 65535  # of a coordinate: 16 bits
 
 
-def viewer_json(archive: Archive) -> str | None:
-    """The frames for templates/view.js; None where there is no shape in space."""
+def viewer_data(archive: Archive) -> dict[str, Any] | None:
+    """The frames for templates/view.js, and what their colours are called; None where there is no shape in space."""
     names = [name for name in shape_names(archive) if name != "draped"] or []
     rods = [rod for rod in rods_of(archive) if len(rod.nodes)]
     if len(names) < 2 or not rods:
@@ -31,16 +31,22 @@ def viewer_json(archive: Archive) -> str | None:
     nodes = archive.states["rod_nodes"][entries]
     cloud = np.concatenate([shape.positions[nodes] for shape in shapes])
     low, size = cloud.min(axis=0), float(np.ptp(cloud, axis=0).max())
-    scales: dict[Colour, dict[str, Any]] = {}
-    frames = [_frame(archive, shape, nodes, entries, low, size, scales) for shape in shapes]
-    view = {
+    scales = [_scales(archive, shape) for shape in shapes]
+    frames = [_frame(shape, own, nodes, entries, low, size) for shape, own in zip(shapes, scales, strict=True)]
+    kinds = {kind: scale for own in scales for kind, scale in own.items()}
+    return {
         "frames": frames,
-        "scales": scales,
+        "palettes": {kind: scale.palette for kind, scale in kinds.items()},
+        "names": {kind: scale.caption.split(" in ")[0] for kind, scale in kinds.items()},
         "rods": counts,
         "inks": [FAMILIES[rod.family == "v"] for rod in rods],
         "box": ((cloud.max(axis=0) - low) / size).tolist(),
     }
-    return json.dumps(view, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def viewer_json(data: dict[str, Any]) -> str:
+    """The data as they stand in a page: they cannot end its script element."""
+    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _frame_shape(archive: Archive, name: str) -> Shape:
@@ -60,27 +66,31 @@ def _entries(lengths: list[int]) -> tuple[NDArray[np.intp], list[int]]:
     return np.concatenate(parts).astype(np.intp), [len(part) for part in parts]
 
 
+def _scales(archive: Archive, shape: Shape) -> dict[Colour, Scale]:
+    """What the shape is coloured by; its scales are its own."""
+    kinds: tuple[Colour, ...] = () if shape.flat else ("stress", "gap")
+    found = {colour: scale_of(archive, shape, colour) for colour in kinds}
+    return {colour: scale for colour, scale in found.items() if scale is not None}
+
+
 def _frame(
-    archive: Archive, shape: Shape, nodes: NDArray[np.intp], entries: NDArray[np.intp], low: NDArray[np.float64],
-    size: float, scales: dict[Colour, dict[str, Any]],
+    shape: Shape, scales: dict[Colour, Scale], nodes: NDArray[np.intp], entries: NDArray[np.intp],
+    low: NDArray[np.float64], size: float,
 ) -> dict[str, Any]:  # fmt: skip
     places = np.rint((shape.positions[nodes] - low) / size * STEPS).astype("<u2")
-    frame: dict[str, Any] = {"name": shape.name, "caption": shape.caption, "places": _packed(places)}
-    kinds: tuple[Colour, ...] = ("gap", "stress")
-    for colour in kinds:
-        scale = scale_of(archive, shape, colour)
-        if scale is not None and not shape.flat:
-            frame[colour] = _packed(scale.bins[entries].astype(np.uint8))
-            scales.setdefault(colour, _scale(scale))
-    return frame
+    coloured: dict[str, Any] = {
+        colour: {"bins": _packed(scale.bins[entries].astype(np.uint8)), **_legend(scale)}
+        for colour, scale in scales.items()
+    }
+    return {"name": shape.name, "caption": shape.caption, "places": _packed(places), **coloured}
 
 
-def _scale(scale: Scale) -> dict[str, Any]:
+def _legend(scale: Scale) -> dict[str, Any]:
+    """What stands at the colour bar."""
     ticks = nice_ticks(scale.low, scale.high, 4)
     spread = scale.high - scale.low
     return {
         "caption": scale.caption,
-        "palette": scale.palette,
         "ticks": [[(value - scale.low) / spread, f"{value + 0.0:g}"] for value in ticks],
     }
 

@@ -1,11 +1,13 @@
 """Numbers as they stand in a report, with their units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite, pi
 from typing import Any
 
+from rodshell.output.rounding import FINEST, Rounding
 from rodshell.units import stress_text
 
+EXACT = Rounding(FINEST)
 UNKNOWN = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
@@ -37,15 +39,15 @@ def rounded(value: float, digits: int = 3) -> str:
     return f"{float(text):.0f}" if abs(float(text)) >= 10**digits else text
 
 
-def millimetres(metres: float | None, digits: int = 3) -> str:
-    """A length [m] in mm with about `digits` significant digits, 0.001 mm at the finest."""
+def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXACT) -> str:
+    """A length [m] in mm with about `digits` significant digits, no finer than its rounding."""
     if metres is None or not isfinite(metres):
         return UNKNOWN
     value = 1e3 * metres
-    if value and abs(value) < 1e-3:
-        return "under 0.001 mm"
+    if value and abs(value) < rounding.step:
+        return f"under {rounding.words}"
     whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
-    return f"{value:.{min(max(digits - whole, 0), 3)}f} mm"
+    return f"{value:.{min(max(digits - whole, 0), rounding.digits)}f} mm"
 
 
 def percent(share: float | None) -> str:
@@ -55,6 +57,19 @@ def percent(share: float | None) -> str:
     if abs(share) < 1e-9:
         return "0 %"
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+def share_of_weight(found: Mapping[str, Any]) -> str:
+    """What an entry of `self_weight` says: how much of its own weight a shell bears."""
+    factor, limit = found.get("load_factor"), found.get("limit")
+    if limit == "no mass":
+        return "unknown: no mass was given"
+    if factor is None:
+        return "more than 100 times"
+    if limit == "unstable unloaded":
+        return "none: unstable unloaded"
+    least = "at least " if limit == "not followed" else ""
+    return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
 
 
 def stage(share: float) -> str:
@@ -95,10 +110,10 @@ def small(value: float) -> str:
     return f"{value:.1e}"
 
 
-def place(point: Sequence[float | None]) -> str:
+def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
     """A point (3,) [m] in mm."""
-    known = [round(1e3 * x, 1) + 0.0 for x in point if x is not None]
-    return ", ".join(f"{x:.1f}".replace("-", MINUS) for x in known) + " mm" if len(known) == 3 else UNKNOWN
+    known = [rounding.mm(x).replace("-", MINUS) for x in point if x is not None]
+    return f"{', '.join(known)} mm" if len(known) == 3 else UNKNOWN
 
 
 def yes_or_no(value: object) -> str:

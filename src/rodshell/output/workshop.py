@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.checks import Bending, Checks, JointLoads, Reactions
+from rodshell.checks import Bending, Checks, JointLoads, Reactions, SelfWeight
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 
@@ -53,6 +53,7 @@ def workshop_result(
         "bending": {"shear_strength": shear_strength, **_bending(checks, strength)},
         "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
         "joint_loads": {ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
+        "self_weight": {ends: _self_weight(one) for ends, one in checks.self_weight.items()},
         **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
         "contact": _contact(checks),
         "fabrication": _fabrication(result, mesh, made),
@@ -142,6 +143,10 @@ def _reactions(held: Reactions) -> dict[str, Any]:
     }
 
 
+def _self_weight(weighed: SelfWeight) -> dict[str, Any]:
+    return {"load_factor": weighed.load_factor, "deflection": weighed.deflection, "limit": weighed.limit}
+
+
 def _joint_loads(mesh: GridMesh, loads: JointLoads) -> list[dict[str, Any]]:
     """Of each joint, on its second rod: SI units, angles in degrees."""
     names = [rod.name for rod in mesh.grid.rods]
@@ -176,7 +181,7 @@ def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) ->
         "end_allowance": made.options.end_allowance,
         "stock_length": made.options.stock_length,
         "kerf": made.options.kerf,
-        "total_mass": float(made.mass.sum()),
+        "total_mass": float(made.mass.sum()) + len(joints) * (result.get("joint") or {}).get("mass", 0.0),
         "bracing": [
             {"from": joints[brace.joints[0]], "to": joints[brace.joints[1]], "flat": brace.flat, "final": brace.final}
             for brace in made.bracing

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError
-from rodshell.targets.meshfile import file_bytes
+from rodshell.targets.meshfile import cause, file_bytes, recoded
 
 Floats = NDArray[np.float64]
 
@@ -49,9 +49,10 @@ def _strokes(path: Path, unit: float) -> list[Floats]:
         raise InputError(f"{path}: curves are read from {' or '.join(CURVE_FILES)}")
     try:
         strokes = _of_dxf(path) if path.suffix.lower() == ".dxf" else _of_obj(data)
-    except Exception:  # a damaged file can break a reader anywhere
+    except Exception as reason:  # a damaged file can break a reader anywhere
         raise InputError(
-            f"{path} cannot be read as a drawing of curves: it is damaged or of another format; export it anew"
+            f"{path} cannot be read as a drawing of curves: it is damaged or of another format; export it anew "
+            f"(the reader says: {cause(reason)})"
         ) from None
     return [np.asarray(stroke, dtype=float) * unit for stroke in strokes if len(stroke) > 1]
 
@@ -59,7 +60,7 @@ def _strokes(path: Path, unit: float) -> list[Floats]:
 def _of_obj(data: bytes) -> list[Floats]:
     """The `l` elements of an OBJ."""
     points, lines = list[list[float]](), list[list[int]]()
-    for words in map(str.split, data.decode("utf-8").splitlines()):
+    for words in map(str.split, recoded(data).decode("utf-8").splitlines()):
         if words[:1] == ["v"]:
             points.append([float(word) for word in words[1:4]])
         elif words[:1] == ["l"]:

@@ -1,12 +1,13 @@
 """A grey image as heights; where it has few grey levels, its terraces are smoothed away within one level."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError
-from rodshell.targets.meshfile import file_bytes
+from rodshell.targets.meshfile import MOST_HEIGHTS, cause, file_bytes, require_few_heights
 
 Floats = NDArray[np.float64]
 
@@ -21,20 +22,28 @@ def read_image(path: Path) -> tuple[Floats, float | None]:
 
     Raises
     ------
-    InputError : no such file, damaged.
+    InputError : no such file, damaged, too many pixels (which is known before they are decoded).
     """
+    from PIL import Image
+
     file_bytes(path)
     try:
-        from PIL import Image
-    except ImportError:
-        raise InputError(f"{path}: cannot be read as an image: give a PNG or a CSV") from None
-    try:
-        with Image.open(path) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # there is a lower limit here
+            opened = Image.open(path)
+        with opened as image:
+            require_few_heights(path, image.height, image.width)
             image.load()
             white = 65535.0 if image.mode.startswith("I") else 255.0  # 16 bits or 8
             grey = np.asarray(image if white > 255 else image.convert("F"), dtype=float) / white
+    except InputError:
+        raise
+    except Image.DecompressionBombError:
+        raise InputError(
+            f"{path} has far too many pixels: scale it down to {MOST_HEIGHTS / 1e6:g} million or fewer"
+        ) from None
     except Exception as reason:  # a damaged image can break a reader anywhere
-        raise InputError(f"{path} cannot be read as an image ({str(reason)[:60]}): save it anew") from None
+        raise InputError(f"{path} cannot be read as an image ({cause(reason)}): save it anew") from None
     step = float(np.diff(np.unique(grey)).min(initial=1.0))
     return (smoothed(grey, step), step) if COARSE < step < 1.0 else (grey, None)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError
-from rodshell.targets.meshfile import file_bytes
+from rodshell.targets.meshfile import file_bytes, require_few_heights
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +48,8 @@ def _cells(path: Path) -> list[list[str]]:
         raise InputError(f"{path} is not text in UTF-8: save it as CSV in UTF-8") from None
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     separator = next((mark for mark in ";\t," if lines and mark in lines[0]), None)
+    columns = len(lines[0].split(separator)) if lines else 0
+    require_few_heights(path, len(lines), 1 if columns == POINT else columns)
     rows = [[cell.strip() for cell in line.split(separator)] for line in lines]
     return rows if separator == "," else [[cell.replace(",", ".") for cell in row] for row in rows]
 

@@ -1,5 +1,7 @@
 """Surfaces in files: OBJ, STL, PLY, OFF and glTF, in the unit that the user states."""
 
+import codecs
+import io
 import re
 from collections.abc import Mapping
 from os import PathLike
@@ -10,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError
+from rodshell.targets.trianglemesh import MOST_FACES
 from rodshell.units import shown
 
 Floats = NDArray[np.float64]
@@ -18,9 +21,11 @@ Ints = NDArray[np.intp]
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
 IN_METRES = (".glb", ".gltf")  # by their standard
 LARGEST_FILE = 300e6  # bytes
-SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a rodshell can have
+SMALLEST, LARGEST = 1e-3, 1e3  # m: extents that a gridshell can have
 WHOLE = 0.97  # of the vertices of a sound file belong to faces; of one cut short, fewer
 HEAD = 4000  # bytes in which a header lies
+MOST_HEIGHTS = MOST_FACES // 2
+LONGEST = 120  # characters of a reader's own words
 
 
 def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = None) -> tuple[Floats, Ints]:
@@ -36,8 +41,8 @@ def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = 
     InputError : no such file, damaged or cut short, without a surface, without a unit, of an absurd size.
     """
     path = Path(path)
-    data = file_bytes(path)
-    meshes = _loaded(path)
+    data = _in_utf8(path, file_bytes(path))
+    meshes = _loaded(path, data)
     if not meshes:
         raise InputError(f"{path} holds no faces, or is damaged: export the surface as a mesh of triangles")
     if name is not None:
@@ -48,6 +53,14 @@ def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = 
     if name is None:
         _require_whole(path, data, vertices, faces)
     return in_metres(vertices, faces, unit, path), faces
+
+
+def require_few_heights(path: Path, rows: int, columns: int) -> None:
+    """A lattice of heights becomes two faces for each; asked before more than its extent is read."""
+    if rows * columns > MOST_HEIGHTS:
+        raise InputError(
+            f"{path} has {rows} x {columns} heights: scale it down to {MOST_HEIGHTS / 1e6:g} million or fewer"
+        )
 
 
 def file_bytes(path: Path) -> bytes:
@@ -83,13 +96,36 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
     return vertices * unit
 
 
-def _loaded(path: Path) -> dict[str, Any]:
+def _in_utf8(path: Path, data: bytes) -> bytes:
+    """The content, what is text in it as the reader wants it: names and comments may be written otherwise."""
+    kind = path.suffix.lower()
+    if kind == ".ply":
+        head, end, body = data.partition(b"end_header")
+        return recoded(head) + end + body
+    if kind in (".obj", ".off") or (kind == ".stl" and data[:5].lower() == b"solid" and b"facet" in data[:HEAD]):
+        return recoded(data)
+    return data
+
+
+def recoded(text: bytes) -> bytes:
+    """Text in UTF-8, UTF-16 or a Windows code page as UTF-8."""
+    try:
+        text.decode("utf-8")
+    except UnicodeDecodeError:
+        utf16 = text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        return text.decode("utf-16" if utf16 else "cp1252", "replace").encode("utf-8")
+    return text
+
+
+def _loaded(path: Path, data: bytes) -> dict[str, Any]:
     """The meshes in a file by name, each in its place."""
     import trimesh
 
+    kind = path.suffix[1:].lower()
+    inputs = {"file_obj": str(path)} if kind == "gltf" else {"file_obj": io.BytesIO(data), "file_type": kind}
     try:
         with np.errstate(all="ignore"):  # what is not finite is refused later, with its place
-            scene = trimesh.load_scene(str(path), process=False, skip_materials=True)
+            scene = trimesh.load_scene(**inputs, process=False, skip_materials=True)
             found: dict[str, Any] = {}
             for node in scene.graph.nodes_geometry:
                 transform, geometry = scene.graph[node]
@@ -100,10 +136,17 @@ def _loaded(path: Path) -> dict[str, Any]:
             return found
     except MemoryError:
         raise InputError(f"{path} claims to be larger than the memory: it is damaged; export it anew") from None
-    except Exception:  # a damaged file can break a reader anywhere
+    except Exception as reason:  # a damaged file can break a reader anywhere
         raise InputError(
-            f"{path} cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export it anew"
+            f"{path} cannot be read as {path.suffix[1:].upper()}: it is damaged or of another format; export it anew "
+            f"(the reader says: {cause(reason)})"
         ) from None
+
+
+def cause(reason: Exception) -> str:
+    """What a reader says of a file that it cannot read, in one short line."""
+    said = " ".join(str(reason).split())[:LONGEST]
+    return f"{type(reason).__name__}: {said}" if said else type(reason).__name__
 
 
 def _joined(meshes: list[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:

@@ -8,7 +8,7 @@
   const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
   for (const frame of data.frames) {
     frame.places = new Uint16Array(bytes(frame.places).buffer);
-    for (const kind of Object.keys(data.scales)) if (frame[kind]) frame[kind] = bytes(frame[kind]);
+    for (const kind of Object.keys(data.palettes)) if (frame[kind]) frame[kind].bins = bytes(frame[kind].bins);
   }
   const count = data.frames[0].places.length / 3, first = [], owner = [];
   data.rods.reduce((start, length, rod) => {
@@ -17,7 +17,7 @@
   }, 0);
   const inks = [...new Set(data.inks)], ink = data.inks.map(colour => inks.indexOf(colour));
   const x = new Float32Array(count), y = new Float32Array(count), depth = new Float32Array(count);
-  let azimuth = -1.08, elevation = 0.47, zoom = 1, waiting = false;
+  let azimuth = -1.08, elevation = 0.47, zoom = 1, waiting = false, shown = null;
 
   const mixed = (colour, share) => {
     const channel = k => Math.round(parseInt(colour.slice(k, k + 2), 16) * (1 - share) + [253, 253, 251][(k - 1) / 2] * share);
@@ -43,7 +43,7 @@
     canvas.width = canvas.clientWidth * ratio;
     canvas.height = canvas.clientHeight * ratio;
     project(frame);
-    const scale = data.scales[choice.value], bins = scale && frame[choice.value], palette = bins ? scale.palette : inks;
+    const scale = frame[choice.value], bins = scale && scale.bins, palette = bins ? data.palettes[choice.value] : inks;
     const buckets = Array.from({ length: LAYERS * palette.length }, () => []);
     for (let k = 0; k < first.length; k++) {
       const a = first[k], layer = Math.max(0, Math.min(LAYERS - 1, Math.floor(LAYERS * (depth[a] + depth[a + 1]) / 2)));
@@ -68,15 +68,15 @@
     }
     caption.textContent = frame.caption;
     slider.setAttribute("aria-valuetext", frame.caption);
-    showBar(scale && bins ? scale : null);
+    showBar(scale, palette);
   }
 
-  function showBar(scale) {
+  function showBar(scale, palette) {  // every frame has a scale of its own
     bar.style.visibility = scale ? "visible" : "hidden";
-    if (!scale || bar.dataset.kind === choice.value) return;
-    bar.dataset.kind = choice.value;
-    const step = 100 / scale.palette.length;
-    const stops = scale.palette.map((colour, k) => `${colour} ${k * step}% ${(k + 1) * step}%`);
+    if (!scale || scale === shown) return;
+    shown = scale;
+    const step = 100 / palette.length;
+    const stops = palette.map((colour, k) => `${colour} ${k * step}% ${(k + 1) * step}%`);
     bar.querySelector(".map").style.background = `linear-gradient(90deg, ${stops})`;
     bar.querySelector(".what").textContent = scale.caption;
     bar.querySelector(".ticks").replaceChildren(...scale.ticks.map(([share, text]) => {
