@@ -48,12 +48,17 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
     """The ways up of several shells at the shares that all reached, their `rows`."""
     lost = [one.lost_at for one in ways if one.lost_at is not None]
+    reached = [one.reached_from_flat for one in ways]
+    elsewhere = [one.elsewhere for one in ways if one.elsewhere is not None]
     return Deployment(
         ways[0].share[rows[0]],
         np.concatenate([one.positions[row] for one, row in zip(ways, rows, strict=True)], axis=1),
         (),
-        tuple(sorted({pair for one in ways for pair in one.snaps})),
+        tuple(sorted({snap for one in ways for snap in one.snaps}, key=lambda snap: snap.start)),
         max(lost, default=None),
+        False if False in reached else None if None in reached else True,
+        max(elsewhere, key=lambda one: one.distance, default=None),
+        max((one.guided for one in ways if one.guided is not None), default=None),
     )
 
 

@@ -1,6 +1,7 @@
 """What is kept of checks and fabrication in result.json and states.npz."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -131,7 +132,16 @@ def _deployment(checks: Checks) -> dict[str, Any]:
         {"share": share, "height": float(np.ptp(positions[:, 2])), **_bent([bent], slice(None), None)}
         for share, positions, bent in zip(way.share, way.positions, checks.on_the_way, strict=True)
     ]
-    return {"ends": "pinned", "stages": stages, "snaps": [list(pair) for pair in way.snaps], "lost_at": way.lost_at}
+    return {
+        "ends": "pinned",
+        "stages": stages,
+        "snaps": [[snap.start, snap.stop] for snap in way.snaps],
+        "snapped_by": [snap.moved for snap in way.snaps],
+        "lost_at": way.lost_at,
+        "reached_from_flat": way.reached_from_flat,
+        "elsewhere": None if way.elsewhere is None else asdict(way.elsewhere),
+        "guided": None if way.guided is None else list(way.guided),
+    }
 
 
 def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) -> dict[str, Any]:
