@@ -1,13 +1,14 @@
 """All checks of a popped-up shell in one call."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from rodshell.checks.bending import Bending, bending, bending_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
+from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import Ends
@@ -31,6 +32,7 @@ class Checks:
     ----------
     bending, reactions, joints : by end condition.
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
+    other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
     """
 
     bending: dict[Ends, Bending]
@@ -38,6 +40,7 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None
     on_the_way: tuple[Bending, ...]
+    other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -93,7 +96,7 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, ())
+        return Checks(bent, held, carried, None, (), _others(popped, settled, None))
     last = done["pinned"]
     deployment = deploy(
         last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
@@ -101,7 +104,25 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
     )  # fmt: skip
     flat = bending(last.footprint.mesh, deployment.positions[0], rod)
     on_the_way = (flat, *(bending_of(shell, state, rod) for shell, state in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way)
+    return Checks(bent, held, carried, deployment, on_the_way, _others(popped, settled, deployment))
+
+
+def _others(
+    popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None
+) -> dict[Ends, OtherShapes]:
+    """Other stable shapes, with half of the factorisations that the shells and the deployment took.
+
+    Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
+    """
+    done = sum(one.report.factorizations for one in popped.values())
+    left = (done + (0 if deployment is None else deployment.factorizations)) // 2
+    found = dict[Ends, OtherShapes]()
+    for ends, (shell, at) in settled.items():
+        if at.report.stable:
+            own = deployment if ends == "pinned" else None
+            found[ends] = other_shapes(shell, at, most_factorizations=left if found else 2 * left // 3, deployment=own)
+            left -= 2 * left // 3
+    return found
 
 
 def _worst(bent: Bending) -> float:

@@ -46,10 +46,12 @@ class Elsewhere:
     ----------
     distance : of the farthest node from its final place, over half the shell's width.
     energy : over that of the final shape.
+    positions : (n, 3) of the mesh's nodes [m].
     """
 
     distance: float
     energy: float
+    positions: Floats
 
     @property
     def words(self) -> str:
@@ -72,6 +74,7 @@ class Deployment:
         are driven on straight lines; None where that could not be followed.
     elsewhere : where it comes to rest instead.
     guided : the shares between which it has to be guided off the path that leads elsewhere.
+    factorizations : that it took.
     """
 
     share: Floats
@@ -82,6 +85,7 @@ class Deployment:
     reached_from_flat: bool | None = None
     elsewhere: Elsewhere | None = None
     guided: tuple[float, float] | None = None
+    factorizations: int = 0
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -146,7 +150,8 @@ def deploy(
         down_to = lower.stages[-1][0]  # where it meets the path backwards
     elif not lower.arrived:
         end = lower.stages[-1][1]
-        elsewhere = Elsewhere(path.apart(end, final), path.energy(end) / path.energy(final))
+        ratio = path.energy(end) / path.energy(final)
+        elsewhere = Elsewhere(path.apart(end, final), ratio, shell.positions(end.state))
         guided = max((share for share, _ in lower.stages if share < down_to), default=0.0), down_to
     whole = [*(one for one in lower.stages if one[0] < down_to), *(one for one in upper[::-1] if one[0] >= down_to)]
     found = [one for share, one in whole if share in shares]
@@ -155,7 +160,7 @@ def deploy(
         np.array([path.flat, *(shell.positions(one.state) for one in found)]),
         tuple((shell.with_elements(one.elements), one.state) for one in found),
         tuple(snap for snap in lower.snaps if guided is None or snap.stop <= guided[0]),
-        lost, lower.arrived, elsewhere, guided,
+        lost, lower.arrived, elsewhere, guided, path.factorizations,
     )  # fmt: skip
 
 
@@ -181,11 +186,12 @@ class _Path:
         lying[self._nodes] = self._flat_nodes
         self._first, self._last = lying[shell.ends], last[shell.ends]
         self._length = 0.5 * float(np.ptp(positions, axis=0).max())
+        self.factorizations = 0
 
     def backwards(self, state: Floats, forces: Floats, shares: Sequence[float]) -> list[Stage]:
         """Stages at descending shares, from the final shape at the first of them down to where the path has a gap."""
         self._told(shares[0])
-        final = find_equilibrium(self._problem(shares[0], self.shell.elements), state, forces)
+        final = self._counted(find_equilibrium(self._problem(shares[0], self.shell.elements), state, forces))
         self._pattern, found = final.pattern, [(shares[0], final)]
         if not final.report.stable:
             return found
@@ -222,6 +228,7 @@ class _Path:
         found = follow(
             lambda t: self._problem((1 - t) * start + t * share, elements), here.state, here.forces, first_step=1.0
         )
+        self._counted(found)
         return found if found.report.stable else None
 
     def energy(self, at: Equilibrium) -> float:
@@ -239,12 +246,12 @@ class _Path:
         way = state[self._nodes] - self._flat_nodes
         state[self._nodes] = self._flat_nodes + way * np.array([part, part, np.sqrt(part)])
         problem = self._problem(share, tuple(one.refreshed(state) for one in like[1].elements))
-        found = find_stable(problem, state, part * like[1].forces, cut=True, most_iterations=AT_ONCE)
+        found = self._counted(find_stable(problem, state, part * like[1].forces, cut=True, most_iterations=AT_ONCE))
         if found.report.stable:
             return found
         from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
 
-        return relax(problem, state)
+        return self._counted(relax(problem, state))
 
     def _down(self, here: Equilibrium, start: float, stop: float) -> Equilibrium | None:
         """From one share to a lower one on the same branch; None where that ends."""
@@ -255,7 +262,13 @@ class _Path:
         def problem_at(share: float) -> Problem:
             return self._problem(share, self.shell.elements)
 
-        return trace(problem_at, here, start, stop, shortest=SHORTEST, snap=snap, most_factorizations=most)
+        way = trace(problem_at, here, start, stop, shortest=SHORTEST, snap=snap, most_factorizations=most)
+        self.factorizations += way.factorizations
+        return way
+
+    def _counted(self, found: Equilibrium) -> Equilibrium:
+        self.factorizations += found.report.factorizations
+        return found
 
     def _ahead(self, found: Sequence[Stage], share: float) -> Equilibrium | None:
         """The stage after those `found`, from where they lead; None where that does not lead straight there.
@@ -271,7 +284,7 @@ class _Path:
         state = np.sum([weight * one.state for weight, (_, one) in zip(weights, last, strict=True)], axis=0)
         forces = np.sum([weight * one.forces for weight, (_, one) in zip(weights, last, strict=True)], axis=0)
         before, problem = last[0][1], self._problem(share, last[0][1].elements)
-        there = find_equilibrium(problem, state, forces, most_iterations=EASY)
+        there = self._counted(find_equilibrium(problem, state, forces, most_iterations=EASY))
         self._smooth = there.report.stable  # where one guess leads astray, the next ones do, too
         return there if self._smooth and not unaccounted(problem, before, there) else None
 

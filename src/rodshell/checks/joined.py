@@ -1,13 +1,14 @@
 """The checks of several shells as of one."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from rodshell.checks.check import Checks
 from rodshell.checks.deployment import Deployment
+from rodshell.checks.other_shapes import OtherShapes
 from rodshell.formfinding.popup import Ends
 
 
@@ -15,7 +16,7 @@ from rodshell.formfinding.popup import Ends
 class JoinedChecks(Checks):
     """The checks of several shells, which are `named`, as of one."""
 
-    named: Mapping[str, Checks]
+    named: Mapping[str, Checks] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -33,16 +34,17 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     def each(table: str) -> dict[Ends, Any]:
         return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
 
+    others = {end: _searched([part.other_shapes[end] for part in parts if end in part.other_shapes]) for end in ends}
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), named)
+        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), others, named)
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(
         _stacked([part.on_the_way[row[k]] for part, row in zip(parts, rows, strict=True)]) for k in range(len(shared))
     )
     way = _joined_ways(ways, rows)
-    return JoinedChecks(each("bending"), each("reactions"), each("joints"), way, bent, named)
+    return JoinedChecks(each("bending"), each("reactions"), each("joints"), way, bent, others, named)
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
@@ -59,6 +61,16 @@ def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deplo
         False if False in reached else None if None in reached else True,
         max(elsewhere, key=lambda one: one.distance, default=None),
         max((one.guided for one in ways if one.guided is not None), default=None),
+    )
+
+
+def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
+    """The searches of several shells as one: each found the other shapes of its own shell."""
+    return OtherShapes(
+        sum(one.tried for one in parts),
+        any(one.popped_through for one in parts),
+        max((one.largest_kick for one in parts), default=0.0),
+        tuple(shape for one in parts for shape in one.found),
     )
 
 

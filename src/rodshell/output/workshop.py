@@ -1,13 +1,12 @@
 """What is kept of checks and fabrication in result.json and states.npz."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.checks import Bending, Checks, JointLoads, Reactions
+from rodshell.checks import Bending, Checks, Elsewhere, JointLoads, OtherShape, OtherShapes, Reactions
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 
@@ -46,6 +45,7 @@ def workshop_result(
         "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
         "joint_loads": {ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
         **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
+        "other_shapes": {ends: _other_shapes(one) for ends, one in checks.other_shapes.items()},
         "fabrication": _fabrication(result, mesh, made),
     }
 
@@ -139,9 +139,18 @@ def _deployment(checks: Checks) -> dict[str, Any]:
         "snapped_by": [snap.moved for snap in way.snaps],
         "lost_at": way.lost_at,
         "reached_from_flat": way.reached_from_flat,
-        "elsewhere": None if way.elsewhere is None else asdict(way.elsewhere),
+        "elsewhere": None if way.elsewhere is None else _figures(way.elsewhere),
         "guided": None if way.guided is None else list(way.guided),
     }
+
+
+def _figures(shape: Elsewhere | OtherShape) -> dict[str, Any]:
+    """All that is known of a shape but its positions."""
+    return {key: value for key, value in vars(shape).items() if key != "positions"}
+
+
+def _other_shapes(searched: OtherShapes) -> dict[str, Any]:
+    return {"tried": searched.tried, "searched": searched.searched, "found": [_figures(one) for one in searched.found]}
 
 
 def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) -> dict[str, Any]:
