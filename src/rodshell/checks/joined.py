@@ -61,6 +61,7 @@ def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deplo
         False if False in reached else None if None in reached else True,
         max(elsewhere, key=lambda one: one.distance, default=None),
         max((one.guided for one in ways if one.guided is not None), default=None),
+        sum(one.factorizations for one in ways),
     )
 
 
@@ -71,6 +72,7 @@ def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
         any(one.popped_through for one in parts),
         max((one.largest_kick for one in parts), default=0.0),
         tuple(shape for one in parts for shape in one.found),
+        sum(one.factorizations for one in parts),
     )
 
 

@@ -63,13 +63,17 @@ class OtherShapes:
     Parameters
     ----------
     tried : number of starts.
+    popped_through : whether popping through was among them.
+    largest_kick : over half the shell's width.
     found : each shape once.
+    factorizations : that it took.
     """
 
     tried: int
     popped_through: bool
     largest_kick: float
     found: tuple[OtherShape, ...]
+    factorizations: int = 0
 
     @property
     def searched(self) -> str:
@@ -104,7 +108,7 @@ def other_shapes(
             break
         search.go(start, kick, most)
         kicks.append(kick)
-    return OtherShapes(len(kicks), 0.0 in kicks, max(kicks, default=0.0), tuple(search.shapes))
+    return OtherShapes(len(kicks), 0.0 in kicks, max(kicks, default=0.0), tuple(search.shapes), search.factorizations)
 
 
 class _Search:
