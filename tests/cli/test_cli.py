@@ -37,7 +37,7 @@ class FakeArchive:
         self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
-    def save(self, folder: ResultFolder, kinds: list[str] | None = None, more: dict[str, str] | None = None) -> None:
+    def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
         self.kinds = kinds
         folder.put("case.toml", self.case_toml)
         folder.commit()

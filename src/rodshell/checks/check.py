@@ -12,6 +12,7 @@ from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
+from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
@@ -38,6 +39,7 @@ class Checks:
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
     self_weight : by end condition, what share of its own weight the shell bears.
     contact : by end condition; `contact_on_the_way` of the deployment's stages.
+    out_of_time : a sentence on when that was and which checks are missing, or "".
     """
 
     bending: dict[Ends, Bending]
@@ -48,12 +50,14 @@ class Checks:
     self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
     contact_on_the_way: tuple[Contact, ...] = ()
+    out_of_time: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
-        way = (*way, *unknown_weights(self.self_weight), *self.touching)
+        late = (self.out_of_time,) if self.out_of_time else ()
+        way = (*late, *way, *unknown_weights(self.self_weight), *self.touching)
         bends = [
             float(bent.bending_strain.max())
             for bent in (*self.bending.values(), *self.on_the_way)
@@ -161,22 +165,32 @@ def check(
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     weighed = dict[Ends, SelfWeight]()
-    for ends, pair in settled.items():
-        progress("self-weight", f"{ends} ends", 0.0)
-        weighed[ends] = self_weight(*pair)
-    if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, (), weighed, met)
-    last = done["pinned"]
-    deployment = deploy(
-        last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
-        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
-    )  # fmt: skip
-    mesh, laid = last.footprint.mesh, deployment.positions[0]
+    follow = "pinned" in done and stages > 0
+    try:
+        for ends, pair in settled.items():
+            progress("self-weight", f"{ends} ends", 0.0)
+            weighed[ends] = self_weight(*pair)
+        if not follow:
+            return Checks(bent, held, carried, None, (), weighed, met)
+        deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
+    except OutOfTimeError as late:
+        missing = [f"self-weight with {ends} ends" for ends in settled if ends not in weighed]
+        missing += ["the deployment from flat"] if follow else []
+        said = f"{late}; not checked: {', '.join(missing)}"
+        return Checks(bent, held, carried, None, (), weighed, met, out_of_time=said)
+    mesh, laid = done["pinned"].footprint.mesh, deployment.positions[0]
     flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
     return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way)
+
+
+def _deployed(last: Popped, found: Equilibrium, stages: int, progress: Progress) -> Deployment:
+    return deploy(
+        last.shell, last.state, last.forces, stages=stages, pattern=found.pattern,
+        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+    )  # fmt: skip
 
 
 def _worst(bent: Bending) -> float:

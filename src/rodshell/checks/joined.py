@@ -36,13 +36,16 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     def each(table: str) -> dict[Ends, Any]:
         return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
 
-    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in ends}
+    both = [end for end in ends if all(end in part.self_weight for part in parts)]
+    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in both}
+    late = next((part.out_of_time for part in parts if part.out_of_time), "")
     contacts = {end: joined_contact({name: part.contact[end] for name, part in named.items()}) for end in ends}
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
         return JoinedChecks(
-            each("bending"), each("reactions"), each("joints"), None, (), weighed, contacts, named=named
-        )
+            each("bending"), each("reactions"), each("joints"), None, (), weighed, contacts,
+            out_of_time=late, named=named,
+        )  # fmt: skip
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(

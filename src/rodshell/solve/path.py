@@ -61,8 +61,14 @@ def follow(
                 step *= 1.6
         else:
             step = 0.4 * min(step, there - t)
+        if found.report.status is Status.OUT_OF_TIME:
+            break
         if t < 1.0 and (step < SMALLEST_STEP or sum(one.iterations for one in reports) > MOST_OF_ALL):
             break
     ended = last or found
     report = ended.report.after(*(one for one in reports if one is not ended.report))
-    return replace(ended, report=report if t >= 1.0 else replace(report, status=Status.STALLED))
+    if t >= 1.0:
+        return replace(ended, report=report)
+    late = found.report.status is Status.OUT_OF_TIME
+    status = Status.OUT_OF_TIME if late else Status.STALLED
+    return replace(ended, report=replace(report, status=status, reason=found.report.reason))
