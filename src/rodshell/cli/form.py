@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.search import Search
     from rodshell.layout import GridLayout
     from rodshell.output import Archive
+    from rodshell.output.folder import ResultFolder
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -87,28 +88,34 @@ def run(
     from rodshell.output.archive import ARCHIVE
     from rodshell.output.files import reserved
     from rodshell.output.inputs import kept_case, read_inputs
+    from rodshell.solve.time_series import NAMES
 
     kinds = wanted_kinds(only)
     inputs = read_inputs(case.to_toml())
     copies = kept_case(case.to_toml(), inputs, Path())[1]
     names = [*ARCHIVE, *copies, *reserved(kinds), *([SEARCH] if case.undecided else [])]
+    names += [f"{case.drape.frames}/{name}.npy" for name in NAMES] if case.drape.frames else []
     with output_folder(out, name, names, force=force) as place:
         work = _sew if case.seams.lines else _form
         announce_compilation(quiet=quiet)
         progress = Progress(quiet=quiet)
         with progress:
-            archive, searched = work(case, inputs, limited(progress, limit), quiet=quiet)
+            archive, searched = work(case, inputs, place, limited(progress, limit), quiet=quiet)
         if searched and not (quiet or as_json):
             click.echo(searched.table())
         kept = Kept(archive, kinds, {SEARCH: _picture(searched)} if searched else {})
         return deliver(kept, kept.save, place, progress=progress, as_json=as_json, quiet=quiet)
 
 
-def _form(case: Case, inputs: dict[str, bytes], progress: "Calls", *, quiet: bool) -> "tuple[Archive, Search | None]":
-    """The form of a case, and the search for its anchor and heading."""
+def _form(
+    case: Case, inputs: dict[str, bytes], place: "ResultFolder", progress: "Calls", *, quiet: bool
+) -> "tuple[Archive, Search | None]":
+    """The form of a case, and the search for its anchor and heading; frames are staged in `place`."""
     takeaway = case.takeaway()
     target, layout, rod, options = case.build()
     _announce_sizes(case, target, layout, quiet=quiet)
+    if case.drape.frames:
+        options["fall"] = replace(options["fall"], stream=place.new / case.drape.frames)
     from rodshell.form import find_form
 
     found = None
@@ -123,7 +130,9 @@ def _form(case: Case, inputs: dict[str, bytes], progress: "Calls", *, quiet: boo
     return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), found
 
 
-def _sew(case: Case, inputs: dict[str, bytes], progress: "Calls", *, quiet: bool) -> "tuple[Archive, None]":
+def _sew(
+    case: Case, inputs: dict[str, bytes], place: "ResultFolder", progress: "Calls", *, quiet: bool
+) -> "tuple[Archive, None]":
     """The form of a case with seams."""
     takeaway = case.takeaway()
     target, layout, rod, options = case.build_sewn()
