@@ -30,7 +30,7 @@ class Job:
     name: str
     arguments: tuple[str, ...]
     old: tuple[str, ...] = ("--drawings.project", OLD)
-    new: tuple[str, ...] = ("--drawings.project", NEW, "--layout.offset", "0.1,0.1")
+    new: tuple[str, ...] = ("--drawings.project", NEW, "--spacing", "55mm")
 
 
 SMALL = ("form", "hemisphere", "--rods", "7x7", "--spacing", "60mm", "--edge", "20mm", "--length", "900mm")
