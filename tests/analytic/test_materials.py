@@ -1,5 +1,6 @@
 """Preset materials: what they hold, and that what is given beside them replaces it."""
 
+from pathlib import Path
 from typing import get_args
 
 import pytest
@@ -47,3 +48,15 @@ def test_an_unknown_preset_and_a_material_without_a_modulus_are_refused_in_one_s
         load_case("hemisphere", {"rod.material.preset": "larsh"})
     with pytest.raises(InputError, match=r"rod\.material has no youngs_modulus: give it, or a preset"):
         load_case("heightfield", {"target.formula": "x*y", "rod.material.density": 700.0})
+
+
+def test_the_documentation_lists_every_preset_with_its_numbers() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "files.md").read_text()
+    rows = {row.split("`")[1]: row for row in text.splitlines() if row.startswith("| `")}
+    for name, known in PRESETS.items():
+        cells = [cell.strip() for cell in rows[name].strip("|").split("|")]
+        strengths = (known.bending_strength, known.shear_strength)
+        said = ", ".join(f"{value / 1e6:.4g}" for value in strengths if value is not None) or "not known"
+        assert cells[1] == f"{known.youngs_modulus / 1e9:.4g}"
+        assert float(cells[2]) == pytest.approx(rs.Material.preset(name).shear_modulus / 1e9, rel=1e-3)
+        assert cells[3:] == [f"{known.density:g}", said, known.grade, known.source]

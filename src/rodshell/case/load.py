@@ -35,6 +35,7 @@ BUILT_IN: dict[str, Raw] = {
         "target": {"kind": "paraboloid", "radius": 6.0, "height": 3.0},
         "layout": {"spacing": 0.8},
         "rod": {"section": {"kind": "tube", "radius": 0.021, "thickness": 0.0035}, "material": {"preset": "gfrp"}},
+        "drawings": {"name": "pavilion"},
     },
 }
 """The cases that need no file, but for one named like their target's kind; the schema's defaults give the rest.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.checks.check import Checks
-from rodshell.checks.contact import joined_contact
+from rodshell.checks.contact import Contact, joined_contact
 from rodshell.checks.deployment import Deployment
 from rodshell.checks.self_weight import weakest
 from rodshell.formfinding.popup import Ends
@@ -21,14 +21,22 @@ class JoinedChecks(Checks):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return tuple(f"patch {name}: {word}" for name, one in self.named.items() for word in one.warnings)
+        words = [
+            f"patch {name}: {word}"
+            for name, one in self.named.items()
+            for word in one.warnings
+            if word not in one.touching
+        ]
+        return (*words, *self.touching)
 
 
-def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
+def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> JoinedChecks:
     """Of shells that share nothing: what all were checked for, one after the other.
 
-    The way up has the stages that all were followed through. Each shell bears its own weight by itself, what they
+    The deployment has the stages that all were followed through. Each shell bears its own weight by itself, what they
     share being held as supports are: of all the smallest factor counts.
+
+    contacts : of all final shapes together, by end condition; in a deployment each shell is looked at by itself.
     """
     parts = list(named.values())
     ends = [one for one in parts[0].bending if all(one in part.bending for part in parts)]
@@ -39,11 +47,11 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     both = [end for end in ends if all(end in part.self_weight for part in parts)]
     weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in both}
     late = next((part.out_of_time for part in parts if part.out_of_time), "")
-    contacts = {end: joined_contact({name: part.contact[end] for name, part in named.items()}) for end in ends}
+    contact = {end: contacts[end] for end in ends}
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
         return JoinedChecks(
-            each("bending"), each("reactions"), each("joints"), None, (), weighed, contacts,
+            each("bending"), each("reactions"), each("joints"), None, (), weighed, contact,
             out_of_time=late, named=named,
         )  # fmt: skip
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
@@ -57,7 +65,7 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     }
     met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
     return JoinedChecks(
-        each("bending"), each("reactions"), each("joints"), way, bent, weighed, contacts, met, named=named
+        each("bending"), each("reactions"), each("joints"), way, bent, weighed, contact, met, named=named
     )
 
 

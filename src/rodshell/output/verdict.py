@@ -245,9 +245,6 @@ def _merits(result: Result, usable: list[str]) -> Iterator[str]:
         else ""
     )
     yield f"with {' and '.join(usable)} ends the shell is stable and bears {weight} times its own weight{near}"
-    used = utilisation(result)
-    if used is not None:
-        yield f"the rods use {percent(used)} of their strength at most, deployment included"
     yield "no other load than its own weight was checked: neither snow, wind nor people"
 
 

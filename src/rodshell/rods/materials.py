@@ -80,7 +80,7 @@ PRESETS: dict[PresetName, Preset] = {
         1850.0,  # E-glass and polyester, 55 to 65 % of glass by mass: 1750 to 1950
         240e6, 25e6,  # EN 13706-3, E23: axial flexural strength, interlaminar shear strength, at least
         "pultruded profile, class E23",
-        "characteristic, short-term: reduce for duration, moisture and temperature",
+        MOISTURE,
         "EN 13706-3:2002, E23, minimum properties; shear modulus and density typical of pultruders' design manuals",
     ),
     "plywood": Preset(
