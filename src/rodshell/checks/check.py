@@ -1,6 +1,6 @@
 """All checks of a popped-up shell in one call."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import inf
 
@@ -21,6 +21,7 @@ from rodshell.model import Shell
 from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
+from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import length_text, stress_text
@@ -168,8 +169,7 @@ def check(
     follow = "pinned" in done and stages > 0
     try:
         for ends, pair in settled.items():
-            progress("self-weight", f"{ends} ends", 0.0)
-            weighed[ends] = self_weight(*pair)
+            weighed[ends] = self_weight(*pair, progress=_weighing(ends, progress))
         if not follow:
             return Checks(bent, held, carried, None, (), weighed, met)
         deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
@@ -184,6 +184,14 @@ def check(
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
     return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way)
+
+
+def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
+    def told(count: int, factor: float) -> None:
+        done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
+        progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
+
+    return told
 
 
 def _deployed(last: Popped, found: Equilibrium, stages: int, progress: Progress) -> Deployment:
