@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from rodshell.cli.progress import Progress
+from rodshell.output import open_folder
 from rodshell.paper import FIGURES
 
 HERE = Path(__file__).parent
@@ -48,7 +49,9 @@ def section(name: str, folder: Path) -> str:
 def main() -> None:
     with Progress(quiet=False) as progress:
         for name in sys.argv[1:] or FIGURES:
-            import_module(f"rodshell.paper.{name}").make(progress).save(HERE / "paper" / name)
+            figure = import_module(f"rodshell.paper.{name}").make(progress)
+            with open_folder(HERE / "paper" / name, force=True) as place:  # git keeps what was there
+                figure.save(place)
     made = [name for name in FIGURES if (HERE / "paper" / name / "table.txt").exists()]
     page = "\n".join([HEAD, *(section(name, HERE / "paper" / name) for name in made)])
     (HERE / "paper.md").write_text(page, encoding="utf-8")

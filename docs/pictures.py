@@ -10,10 +10,10 @@ FOLDER = Path(__file__).parent / "pictures"
 
 
 def main() -> None:
-    target, layout, rod, options = load_case("hemisphere").build()
+    target, layout, rod, options = load_case("pavilion").build()
     archive = find_form(target, layout, rod, **options).archive()
-    for name, state in (("flat", "flat"), ("clamped", "popped_clamped")):
-        (FOLDER / f"hemisphere-{name}.svg").write_text(picture_svg(archive, state), encoding="utf-8")
+    (FOLDER / "pavilion-flat.svg").write_text(picture_svg(archive, "flat"), encoding="utf-8")
+    (FOLDER / "pavilion-pinned.svg").write_text(picture_svg(archive, "popped_pinned", "stress"), encoding="utf-8")
 
 
 if __name__ == "__main__":

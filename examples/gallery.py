@@ -1,7 +1,8 @@
-"""Ten targets, each formed, popped up, and held against its figures: formulas, meshes and a Rhino file.
+"""Twelve shells of some metres, with rods as they are sold, each formed, popped up, and held against its figures.
 
-`python examples/gallery.py NAME ...` forms some of them and keeps the results in out/NAME; without names all
-are formed and nothing is kept.
+Their targets are formulas, meshes and a Rhino file. `python examples/gallery.py NAME ...` forms some of them ("all":
+each), checks them, prints their verdicts and keeps the results in out/NAME; without names all are formed and nothing is
+kept.
 """
 
 import sys
@@ -10,17 +11,24 @@ from math import degrees, pi
 from pathlib import Path
 
 import rodshell as rs
+from rodshell.output.verdict import verdict
 
 DATA = Path(__file__).parent / "data"
 MM = 1e-3  # m
-LATH = rs.Rod(rs.Circle(radius=0.01), rs.Material(youngs_modulus=30e9, density=1900.0, poisson_ratio=0.3))
+GFRP, LARCH = rs.Material.preset("gfrp"), rs.Material.preset("larch")
+
+
+def tube(diameter: float, wall: float) -> rs.Rod:
+    """A pultruded tube [mm]."""
+    return rs.Rod(rs.Tube(radius=diameter / 2 * MM, thickness=wall * MM), GFRP)
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A target and how it is gridded; the largest gaps, rms over the size, that its pop-ups may leave."""
+    """A target, its rods and how it is gridded; the largest gaps, rms over the size, that its pop-ups may leave."""
 
     target: rs.Target
+    rod: rs.Rod
     spacing: float
     pinned: float
     clamped: float
@@ -31,29 +39,37 @@ class Piece:
         return rs.GridLayout.orthogonal(spacing=self.spacing, edge=self.spacing / 4, rotate=self.rotate)
 
     def form(self) -> rs.Form:
-        return rs.find_form(self.target, self.layout(), LATH, anchor=self.anchor)
+        return rs.find_form(self.target, self.layout(), self.rod, anchor=self.anchor)
 
 
 def gallery() -> dict[str, Piece]:
-    """The ten by name, one of them in two formats. On bumps, ridges and cusps the free grid springs off."""
+    """The twelve by name, one of them in two formats. On bumps, ridges and cusps the free grid springs off."""
     disc = rs.Disc(5.0)
     vault = rs.HeightField(formula="4*cos(0.28*x)", domain=rs.Rectangle((9.0, 12.0)))
     bumps = "2.2*exp(-((x - 2.2)^2 + y^2)/4.5) + 1.8*exp(-((x + 2.2)^2 + y^2)/4.5)"
     ridge = "2 - 0.03*x^2 - 0.04*y^2 + 0.02*x*y + 0.9*exp(-(0.88*x + 0.48*y)^2/16 - (0.88*y - 0.48*x)^2/2.5)"
+    lath = rs.Rod(rs.RectangularSection(width=15 * MM, height=40 * MM), LARCH)
     return {
-        "dome": Piece(rs.Hemisphere(radius=5.0), 0.8, 0.0105, 0.0001),
-        "barrel vault": Piece(vault, 0.9, 0.007, 0.003, rotate=pi / 4),
-        "saddle": Piece(rs.HeightField(formula="(x^2 - y^2)/16", domain=disc), 0.8, 0.0004, 0.0001),
-        "monkey saddle": Piece(rs.HeightField(formula="(x^3 - 3*x*y^2)/90", domain=disc), 0.8, 0.0025, 0.0005),
-        "two bumps": Piece(rs.HeightField(formula=bumps, domain=disc), 0.8, 0.032, 0.031),
-        "freeform, OBJ": Piece(rs.surface_from(DATA / "freeform.obj", unit=MM), 0.9, 0.0012, 0.0009),
-        "freeform, 3dm": Piece(rs.surface_from(DATA / "freeform.3dm"), 0.9, 0.0012, 0.0009),
-        "ball below its equator": Piece(rs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), 0.6, 0.0145, 0.0003),
-        "torus": Piece(rs.surface_from(DATA / "torus.obj", unit=MM), 0.7, 0.002, 0.0002),
-        "tent with an oculus": Piece(
-            rs.surface_from(DATA / "tent.obj", unit=MM), 0.6, 0.002, 0.0015, anchor=(0.0, 0.0)
+        "garden pavilion": Piece(rs.Paraboloid(radius=4.5, height=1.8), lath, 0.6, 0.003, 0.0001),
+        "dome": Piece(rs.Hemisphere(radius=5.0), tube(25, 3), 0.8, 0.0105, 0.0001),
+        "barrel vault": Piece(vault, tube(38, 3.5), 0.9, 0.007, 0.003, rotate=pi / 4),
+        "saddle": Piece(rs.HeightField(formula="(x^2 - y^2)/16", domain=disc), tube(25, 3), 0.8, 0.0004, 0.0001),
+        "monkey saddle": Piece(
+            rs.HeightField(formula="(x^3 - 3*x*y^2)/90", domain=disc), tube(12, 2), 0.8, 0.0025, 0.0005
         ),
-        "ridge": Piece(rs.HeightField(formula=ridge, domain=rs.Rectangle((10.0, 10.0))), 0.9, 0.021, 0.013),
+        "two bumps": Piece(rs.HeightField(formula=bumps, domain=disc), tube(16, 2.5), 0.8, 0.032, 0.031),
+        "freeform, OBJ": Piece(rs.surface_from(DATA / "freeform.obj", unit=MM), tube(20, 2.5), 0.9, 0.0012, 0.0009),
+        "freeform, 3dm": Piece(rs.surface_from(DATA / "freeform.3dm"), tube(20, 2.5), 0.9, 0.0012, 0.0009),
+        "ball below its equator": Piece(
+            rs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), tube(16, 2.5), 0.6, 0.0145, 0.0003
+        ),
+        "torus": Piece(rs.surface_from(DATA / "torus.obj", unit=MM), tube(16, 2.5), 0.7, 0.002, 0.0002),
+        "tent with an oculus": Piece(
+            rs.surface_from(DATA / "tent.obj", unit=MM), tube(12, 2), 0.6, 0.002, 0.0015, anchor=(0.0, 0.0)
+        ),
+        "ridge": Piece(
+            rs.HeightField(formula=ridge, domain=rs.Rectangle((10.0, 10.0))), tube(16, 2.5), 0.9, 0.021, 0.013
+        ),
     }
 
 
@@ -70,13 +86,17 @@ def check(name: str, piece: Piece) -> rs.Form:
 
 
 if __name__ == "__main__":
+    asked = sys.argv[1:]
     for name, piece in gallery().items():
-        if len(sys.argv) > 1 and name not in sys.argv[1:]:
+        if asked and not {name, "all"} & set(asked):
             continue
         form = check(name, piece)
         gaps = ", ".join(f"{ends} {100 * form.agreement[ends].rms_relative:.3f} %" for ends in form.popped)
         print(
             f"{name}: {len(form.footprint.rods)} rods, angle {degrees(form.draped.min_angle):.0f} deg, gap rms {gaps}"
         )
-        if len(sys.argv) > 1:
-            form.save(Path("out") / name.replace(" ", "-").replace(",", ""))
+        if asked:
+            archive = form.archive()
+            found = verdict(archive)
+            print(f"  {found.level}: {found.headline}")
+            archive.save(Path("out") / name.replace(" ", "-").replace(",", ""))

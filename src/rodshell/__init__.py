@@ -15,6 +15,10 @@ Names are imported when they are first used, so that the command line starts at 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from rodshell.uncached import allow_uncached
+
+allow_uncached()
+
 if TYPE_CHECKING:
     from rodshell.errors import (
         ConvergenceError,
@@ -58,7 +62,8 @@ if TYPE_CHECKING:
     from rodshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
     from rodshell.output.archive import Archive, read
     from rodshell.output.takeaway import DrawingStyle, Takeaway
-    from rodshell.rods.section import Circle, Ellipse, GivenSection, Material, RectangularSection, Rod, Tube
+    from rodshell.rods.materials import Material
+    from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
     from rodshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.rod_statics import RodShape, solve_rod
@@ -98,9 +103,8 @@ _HOMES = {
     "rodshell.model.elastic_rod": ("ElasticRod", "RodStrains"),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net", "sphere_net_end", "sphere_net_rod"),
-    "rodshell.rods.section": (
-        "Circle", "Ellipse", "GivenSection", "Material", "RectangularSection", "Rod", "Tube",
-    ),
+    "rodshell.rods.materials": ("Material",),
+    "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.output.archive": ("Archive", "read"),
     "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
     "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),

@@ -1,7 +1,8 @@
 """The front door: from a target to a form in one call, and what can be done with it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,43 +16,67 @@ from rodshell.checks.joined import joined_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import fabricate
 from rodshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
-from rodshell.formfinding.drape import Method, require
+from rodshell.formfinding.drape import Method
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
-from rodshell.joints import Joint
+from rodshell.joints import Ball, Joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output import Archive
+from rodshell.output.inputs import read_inputs
 from rodshell.output.result import States, form_result, form_states, table_result, table_states
 from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
-from rodshell.output.summary import summary_text
 from rodshell.output.takeaway import Takeaway
+from rodshell.output.verdict import Verdict, verdict
 from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.targets.seam import Seam
+from rodshell.validation import instance
 
 FOUND = "a form that an earlier rodshell.find_form returned (one read from a folder: run its case.toml again)"
 LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
 
 
-class Form(FoundForm):
+class _Judged:
+    """A job's result with its checks, made once with the usual options, and what they come to."""
+
+    @cached_property
+    def _checked(self) -> Archive:
+        return self.archive()  # type: ignore[attr-defined]
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the result is worth, all checks done: good, check or unbuildable, with the reasons.
+
+        For a strength or other options of the checks: `archive(takeaway=...).verdict`.
+        """
+        return self._checked.verdict
+
+    def summary(self) -> str:
+        """One screen of text, all checks done."""
+        return self._checked.summary()
+
+
+class Form(_Judged, FoundForm):
     """A form that was found: its stages, and its files."""
 
     def result(self) -> dict[str, Any]:
         """The content of result.json before anything was checked."""
         return form_result(self)
 
-    def summary(self) -> str:
-        """One screen of text."""
-        return summary_text(self.result())
-
     def archive(
-        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+        self,
+        case_toml: str | None = None,
+        *,
+        takeaway: Takeaway | None = None,
+        inputs: Mapping[str, bytes] | None = None,
+        progress: Progress = silent,
     ) -> Archive:
         """Everything that is kept, checked and made ready to be built.
 
         case_toml : the input it came from, by default one made from the objects.
+        inputs : contents of the files that it names, by their path in it; default: as they are now.
         """
         takeaway = takeaway or Takeaway()
         if case_toml is None:
@@ -61,89 +86,128 @@ class Form(FoundForm):
                 method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
                 fall=draped.fall, takeaway=takeaway,
             )  # fmt: skip
-        return _archive(self, form_states(self), case_toml, takeaway, progress)
+        return _archive(self, form_states(self), case_toml, takeaway, progress, inputs)
 
     def save(
-        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+        self,
+        folder: str | PathLike[str],
+        *,
+        case_toml: str | None = None,
+        takeaway: Takeaway | None = None,
+        kinds: Iterable[str] | None = None,
+        force: bool = False,
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
+        kinds : of files beside the archive, such as "dxf", "csv"; default: all that every installation can.
+        force : also replace files that rodshell did not write, or that were changed since, where it has to write.
+
         Raises
         ------
-        OutputError : the folder cannot be written, or holds something else.
+        OutputError : the folder cannot be written, or such files are there and `force` is False.
         """
-        return self.archive(case_toml, takeaway=takeaway).save(folder)
+        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
 
 
-class PoppedUp(PoppedTable):
+class PoppedUp(_Judged, PoppedTable):
     """A table of rods that was popped up, and its files."""
 
     def result(self) -> dict[str, Any]:
         """The content of result.json before anything was checked."""
         return table_result(self, "popup")
 
-    def summary(self) -> str:
-        """One screen of text."""
-        return summary_text(self.result())
-
     def archive(self, *, takeaway: Takeaway | None = None, progress: Progress = silent) -> Archive:
         """Everything that is kept, checked and made ready to be built."""
         return _archive(self, table_states(self), "", takeaway or Takeaway(), progress)
 
-    def save(self, folder: str | PathLike[str], *, takeaway: Takeaway | None = None) -> Path:
-        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return self.archive(takeaway=takeaway).save(folder)
+    def save(
+        self,
+        folder: str | PathLike[str],
+        *,
+        takeaway: Takeaway | None = None,
+        kinds: Iterable[str] | None = None,
+        force: bool = False,
+    ) -> Path:
+        """As `Form.save`."""
+        return self.archive(takeaway=takeaway).save(folder, kinds, force=force)
 
 
-class Sewn(SewnForm):
+class Sewn(_Judged, SewnForm):
     """A form in patches that are sewn together, and its files."""
 
     def result(self) -> dict[str, Any]:
         """The content of result.json before anything was checked."""
         return sewn_result(self)
 
-    def summary(self) -> str:
-        """One screen of text."""
-        return summary_text(self.result())
-
     def archive(
-        self, case_toml: str | None = None, *, takeaway: Takeaway | None = None, progress: Progress = silent
+        self,
+        case_toml: str | None = None,
+        *,
+        takeaway: Takeaway | None = None,
+        inputs: Mapping[str, bytes] | None = None,
+        progress: Progress = silent,
     ) -> Archive:
-        """All patches as one: everything that is kept, checked and made ready to be built."""
+        """All patches as one: everything that is kept, checked and made ready to be built; see `Form.archive`."""
         takeaway = takeaway or Takeaway()
         if case_toml is None:
             case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+        takeaway.require_known_stress(self.rod, self.joint)
+        weight = takeaway.judged_by(self.rod).shear_weight
         checks = joined_checks(
-            {k: check(one.popped, self.rod, stages=takeaway.stages, progress=progress) for k, one in self.found.items()}
-        )
+            {
+                name: check(
+                    one.popped, self.rod,
+                    stages=takeaway.stages, shear_weight=weight, progress=progress,
+                )
+                for name, one in self.found.items()
+            }
+        )  # fmt: skip
         result = with_seam_forces(self.result(), self, checks)
         shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
-        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway)
+        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway, inputs)
 
     def save(
-        self, folder: str | PathLike[str], *, case_toml: str | None = None, takeaway: Takeaway | None = None
+        self,
+        folder: str | PathLike[str],
+        *,
+        case_toml: str | None = None,
+        takeaway: Takeaway | None = None,
+        kinds: Iterable[str] | None = None,
+        force: bool = False,
     ) -> Path:
-        """Write archive, drawings, schedules, models and report; the folder's absolute path."""
-        return self.archive(case_toml, takeaway=takeaway).save(folder)
+        """As `Form.save`."""
+        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
 
 
-def _archive(job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress) -> Archive:
+def _archive(
+    job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress,
+    inputs: Mapping[str, bytes] | None = None,
+) -> Archive:  # fmt: skip
     """A job's result and states with its checks and its fabrication."""
-    checks = check(job.popped, job.rod, stages=takeaway.stages, progress=progress)
+    takeaway.require_known_stress(job.rod, job.joint if isinstance(job, Form) else Ball())
+    weight = takeaway.judged_by(job.rod).shear_weight
+    checks = check(job.popped, job.rod, stages=takeaway.stages, shear_weight=weight, progress=progress)
     shapes = {ends: shell.positions for ends, shell in job.popped.items()}
-    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway)
+    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway, inputs)
 
 
 def _kept(
     job: Form | PoppedUp | Sewn, result: dict[str, Any], states: States, checks: Checks, shapes: Mapping[Ends, Any],
-    case_toml: str, takeaway: Takeaway,
+    case_toml: str, takeaway: Takeaway, inputs: Mapping[str, bytes] | None,
 ) -> Archive:  # fmt: skip
     mesh = job.footprint.mesh
     final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
     made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    result = workshop_result(result, mesh, checks, made, takeaway.strength)
+    judged = takeaway.judged_by(job.rod)
+    result = workshop_result(result, mesh, checks, made, judged.strength, judged.shear_strength)
+    result["bending"]["strength_of"] = judged.strength_of
+    if takeaway.rod_chosen:
+        result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
     result["drawings"] = takeaway.drawings.parameters()
-    return Archive(result, states | workshop_states(checks), case_toml).as_stored()
+    result["name"] = takeaway.drawings.name or result["name"]
+    result["verdict"] = verdict(result).table()
+    kept = read_inputs(case_toml) if inputs is None else inputs
+    return Archive(result, states | workshop_states(checks), case_toml, kept).as_stored()
 
 
 def find_form(
@@ -153,10 +217,10 @@ def find_form(
     *,
     method: Method = "bound",
     anchor: tuple[float, float] | None = None,
-    gravity: float = 9.81,
+    gravity: float | None = None,
     joint: Joint | None = None,
     fall: Fall | None = None,
-    ends: Sequence[Ends] = ("pinned", "clamped"),
+    ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
     start: FoundForm | None = None,
     progress: Progress = silent,
 ) -> Form:
@@ -170,7 +234,7 @@ def find_form(
     method, anchor, gravity : of the drape, see `drape`.
     joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
     fall : of method "paper", see `drape`.
-    ends : end conditions of the pop-up.
+    ends : end conditions of the pop-up: "pinned", "clamped", or both in a tuple.
     start : a form found before, for a spacing, heading, anchor or target that has changed a little: its net is where
         the new net is looked for (method "bound"), and where its shells went from their draped states is where the new
         ones start, rods being matched by their place in the lattice. Any form will do; what does not help is
@@ -187,9 +251,9 @@ def find_form(
     InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
     """
     for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
-        require(name, value, kind)
+        instance(name, value, kind)
     if start is not None:
-        require("start", start, FoundForm, FOUND)
+        instance("start", start, FoundForm, FOUND)
     found = find_stages(
         target, layout, rod,
         method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,
@@ -206,7 +270,7 @@ def sew(
     *,
     own: Mapping[str, PatchLayout] | None = None,
     joint: Joint | None = None,
-    ends: Sequence[Ends] = ("pinned", "clamped"),
+    ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
     search: bool = False,
     progress: Progress = silent,
 ) -> Sewn:
@@ -226,7 +290,7 @@ def sew(
     InputError : a value does not fit. NetLimitError : no net covers a patch from its anchor and heading.
     """
     for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
-        require(name, value, kind)
+        instance(name, value, kind)
     found = find_sewn_stages(
         target, [Seam.of(row) for row in seams], layout, rod,
         own=own, joint=joint, ends=ends, search=search, progress=progress,

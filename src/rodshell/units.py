@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
-from math import fmod, inf, isfinite, tau
+from math import floor, fmod, inf, isfinite, log10, tau
 from numbers import Real
 from typing import Literal
 
@@ -20,6 +20,7 @@ Kind = Literal[
     "rotational stiffness",
     "force",
     "bending stiffness",
+    "section modulus",
     "mass per length",
     "inertia per length",
     "time",
@@ -98,6 +99,7 @@ _KINDS: dict[Kind, _Units] = {
         '"2.5 kN m2"',
         _factors("1 Nm2", "1000 kNm2", "1e6 MNm2", "0.000001 Nmm2", "0.001 kNmm2", "1e-4 Ncm2", "0.1 kNcm2"),
     ),
+    "section modulus": _Units("a section modulus", '"1.2 cm3"', _factors("1 m3", "0.000001 cm3", "1e-9 mm3")),
     "mass per length": _Units("a mass per length", '"1.2 kg/m"', _factors("1 kg/m", "0.001 g/m", "1 g/mm")),
     "inertia per length": _Units("an inertia per length", '"0.001 kg m"', _factors("1 kgm", "0.001 gm", "0.001 kgmm")),
     "number": _Units("a plain number", "0.5", {}),
@@ -205,10 +207,25 @@ def shown(value: object) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
+def rounded_down(length: float) -> float:
+    """The nearest length below of 1, 1.5, 2, 3, 5 or 7 times a power of ten [m]."""
+    decade = 10.0 ** floor(log10(length))
+    return max(decade * step for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if decade * step <= length * (1 + 1e-9))
+
+
 def length_text(metres: float) -> str:
     """A length in the unit that reads well: 83.3 mm, 20 m."""
     in_mm = metres < 0.9995
     return f"{float(f'{1e3 * metres if in_mm else metres:.3g}'):g} {'mm' if in_mm else 'm'}"
+
+
+PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
+
+
+def stress_text(pascals: float) -> str:
+    """A stress in the unit that reads well: 14.4 MPa, 83 kPa."""
+    size, name = next((one for one in PRESSURES if abs(pascals) >= one[0]), PRESSURES[-1])
+    return f"{float(f'{pascals / size:.3g}'):g} {name}"
 
 
 def _plain(value: Real) -> float:

@@ -517,7 +517,9 @@ def test_interrupted_motion_keeps_what_was_finished(tmp_path, streamed):
             raise KeyboardInterrupt
 
     stream = tmp_path / "swing" if streamed else None
-    series = swing(progress=stop, stream=stream)
+    with pytest.raises(KeyboardInterrupt):
+        swing(progress=stop)
+    series = swing(progress=stop, stream=stream, interruptible=True)
     whole = swing()
     assert series.report.end is End.INTERRUPTED
     assert series.times[-1] == pytest.approx(0.2)

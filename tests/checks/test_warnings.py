@@ -26,7 +26,7 @@ def checks(final: dict[str, float], way: list[float]) -> Checks:
     """Of shells whose rods lie on circles: in their final shapes, and at equal stages of the way up."""
     share = np.linspace(0, 1, len(way))
     deployment = Deployment(share, np.zeros((len(way), MESH.node_count, 3)), ()) if way else None
-    return Checks({ends: bent(radius) for ends, radius in final.items()}, {}, {}, deployment, tuple(map(bent, way)))  # type: ignore[misc]
+    return Checks({ends: bent(radius) for ends, radius in final.items()}, {}, {}, deployment, tuple(map(bent, way)), {})  # type: ignore[misc]
 
 
 def test_rods_break_by_their_thickness_over_the_radius() -> None:
@@ -81,4 +81,4 @@ def test_a_stretched_rod_is_not_a_thick_one() -> None:
     assert shell.strain is not None
     axial = np.full_like(shell.axial_strain, -0.2)
     drawn = replace(shell, axial_strain=axial, strain=shell.strain + 0.2)
-    assert Checks({"pinned": drawn}, {}, {}, None, ()).warnings == ()
+    assert Checks({"pinned": drawn}, {}, {}, None, (), {}).warnings == ()

@@ -77,15 +77,16 @@ def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, obje
 
 
 def test_what_a_file_leaves_out_is_the_default_but_counts_and_lengths_are_auto(load: Any) -> None:
-    lengths = dict.fromkeys(("layout.spacing", "layout.edge", "rod.section.radius"), "auto")
-    automatic = {"layout.rods": "auto", "layout.length": "auto", **lengths}
-    assert load("") == load_case("hemisphere", automatic)
+    automatic = dict.fromkeys(("layout.rods", "layout.length", "layout.spacing", "layout.edge"), "auto")
+    asked, without = load(""), {"rod": None}
+    assert asked.model_copy(update=without) == load_case("hemisphere", automatic).model_copy(update=without)
+    assert asked.rod.left_open == ("material", "section")
 
 
 @pytest.mark.parametrize("size", [0.2, 6.0, 150.0])
 def test_lengths_left_out_grow_with_the_target(load: Any, size: float) -> None:
     """So every scale has the same net: the spacing is a round length, and all else follows it or the size."""
-    text = f'target = {{ kind = "heightfield", formula = "0", radius = {size} }}'
+    text = f'target = {{ kind = "heightfield", formula = "0", radius = {size} }}\nrod.material.preset = "rubber"'
     _, layout, rod, _ = load(text).build()
     assert size / 12 < layout.spacing[0] <= size / 8  # rounded down to 1, 1.5, 2, 3, 5 or 7 times a power of ten
     assert layout.edge == layout.spacing[0] / 6
@@ -180,7 +181,7 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ("target.radus = 1", "unknown key target.radus: did you mean target.radius?"),
         ("radius = 1", "unknown key radius: did you mean target.radius?"),
         ("layot.rods = [3, 3]", "unknown key layot: did you mean layout?"),
-        ("rod.material.E = 1", "unknown key rod.material.E: [rod.material] has youngs_modulus,"),
+        ("rod.material.E = 1", "unknown key rod.material.E: [rod.material] has preset, youngs_modulus,"),
         ("xyzzy = 1", "the tables are target, layout, rod, joint, drape, pop_up"),
         ("target.base = 1", 'kind "hemisphere" has no base: leave it out, or set target.kind to "cap"'),
         ("rod.section.thickness = 1", 'kind "circle" has no thickness'),

@@ -12,14 +12,17 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
+import rodshell as rs
 from rodshell.case import case_keys, load_case
 from rodshell.cli import main
 from rodshell.cli.options import ALIASES
 from rodshell.cli.rodends import COLUMNS
 from rodshell.errors import NetLimitError
+from rodshell.output.folder import ResultFolder
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -29,25 +32,26 @@ CROSS = [
 
 
 class FakeArchive:
-    def __init__(self, status: str, case_toml: str) -> None:
-        self.result = {"format": "rodshell-result", "status": status}
+    def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
+        verdict = {"level": level, "reasons": ["the rods touch"]}
+        self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
-    def save(self, folder: Path, kinds: list[str] | None = None) -> None:
+    def save(self, folder: ResultFolder, kinds: list[str] | None = None, more: dict[str, str] | None = None) -> None:
         self.kinds = kinds
-        folder.mkdir(parents=True)
-        (folder / "case.toml").write_text(self.case_toml)
+        folder.put("case.toml", self.case_toml)
+        folder.commit()
 
     def summary(self) -> str:
         return "agreement 0.01 mm"
 
 
 class FakeForm:
-    def __init__(self, status: str) -> None:
-        self.status = status
+    def __init__(self, status: str, level: str) -> None:
+        self.status, self.level = status, level
 
     def archive(self, case_toml: str = "", **options: Any) -> FakeArchive:
-        return FakeArchive(self.status, case_toml)
+        return FakeArchive(self.status, case_toml, self.level)
 
 
 class FakeFinder(ModuleType):
@@ -56,7 +60,7 @@ class FakeFinder(ModuleType):
     def __init__(self) -> None:
         super().__init__("rodshell.form")
         self.calls = list[tuple[tuple[Any, ...], dict[str, Any]]]()
-        self.status = "converged"
+        self.status, self.level = "converged", "good"
         self.fault: BaseException | None = None
 
     def find_form(self, *args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
@@ -65,7 +69,7 @@ class FakeFinder(ModuleType):
             progress(stage, f"iteration {iteration}", 1e-3)
         if self.fault:
             raise self.fault
-        return FakeForm(self.status)
+        return FakeForm(self.status, self.level)
 
     pop_up_table = find_form
 
@@ -115,10 +119,10 @@ def test_form_asks_for_the_case_and_saves_its_full_input(
 
 
 def test_a_case_file_is_run_into_out_and_its_name(finder: FakeFinder) -> None:
-    Path("shell.toml").write_text("target.radius = '1 m'")
+    Path("shell.toml").write_text("target.radius = '1 m'\nrod.section.radius = '5 mm'\nrod.material.preset = 'gfrp'")
     assert main(["form", "shell.toml"]) == 0
     asked = load_case("shell.toml")
-    assert load_case("out/shell/case.toml") == asked.sized(asked.target.build())
+    assert load_case("out/shell/case.toml") == asked.with_rod(asked.build().rod)
 
 
 def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
@@ -135,7 +139,8 @@ def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
         assert f"--{key}, {alias} " in shown
 
 
-ANY_WORDS = ("drawings.layers.", "drawings.project", "drawings.revision", "drape.frames")
+DRAWN = ("layers.", "project", "revision", "name", "author", "date")
+ANY_WORDS = (*(f"drawings.{key}" for key in DRAWN), "drape.frames")
 WORDS = [key for key in case_keys() if key.startswith(ANY_WORDS)]
 
 
@@ -204,9 +209,9 @@ def test_an_output_folder_that_cannot_be_written_is_refused_before_the_solve(
     assert "file is a file" in refused(capsys, "form", "hemisphere", "--out", "file/dome")
     assert "file: it is a file" in refused(capsys, "form", "hemisphere", "--out", "file")
     Path("thesis").mkdir()
-    Path("thesis/chapter.tex").write_text("")
-    assert "thesis: it is not empty" in refused(capsys, "form", "hemisphere", "--out", "thesis")
-    assert "thesis: it is not empty" in refused(
+    Path("thesis/report.html").write_text("")
+    assert "will not replace report.html" in refused(capsys, "form", "hemisphere", "--out", "thesis")
+    assert "will not replace report.html" in refused(
         capsys, "popup", write_table(Path("rods.csv"), CROSS), "--unit", "m", "--out", "thesis"
     )
     assert "in /proc; choose another folder" in refused(capsys, "form", "hemisphere", "--out", "/proc/dome")
@@ -219,12 +224,47 @@ def test_the_output_folder_is_left_alone_by_the_check(finder: FakeFinder) -> Non
     assert list(Path.cwd().iterdir()) == []
 
 
-def test_an_earlier_result_may_be_replaced(finder: FakeFinder) -> None:
-    Path("dome").mkdir()
+def test_an_earlier_result_is_replaced_and_a_copied_one_by_force(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
     Path("dome/result.json").write_text('{"format": "rodshell-result", "version": 1}')
-    finder.fault = NetLimitError("no net")
-    assert main(["form", "hemisphere", "--out", "dome"]) == 2
-    assert len(finder.calls) == 1
+    assert "will not replace result.json" in refused(capsys, "form", "hemisphere", "--out", "dome")
+    assert len(finder.calls) == 2
+    assert main(["form", "hemisphere", "--out", "dome", "--force", "-q"]) == 0
+
+
+def test_a_file_that_comes_into_the_way_while_the_job_runs_sends_the_result_elsewhere(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save = FakeArchive.save
+
+    def late(self: FakeArchive, folder: ResultFolder, *arguments: Any, **options: Any) -> None:
+        (folder.path / "case.toml").write_text("mine")
+        save(self, folder, *arguments, **options)
+
+    monkeypatch.setattr(FakeArchive, "save", late)
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    assert "dome-2 instead: will not replace case.toml" in capsys.readouterr().err
+    assert Path("dome/case.toml").read_text() == "mine"
+    assert load_case("dome-2/case.toml") == load_case("hemisphere")
+
+
+@pytest.mark.parametrize(
+    ("status", "level", "code"),
+    [("converged", "good", 0), ("converged", "check", 0), ("converged", "unbuildable", 4), ("stalled", "check", 3),
+     ("stalled", "unbuildable", 3)],
+)  # fmt: skip
+def test_the_exit_code_is_the_verdict_s_and_not_converged_wins(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], status: str, level: str, code: int
+) -> None:
+    finder.status, finder.level = status, level
+    assert main(["form", "hemisphere", "--quiet"]) == code
+    said = {0: "", 3: "rodshell: NOT CONVERGED: stalled", 4: "rodshell: NOT BUILDABLE: the rods touch"}[code]
+    err = capsys.readouterr().err
+    assert err.startswith(said)
+    assert (err == "") == (code == 0)
 
 
 def test_not_converged_saves_says_so_and_ends_with_3(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
@@ -255,6 +295,7 @@ def test_json_is_the_result_and_nothing_else_on_stdout(finder: FakeFinder, capsy
         "out": str(Path("out/hemisphere").resolve()),
         "format": "rodshell-result",
         "status": "converged",
+        "verdict": {"level": "good", "reasons": ["the rods touch"]},
     }
 
 
@@ -277,6 +318,7 @@ def test_the_first_run_announces_the_compilation(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "rodshell.form", finder)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    numba.config.reload_config()  # type: ignore[attr-defined]
     assert main(["form", "hemisphere", "--out", "a"]) == 0
     assert "compiling kernels, once" in capsys.readouterr().err
     kernel = f"stretch.energy-12.py{sys.version_info.major}{sys.version_info.minor}.nbi"
@@ -295,8 +337,8 @@ def test_popup_reads_a_table_in_its_unit(finder: FakeFinder) -> None:
     assert [rod.name for rod in grid.rods] == ["A", "B"]
     np.testing.assert_allclose(flat, [[[-0.1, 0], [0.1, 0]], [[0, -0.1], [0, 0.1]]], rtol=1e-15)
     np.testing.assert_allclose(final[:, 1], [[0.08, 0, 0], [0, 0.08, 0]], rtol=1e-15)
-    # the paper's 1 mm rod belongs to a longest rod of 0.2 pi m; here it is 0.2 m
-    assert rod.section.radius == pytest.approx(0.001 / np.pi, rel=1e-12)
+    assert rod.material == rs.Material.preset("petg")
+    assert 0 < rod.section.radius <= 0.08 / 200  # half the width over 200
     assert Path("out/rods-popup").is_dir()
 
 
@@ -330,12 +372,13 @@ def test_a_table_takes_the_rod_that_is_asked_for(finder: FakeFinder) -> None:
 
     usual = rod()
     assert rod("--rod.section.radius", "2 mm").section == Circle(0.002)
-    assert rod("--rod.material.youngs_modulus", "11 GPa").section == usual.section
+    assert usual.material == Material.preset("petg")
     assert rod("--rod.material.youngs_modulus", "11 GPa").material == Material(11e9, 1e3, 0.5)
     lath = ["--rod.section.kind", "rectangle", "--rod.section.width", "1 mm", "--rod.section.height", "3 mm"]
     assert rod(*lath).section == RectangularSection(width=0.001, height=0.003)
     tube = rod("--rod.section.kind", "tube", "--rod.section.thickness", "0.1 mm").section
-    assert tube == Tube(usual.section.radius, 0.0001)
+    assert isinstance(tube, Tube)
+    assert tube.thickness == 0.0001
 
 
 def test_a_result_takes_the_rod_that_is_asked_for_in_place_of_its_own(finder: FakeFinder, dome: Path) -> None:
@@ -355,13 +398,17 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """So that a wrong unit, or a file without a target, shows."""
-    Path("empty.toml").write_text("")
+    Path("empty.toml").write_text("rod.material.preset = 'rubber'")
     assert main(["form", "empty.toml"]) == 0
-    said = capsys.readouterr().err.splitlines()[0]
-    assert said == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm, rod radius 1 mm"
-    Path("big.toml").write_text("target = { radius = 200 }\nlayout.spacing = 25")
+    sizes, rod = capsys.readouterr().err.splitlines()[:2]
+    assert sizes == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm"
+    assert rod.startswith("rodshell: rod: circle, radius 1 mm; E = 1 MPa")
+    assert rod.endswith("; section was not given: chosen to fit")
+    Path("big.toml").write_text("target = { radius = 200 }\nlayout.spacing = 25\nrod.material.preset = 'rubber'")
     assert main(["form", "big.toml"]) == 0
-    assert capsys.readouterr().err.startswith("rodshell: hemisphere, 400 m wide; edge 4.17 m, rod radius 1 m\n")
+    sizes, rod = capsys.readouterr().err.splitlines()[:2]
+    assert sizes == "rodshell: hemisphere, 400 m wide; edge 4.17 m"
+    assert rod.startswith("rodshell: rod: circle, radius 1000 mm; ")
     assert main(["form", "empty.toml", "--quiet", "--out", "quiet"]) == 0
     assert capsys.readouterr().err == ""
 

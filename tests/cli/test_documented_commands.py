@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("my_case.toml", "case.toml"):
         (folder / name).write_text(case)
     (folder / "rods.csv").write_text("\n".join([",".join(COLUMNS), *_rods()]))
-    assert main(["form", "hemisphere", "--out", str(folder / "out" / "dome"), "--quiet", *QUICK["form"]]) == 0
+    assert main(["form", "pavilion", "--out", str(folder / "out" / "pavilion"), "--quiet", *QUICK["form"]]) == 0
     assert main(["form", "hemisphere", "--out", str(folder / "DIR"), "--quiet", *QUICK["form"]]) == 0
     return folder
 

@@ -21,7 +21,9 @@ from rodshell.output.files import DEFAULT, KINDS, read_kinds
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    """Of all files but the manifest."""
+    files = [path for path in folder.rglob("*") if path.is_file() and path.name != "manifest.json"]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
 @pytest.mark.parametrize("name", ["wished", "sample", "table"])
@@ -74,7 +76,7 @@ def test_command_writes_what_is_asked_for(tmp_path: Path, capsys: pytest.Capture
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [(["--only", "dxf,cvs"], '"cvs" is no kind of file: use dxf, svg'), (["--only", ","], "is no kind of file"),
-     (["--out", "{file}"], "choose another folder")],
+     (["--out", "{file}"], "it is a file; choose a folder")],
 )  # fmt: skip
 def test_bad_requests_are_one_sentence(
     arguments: list[str], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -3,12 +3,14 @@
 import csv
 import json
 from functools import cache
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.paper import reserved
 from rodshell.paper.fig4 import make
 from rodshell.paper.two_rods import LENGTH, RATE, ROD, STEP, run, run_statics
 
@@ -73,7 +75,8 @@ def test_figure_is_written_with_its_tables(tmp_path):
     figure = make(lambda *_: None, turns=0.05)
     figure.save(tmp_path / "fig4")
     names = {"fig4.svg", "fig4-animated.svg", "fig4-lag.svg", "table.csv", "table.txt", "angles-a.csv", "angles-b.csv"}
-    assert {path.name for path in (tmp_path / "fig4").iterdir()} == names | {"result.json"}
+    assert {path.name for path in (tmp_path / "fig4").iterdir()} == names | {"result.json", "manifest.json"}
+    assert all(any(Path(name).match(pattern) for pattern in reserved("fig4")) for name in names)
     for name in names:
         if name.endswith(".svg"):
             root = ElementTree.parse(tmp_path / "fig4" / name).getroot()

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from rodshell.cli import main, paper
+from rodshell.output.folder import ResultFolder
 from rodshell.paper import FIGURES
 
 
@@ -21,9 +22,9 @@ class Made:
     def result(self) -> dict[str, str]:
         return {"figure": self.name}
 
-    def save(self, folder: Path) -> None:
-        folder.mkdir(parents=True)
-        (folder / "table.txt").write_text(self.summary())
+    def save(self, folder: ResultFolder) -> None:
+        folder.put("table.txt", self.summary())
+        folder.commit()
 
 
 def stand_in(monkeypatch: pytest.MonkeyPatch, status: dict[str, str]) -> None:

@@ -95,20 +95,6 @@ def test_a_popped_up_saddle_is_warned_of(monkeypatch):
     assert form.result()["pop_up"]["pinned"]["stable"] is False
 
 
-@pytest.mark.parametrize(("share", "says"), [(0.49, None), (0.51, "hardly any room for joints"), (1.01, "touch")])
-@pytest.mark.parametrize("kind", ["circle", "lath"])
-def test_rods_too_wide_for_their_distance_are_warned_of(share, says, kind):
-    """Where families meet at an angle, parallel rods are nearer than their spacing by its sine."""
-    found = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=())
-    apart = 0.05 * np.sin(np.radians(found.result()["drape"]["min_angle_deg"]))
-    wide = share * apart
-    section = rs.Circle(wide / 2) if kind == "circle" else rs.RectangularSection(1e-3, wide)
-    rod = rs.Rod(section, ROD.material)
-    warnings = replace(found, draped=replace(found.draped, rod=rod)).warnings
-    assert [says in text for text in warnings] == [True] * (says is not None)
-    assert all(f"{1e3 * wide:.3g} mm wide" in text and f"{1e3 * apart:.3g} mm apart" in text for text in warnings)
-
-
 @pytest.mark.parametrize(("stiffness", "stretched"), [(0.3e6, True), (1e8, False)])
 def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remedy(stiffness, stretched):
     """Strain is density g length / E whatever the section: no other advice is given where that is the cause."""

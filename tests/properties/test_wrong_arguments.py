@@ -26,6 +26,29 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor=(0.0, np.nan)), "anchor must be two finite numbers"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor=0.1), "anchor must be two finite numbers x, y in m, not 0.1"),
         (
+            lambda: rs.find_form(TARGET, LAYOUT, ROD, ends="clampd"),
+            'ends must be "pinned" or "clamped", not "clampd": did you mean "clamped"?',
+        ),
+        (
+            lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=("pinned", "x")),
+            'ends must be "pinned" or "clamped", not "x"',
+        ),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=()), 'ends must be one or several of "pinned", "clamped"'),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, method="bond"), '"paper", not "bond": did you mean "bound"?'),
+        (
+            lambda: rs.find_form(TARGET, LAYOUT, ROD, gravity=-5.0),
+            r'gravity = -5.0 m/s2: method "bound" has no gravity',
+        ),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, fall=rs.Fall()), 'nothing falls with method "bound"'),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint="pin"), r"such as rodshell.Pin\(\), not 'pin'"),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint=rs.Pin), "not the class Pin itself"),
+        (lambda: rs.pop_up(None, None, ROD, ends="clampd"), 'ends must be "pinned" or "clamped", not "clampd"'),
+        (lambda: rs.pop_up(None, None, ROD, start="drapped"), 'not "drapped": did you mean "draped"?'),
+        (lambda: rs.Rod(ROD.material, ROD.section), "section must be a circle, .* section, not a Material"),
+        (lambda: rs.Rod(ROD.section, 1e9), "material must be a rodshell Material, not 1000000000.0"),
+        (lambda: rs.Hemisphere(radius="20"), 'target radius must be a number in m, not "20"'),
+        (lambda: rs.Cap(radius=1.0, base="0.2"), 'target base must be a number in m, not "0.2"'),
+        (
             lambda: rs.drape(LAYOUT, ROD, TARGET, anchor=(1, 1)),
             r"no point over \(1, 1\) m: choose .* \(--anchor auto\)",
         ),
@@ -34,6 +57,11 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
 def test_a_wrong_argument_is_refused_in_one_sentence(call, sentence):
     with pytest.raises(rs.InputError, match=sentence):
         call()
+
+
+def test_one_end_condition_needs_no_tuple():
+    assert list(rs.find_form(TARGET, LAYOUT, ROD, ends="clamped").popped) == ["clamped"]
+    assert list(rs.find_form(TARGET, LAYOUT, ROD, ends=("pinned", "pinned")).popped) == ["pinned"]
 
 
 def test_an_edge_left_out_is_a_sixth_of_the_smaller_spacing():

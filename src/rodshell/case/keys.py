@@ -69,6 +69,12 @@ def _table_models(annotation: Any) -> list[type[Table]]:
     return [member for member in members if isinstance(member, type) and issubclass(member, Table)]
 
 
+def _choices(annotation: Any) -> tuple[str, ...]:
+    """The words of a key that is a choice, which may be left out; else none."""
+    members = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
+    return next((get_args(member) for member in members if get_origin(member) is Literal), ())
+
+
 def _kind_of(model: type[Table]) -> str:
     """The `kind` that selects this table."""
     return str(model.model_fields["kind"].default)
@@ -81,5 +87,5 @@ def _keys_of(model: type[Table], prefix: str, kind: tuple[str, ...] = ()) -> Ite
             for inner in models:
                 yield from _keys_of(inner, path + ".", (_kind_of(inner),) if len(models) > 1 else ())
         else:
-            choices = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+            choices = _choices(field.annotation)
             yield CaseKey(path, field.description or f"kind of {prefix.rstrip('.')}", kind, choices)

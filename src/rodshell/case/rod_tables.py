@@ -1,7 +1,8 @@
 """The tables of rods, by their sections and material, and of joints, one for each kind."""
 
+from collections.abc import Callable
 from math import inf
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -16,37 +17,44 @@ from rodshell.case.values import (
     InertiaPerLength,
     Length,
     LengthOrAuto,
+    Lengths,
     MassPerLength,
     PoissonRatio,
+    SectionModulus,
     Stiffness,
     Stress,
 )
 from rodshell.errors import InputError
+from rodshell.rods.materials import Material, PresetName, preset_values
 
 if TYPE_CHECKING:
+    from rodshell.checks.sizing import Fit
     from rodshell.joints import Joint
-    from rodshell.rods.section import GivenSection, Rod, Section
-    from rodshell.targets import Target
-
-SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]
+    from rodshell.rods.section import Circle, GivenSection, Rod, Section, Tube
+UNSIZED = 1.0  # m, in place of a radius that is still to be found
 
 
-def _decided(radius: float | Literal["auto"]) -> float:
-    if radius == "auto":
-        raise InputError('rod.section.radius = "auto": there is no target whose size it could be taken from: give it')
-    return radius
+class AutoTable(Table):
+    """A section that is chosen to fit its target."""
+
+    kind: Literal["auto"] = "auto"
+
+    def build(self) -> "Circle":
+        from rodshell.rods.section import Circle
+
+        return Circle(radius=UNSIZED)
 
 
 class CircleTable(Table):
     kind: Literal["circle"] = "circle"
     radius: LengthOrAuto = Field(
-        default="auto", description='radius; "auto": 1/200 of the target\'s size; of a tube: outer radius'
+        default="auto", description='radius, or "auto": by the target\'s bends; of a tube: outer radius'
     )
 
-    def build(self) -> "Section":
+    def build(self) -> "Circle":
         from rodshell.rods.section import Circle
 
-        return Circle(radius=_decided(self.radius))
+        return Circle(radius=UNSIZED if self.radius == "auto" else self.radius)
 
 
 class TubeTable(Table):
@@ -54,10 +62,10 @@ class TubeTable(Table):
     radius: LengthOrAuto = Field(default="auto", description="outer radius")
     thickness: Length = Field(description="thickness of the tube's wall")
 
-    def build(self) -> "Section":
+    def build(self) -> "Tube":
         from rodshell.rods.section import Tube
 
-        return Tube(radius=_decided(self.radius), thickness=self.thickness)
+        return Tube(radius=UNSIZED if self.radius == "auto" else self.radius, thickness=self.thickness)
 
 
 class EllipseTable(Table):
@@ -90,6 +98,13 @@ class GivenTable(Table):
     GJ: BendingStiffness = Field(description="twist stiffness")
     mass: MassPerLength = Field(default=0.0, description="mass per length")
     rotary_inertia: InertiaPerLength = Field(default=0.0, description="rotary inertia about the rod's line, per length")
+    fibre_distances: Lengths | None = Field(
+        default=None, description="from the axis to the outermost fibres, across the grid and within it"
+    )
+    fibre_modulus: Stress | None = Field(default=None, description="Young's modulus of the outermost fibres")
+    torsion_modulus: SectionModulus | None = Field(
+        default=None, description="twisting moment over the largest shear stress that it causes"
+    )
 
     def build(self) -> "GivenSection":
         from rodshell.rods.section import GivenSection
@@ -98,51 +113,84 @@ class GivenTable(Table):
 
 
 class MaterialTable(Table):
-    youngs_modulus: Stress = Field(default=1e6, description="Young's modulus")
+    preset: PresetName | None = Field(
+        default=None, description="a named material; keys beside it replace its own values"
+    )
+    youngs_modulus: Stress | None = Field(default=None, description="Young's modulus")
     poisson_ratio: PoissonRatio | None = Field(default=None, description="Poisson's ratio; default 0.5")
     shear: Stress | None = Field(default=None, description="shear modulus, in place of Poisson's ratio: timber")
     density: Density = Field(default=1000.0, description="density")
 
     @model_validator(mode="before")
     @classmethod
-    def _one_of_two(cls, given: dict[str, Any]) -> dict[str, Any]:
-        if "shear" not in given:
-            return {"poisson_ratio": 0.5, **given}
-        if "poisson_ratio" in given:
+    def _complete(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """What the preset says of the keys that are left out; and not both of Poisson's ratio and a shear modulus."""
+        given = {key: value for key, value in given.items() if value is not None}
+        if "shear" in given and "poisson_ratio" in given:
             raise ValueError("rod.material.shear stands in place of poisson_ratio: leave one of them out")
-        return given
+        if given.get("preset") in get_args(PresetName):
+            given = preset_values(given["preset"], given)
+        return given if "shear" in given else {"poisson_ratio": 0.5, **given}
+
+    @model_validator(mode="after")
+    def _has_a_modulus(self) -> Self:
+        if self.youngs_modulus is None:
+            names = ", ".join(get_args(PresetName))
+            raise ValueError(f"rod.material has no youngs_modulus: give it, or a preset ({names})")
+        return self
+
+    def build(self) -> Material:
+        given = self.model_dump(exclude={"preset"}, exclude_none=True)
+        return Material(**given, name=self.preset)
 
 
 class RodTable(Table):
-    section: CircleTable | TubeTable | EllipseTable | RectangleTable | GivenTable = Field(
-        default=CircleTable(), discriminator="kind"
+    """Section and material; what is left out, or "auto", is chosen to fit the target."""
+
+    section: AutoTable | CircleTable | TubeTable | EllipseTable | RectangleTable | GivenTable = Field(
+        default=AutoTable(), discriminator="kind"
     )
-    material: MaterialTable | None = MaterialTable()
+    material: MaterialTable | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _given_needs_no_material(cls, given: dict[str, Any]) -> dict[str, Any]:
         section = given.get("section")
-        if not (isinstance(section, dict) and section.get("kind") == "given"):
-            return given
-        if given.get("material"):
+        if isinstance(section, dict) and section.get("kind") == "given" and given.get("material"):
             raise ValueError("rod.material: a given section says all stiffnesses and masses itself; leave it out")
-        return {**given, "material": None}
+        return {key: value for key, value in given.items() if key != "material" or value}
 
-    def sized(self, target: "Target") -> "RodTable":
-        """A radius left to the target's size decided: rods are then as slender as the paper's on its hemisphere."""
-        if getattr(self.section, "radius", None) == "auto":
-            return self.model_copy(
-                update={"section": self.section.model_copy(update={"radius": SLENDER * target.size})}
-            )
-        return self
+    @property
+    def left_open(self) -> tuple[str, ...]:
+        """Which of "material" and "section" are left to the target."""
+        section = self.section
+        sized = section.kind == "auto" or getattr(section, "radius", None) == "auto"
+        material = self.material is None and section.kind != "given"
+        return (*(["material"] if material else []), *(["section"] if sized else []))
 
-    def build(self) -> "Rod":
-        from rodshell.rods.section import Material, Rod
+    def build(self, fit: "Callable[[], Fit] | None" = None, *, strength: float | None = None) -> "Rod":
+        """The rod.
 
-        if self.material is None:
-            return Rod(section=self.section.build())
-        return Rod(section=self.section.build(), material=Material(**self.material.model_dump(exclude_none=True)))
+        fit : what material and section have to fit; called where one is left open.
+        strength : of the material, in place of the preset's [Pa].
+
+        Raises
+        ------
+        InputError : something is left open, and there is nothing to fit.
+        """
+        from rodshell.rods.section import Circle, Rod, Tube
+
+        section = self.section.build()
+        if not self.left_open:
+            return Rod(section, self.material.build() if self.material else None)
+        if fit is None:
+            raise InputError("rod: there is no target that material and section could be taken from: give both")
+        room = fit()
+        material = self.material.build() if self.material else Material.preset(room.preset)
+        if "section" not in self.left_open:
+            return Rod(section, material)
+        shape = section if isinstance(section, Circle | Tube) and self.section.kind != "auto" else None
+        return Rod(room.section(material, strength=strength, shape=shape), material)
 
 
 class JointTable(Table):

@@ -3,7 +3,6 @@
 Those of targets, and of rods and joints, have modules of their own.
 """
 
-from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
@@ -21,6 +20,7 @@ from rodshell.case.values import (
     Coordinate,
     Counts,
     Duration,
+    IsoDate,
     Length,
     LengthOrAuto,
     Lengths,
@@ -37,9 +37,10 @@ from rodshell.case.values import (
     unit,
 )
 from rodshell.errors import InputError
-from rodshell.units import length_text, shown
+from rodshell.units import length_text, rounded_down, shown
 
 if TYPE_CHECKING:
+    from rodshell.checks.sizing import Fit
     from rodshell.formfinding.fall import Fall
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.layout import GridLayout
@@ -64,7 +65,7 @@ class LayoutTable(Table):
 
         spacing = self.spacing
         if spacing == "auto":
-            spacing = (_round((target.size if target else 0.2) / 8),) * 2
+            spacing = (rounded_down((target.size if target else 0.2) / 8),) * 2
         rotate = 0.0 if self.rotate == "auto" else self.rotate
         return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "rotate": rotate})
 
@@ -192,6 +193,9 @@ class SeamsTable(Table):
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
     stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
+    shear_strength: Stress | None = Field(
+        default=None, description="in shear along the fibres; default: as von Mises has it"
+    )
 
 
 class FabricationTable(Table):
@@ -218,8 +222,11 @@ class DrawingsTable(Table):
     paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(default="A3", description="of the PDF's sheets, landscape")
     project: str = Field(default="", description="for the title block")
     revision: str = Field(default="", description="for the title block")
-    tolerance: Length | None = Field(default=None, description="of lengths, for the title block")
+    tolerance: Length | None = Field(default=None, description="of lengths; they are shown to a tenth of it or finer")
     layers: LayersTable = LayersTable()
+    name: str = Field(default="", description="title of the drawings; default: the target's name")
+    author: str = Field(default="", description="for the title block: who drew or answers for the drawings")
+    date: IsoDate = Field(default="", description='for the title block, "2026-11-22"; default: the day of writing')
 
 
 class Built(NamedTuple):
@@ -229,12 +236,6 @@ class Built(NamedTuple):
     layout: "GridLayout"
     rod: "Rod"
     drape_options: dict[str, Any]
-
-
-def _round(length: float) -> float:
-    """The nearest length below of 1, 1.5, 2, 3, 5 or 7 times a power of ten [m]."""
-    decade = 10.0 ** floor(log10(length))
-    return max(decade * step for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if decade * step <= length * (1 + 1e-9))
 
 
 class Case(Table):
@@ -259,9 +260,19 @@ class Case(Table):
                 content["target"][key] = str(Path(content["target"][key]).absolute())
         return toml_text(content)
 
-    def sized(self, target: "Target") -> "Case":
-        """The same case with a rod that fits its target, where that was left to it."""
-        return self.model_copy(update={"rod": self.rod.sized(target)})
+    def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
+        """The rod; material and section that were left to the target are chosen by the bends of its net."""
+
+        def fit() -> "Fit":
+            from rodshell.checks.sizing import Fit
+
+            return Fit.on(target, layout, anchor=anchor)
+
+        return self.rod.build(fit, strength=self.checks.strength)
+
+    def with_rod(self, rod: "Rod") -> "Case":
+        """The same case with this rod spelled out."""
+        return self.model_copy(update={"rod": RodTable.model_validate(rod.parameters())})
 
     @property
     def undecided(self) -> bool:
@@ -292,13 +303,16 @@ class Case(Table):
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "gravity": drape.gravity, "ends": ends}
+        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "ends": ends}
+        options["gravity"] = None if drape.method == "bound" else drape.gravity
         options["fall"] = drape.fall() if drape.method == "paper" else None
         options["joint"] = self.joint.build()
         target = self.target.build()
         layout = self.layout.build(target)
         self._require_stock(layout)
-        return Built(target, layout, self.rod.sized(target).build(), options)
+        rod = self.rod_on(target, layout, anchor=anchor)
+        self.takeaway().require_known_stress(rod, options["joint"])
+        return Built(target, layout, rod, options)
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
@@ -350,4 +364,6 @@ class Case(Table):
             self.checks.stages,
             Fabrication(**self.fabrication.model_dump()),
             DrawingStyle(**style),
+            rod_chosen=self.rod.left_open,
+            shear_strength=self.checks.shear_strength,
         )

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from datetime import date
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import BeforeValidator
@@ -166,6 +167,15 @@ def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
     return tuple(tuple(pair(quantity("length"))(point) for point in row) for row in rows)
 
 
+def iso_date(value: object) -> str:
+    """A day as "2026-11-22"; "" for none; TOML's own dates too."""
+    try:
+        return date.fromisoformat(str(value)).isoformat() if value != "" else ""
+    except ValueError:
+        raise ValueError('must be a day; write it as "2026-11-22"') from None
+
+
+IsoDate = Annotated[str, BeforeValidator(iso_date)]
 Length = Annotated[float, BeforeValidator(positive("length"))]
 LengthOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(positive("length")))]
 Coordinate = Annotated[float, BeforeValidator(quantity("length"))]
@@ -192,6 +202,7 @@ Force = Annotated[float, BeforeValidator(positive("force"))]
 BendingStiffness = Annotated[float, BeforeValidator(positive("bending stiffness"))]
 MassPerLength = Annotated[float, BeforeValidator(not_negative("mass per length"))]
 InertiaPerLength = Annotated[float, BeforeValidator(not_negative("inertia per length"))]
+SectionModulus = Annotated[float, BeforeValidator(positive("section modulus"))]
 Stress = Annotated[float, BeforeValidator(positive("stress"))]
 Duration = Annotated[float, BeforeValidator(positive("time"))]
 NodeStiffness = Annotated[float, BeforeValidator(positive("stiffness"))]

@@ -1,25 +1,30 @@
-"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat."""
+"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat, its own weight."""
 
-from rodshell.checks.bending import Bending, bending, bending_of, curvatures, fibre_distance, fibre_strain
+from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check, settled_shell
+from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.checks.self_weight import SelfWeight, self_weight
 
 __all__ = [
     "Bending",
     "Checks",
+    "Contact",
     "Deployment",
     "JointLoads",
     "Reactions",
+    "SelfWeight",
     "bending",
     "bending_of",
     "check",
+    "contact",
+    "contact_of",
     "curvatures",
     "deploy",
-    "fibre_distance",
-    "fibre_strain",
     "joint_loads",
     "reactions",
+    "self_weight",
     "settled_shell",
 ]

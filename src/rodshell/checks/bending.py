@@ -1,7 +1,10 @@
-"""Bending check: curvature and stress along each rod, sigma = E y kappa + |N| / A.
+"""Bending check: how each rod is bent and twisted along its length, and the stress of it all.
 
 The curvature is the one whose moment EI kappa is in equilibrium: kappa = 2 tan(phi/2) over the Voronoi length
-[HQK Eq 1b]. A pinned end has none; a clamped end has that between its last edge and its clamp.
+[HQK Eq 1b]. A pinned end has none; a clamped end has that between its last edge and its clamp. Its two parts are the
+normal curvature, out of the shell, and the geodesic curvature, within it. Of rods with unlike stiffnesses, laths, they
+are taken by the section's own axes m1 and m2, which are the shell's normal and a line within it where joints hold the
+rods upright; of others by the shell's normal, that of the rods that cross there.
 """
 
 from dataclasses import dataclass
@@ -9,44 +12,84 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.errors import InputError
+from rodshell.formfinding.draped import node_normals
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.model.shell import last_edges
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+from rodshell.rods.fibres import (
+    VON_MISES,
+    fibre_distance,
+    fibre_modulus,
+    fibre_strain,
+    knows_stress,
+    largest_stress,
+    torsion_stress,
+)
+from rodshell.rods.section import Circle, Rod, Tube
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Bending:
-    """Curvature and stress at every node of every rod: arrays (k,) in the order of the mesh's `rod_nodes`.
+    """Bending, twist and stress at every node of every rod: arrays (k,) in the order of the mesh's `rod_nodes`.
 
     Parameters
     ----------
     curvature : [1/m].
     axial_strain : [-], mean of the edges on both sides.
-    stress : of the outermost fibre, bending and axial [Pa]; None where the section's fibres are not known.
+    stress : the largest over the section of bending, stretch and torsion together [Pa], see `rods.fibres`; None where
+        the section's fibres are not known.
+    strain : of the outermost fibre, bending and axial; None as the stress.
+    normal_curvature, geodesic_curvature : parts of the curvature out of the shell and within it [1/m]; None where
+        no rods cross.
+    twist_rate : twist per length [rad/m]; zero where nothing twists the rods.
+    torsion_stress : largest shear stress of torsion over the section [Pa]; None as the stress.
     """
 
     curvature: Floats
     axial_strain: Floats
     stress: Floats | None
     strain: Floats | None
+    normal_curvature: Floats | None
+    geodesic_curvature: Floats | None
+    twist_rate: Floats
+    torsion_stress: Floats | None
+
+    @property
+    def bending_strain(self) -> Floats | None:
+        """(k,) of the outermost fibre, without the axial strain."""
+        return None if self.strain is None else np.asarray(self.strain - np.abs(self.axial_strain))
 
 
-def bending_of(shell: Shell, state: Floats, rod: Rod) -> Bending:
+def bending_of(shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = VON_MISES) -> Bending:
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis."""
+    mesh, positions = shell.mesh, shell.positions(state)
+    normals = shell_normals(mesh, positions)
+    if shell.node_count != mesh.node_count:  # rods a distance apart at their joints: each has its own line
+        mesh, positions = mesh.apart, state[: shell.node_count]
     clamps = unit(state[shell.ghosts] - state[shell.ends]) if len(shell.ghosts) else None
+    components, twist = None, None
+    if frames := rod_frames(shell):
+        strains = _on_entries(shell, frames.strains(state))
+        twist = strains[:, 2]
+        if len(set(rod.bend_stiffnesses)) > 1:
+            components = strains[:, :2]
+        elif not isinstance(rod.section, Circle | Tube):
+            directors = _mean_of_edges(mesh, edge_directors(shell, frames, state))
+            components = np.column_stack(_parts(*_turns(mesh, positions, clamps), directors))
     return bending(
-        shell.mesh, shell.positions(state), rod, clamps=clamps, components=curvature_components(shell, state)
-    )
+        mesh, positions, rod,
+        clamps=clamps, components=components, twist_rate=twist, normals=normals, shear_weight=shear_weight,
+    )  # fmt: skip
 
 
 def bending(
-    mesh: GridMesh, positions: Floats, rod: Rod, *, clamps: Floats | None = None, components: Floats | None = None
-) -> Bending:
+    mesh: GridMesh, positions: Floats, rod: Rod, *, clamps: Floats | None = None, components: Floats | None = None,
+    twist_rate: Floats | None = None, normals: Floats | None = None, shear_weight: float = VON_MISES,
+) -> Bending:  # fmt: skip
     """Bending of the rods of `mesh` with nodes at `positions` (n, 3) [m].
 
     Parameters
@@ -54,94 +97,83 @@ def bending(
     clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
     components : (k, 2) curvatures towards m1 and m2 [1/m]; without, the stress of a section that is not round is an
         upper bound, as if it bent towards its farthest point.
+    twist_rate : (k,) twist per length [rad/m]; without, none.
+    normals : (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without `components`.
+    shear_weight : of the shear stress against the normal stress, see `rods.fibres`.
     """
-    curvature = curvatures(mesh, positions, clamps=clamps)
-    axial = axial_strains(mesh, positions)
-    fibre = fibre_distance(rod)
-    if fibre is None or rod.material is None:
-        return Bending(curvature, axial, None, None)
-    bent = fibre * curvature if components is None else fibre_strain(rod, components[:, 0], components[:, 1])
-    strain = bent + np.abs(axial)
-    return Bending(curvature, axial, rod.material.youngs_modulus * strain, strain)
+    turns, tangents = _turns(mesh, positions, clamps)
+    curvature, axial = np.linalg.norm(turns, axis=1), axial_strains(mesh, positions)
+    twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate
+    stress = strain = sheared = normal = geodesic = None
+    if components is not None:
+        normal, geodesic = components.T
+    elif normals is not None:
+        normal, geodesic = _parts(turns, tangents, normals)
+    fibre, known = fibre_distance(rod), knows_stress(rod, twisted=bool(twist.any()))
+    if fibre is not None:
+        bent = fibre * curvature if components is None else fibre_strain(rod, components[:, 0], components[:, 1])
+        strain = bent + np.abs(axial)
+    if known and strain is not None:
+        sheared = torsion_stress(rod, twist) if twist.any() else np.zeros(len(twist))
+        if components is None:
+            stress = np.hypot(fibre_modulus(rod) * strain, shear_weight * sheared)
+        else:
+            stress = largest_stress(rod, components[:, 0], components[:, 1], axial, twist, weight=shear_weight)
+    return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
 
 
-def curvature_components(shell: Shell, state: Floats) -> Floats | None:
-    """(k, 2) curvatures towards m1 and m2 [1/m] at each entry of `rod_nodes`; None where rods bend alike all ways."""
-    frames = next((one for one in shell.within if isinstance(one, BendTwist)), None)
-    mesh = shell.mesh
-    if frames is None or len(frames.blocks) != len(mesh.bends) + len(shell.ghosts):
+def rod_frames(shell: Shell) -> BendTwist | None:
+    """The elements that carry the rods' material frames; None where no twist angles are carried."""
+    return next((one for one in shell.within if isinstance(one, BendTwist)), None)
+
+
+def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
+    """(e, 3) first material director m1 of each edge in a `state` (N, 3)."""
+    m1 = frames.refreshed(state).material_directors(state)
+    result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too
+    for side in range(2):
+        result[frames.blocks[:, 1 + 2 * side] - shell.first_angle] = m1[:, side]
+    return result[: len(shell.mesh.edges)]
+
+
+def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
+    """(k, 3) normal of the shell at each entry of `rod_nodes`; None where some rod crosses no other."""
+    if (mesh.grid.joint_counts() == 0).any():
         return None
-    result = np.zeros((len(mesh.rod_nodes), 2))
-    strains, inner = frames.strains(state)[:, :2], _inner(mesh)
-    result[inner] = strains[: len(mesh.bends)] / mesh.voronoi_lengths[:, None]
-    if len(shell.ghosts):
-        s, first, last = mesh.stations, mesh.rod_start, mesh.rod_stop - 1
-        half = 0.5 * np.column_stack([s[first + 1] - s[first], s[last] - s[last - 1]]).ravel()
-        result[np.column_stack([first, last]).ravel()] = strains[len(mesh.bends) :] / half[:, None]
-    return result
+    return node_normals(mesh, positions)[mesh.rod_nodes]
 
 
 def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
     """(k,) curvature [1/m] at each entry of `rod_nodes`."""
-    result = np.zeros(len(mesh.rod_nodes))
-    first, last = mesh.rod_start, mesh.rod_stop - 1
-    before, here, after = (positions[mesh.bends[:, k]] for k in range(3))
-    result[_inner(mesh)] = _turn(unit(here - before), unit(after - here)) / mesh.voronoi_lengths
-    if clamps is not None:
-        for side, (end, neighbour) in enumerate(((first, first + 1), (last, last - 1))):
-            outward = unit(positions[mesh.rod_nodes[end]] - positions[mesh.rod_nodes[neighbour]])
-            half = 0.5 * np.abs(mesh.stations[end] - mesh.stations[neighbour])
-            result[end] = _turn(outward, clamps[side::2]) / half
-    return result
+    return np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1)
 
 
 def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:
     """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one."""
     lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
-    strain = lengths / mesh.edge_lengths - 1.0
+    return _mean_of_edges(mesh, lengths / mesh.edge_lengths - 1.0)
+
+
+def _mean_of_edges(mesh: GridMesh, values: Floats) -> Floats:
+    """(k, ...) of each entry of `rod_nodes`: the mean of the `values` (e, ...) of its edges, which at an end is one."""
     begins = np.ones(len(mesh.rod_nodes), dtype=bool)
     begins[mesh.rod_stop - 1] = False  # entries that an edge begins at
-    total, count = np.zeros(len(begins)), np.zeros(len(begins))
+    total, count = np.zeros((len(begins), *values.shape[1:])), np.zeros(len(begins))
     for entries in (np.flatnonzero(begins), np.flatnonzero(begins) + 1):
-        total[entries] += strain
+        total[entries] += values
         count[entries] += 1
-    return total / count
+    return np.asarray(total / count.reshape(-1, *[1] * (values.ndim - 1)))
 
 
-def fibre_distance(rod: Rod) -> float | None:
-    """Distance [m] of the outermost fibre from the axis about which a rod bends, whichever that is.
-
-    Of a section that is not round this is its farthest point: the stress is then an upper bound. None for a
-    given section, whose shape is not known.
-    """
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return None
-    if isinstance(section, Circle | Tube):
-        return section.outer_radius
-    if isinstance(section, Ellipse):
-        return max(section.a, section.b)
-    if isinstance(section, RectangularSection):
-        return 0.5 * float(np.hypot(section.width, section.height))
-    raise InputError(f"the fibres of a section of kind {type(section).__name__} are not known")
-
-
-def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
-    """Largest bending strain over the section for curvatures towards m1 and m2 [1/m]: exact for each shape.
-
-    Raises
-    ------
-    InputError : a given section has stiffnesses and no shape.
-    """
-    section = rod.section
-    if isinstance(section, RectangularSection):  # at a corner
-        return np.asarray(0.5 * (section.width * np.abs(kappa1) + section.height * np.abs(kappa2)))
-    if isinstance(section, Ellipse):
-        return np.hypot(section.a * kappa1, section.b * kappa2)
-    fibre = fibre_distance(rod)
-    if fibre is None:
-        raise InputError("a given section has no fibres: its stress is not known; give a shape and a material")
-    return np.asarray(fibre * np.hypot(kappa1, kappa2))
+def _on_entries(shell: Shell, strains: Floats) -> Floats:
+    """(k, 3) strains of the bends, and of clamps if among them, over their length at each entry of `rod_nodes`."""
+    mesh = shell.mesh
+    result = np.zeros((len(mesh.rod_nodes), 3))
+    result[_inner(mesh)] = strains[: len(mesh.bends)] / mesh.voronoi_lengths[:, None]
+    if len(strains) > len(mesh.bends):
+        ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
+        result[ends] = strains[len(mesh.bends) :] / (0.5 * last_edges(mesh)[:, None])
+    return result
 
 
 def _inner(mesh: GridMesh) -> NDArray[np.bool_]:
@@ -151,7 +183,29 @@ def _inner(mesh: GridMesh) -> NDArray[np.bool_]:
     return inner
 
 
+def _turns(mesh: GridMesh, positions: Floats, clamps: Floats | None) -> tuple[Floats, Floats]:
+    """At each entry of `rod_nodes` the curvature binormal (k, 3) [1/m] and the rod's direction (k, 3)."""
+    turns, tangents = np.zeros((2, len(mesh.rod_nodes), 3))
+    edges = unit(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]])
+    tangents[:] = _mean_of_edges(mesh, edges)
+    before, here, after = (positions[mesh.bends[:, k]] for k in range(3))
+    turns[_inner(mesh)] = _turn(unit(here - before), unit(after - here)) / mesh.voronoi_lengths[:, None]
+    if clamps is not None:
+        half = 0.5 * last_edges(mesh)[:, None]
+        first, last = mesh.rod_start, mesh.rod_stop - 1
+        turns[first] = _turn(-clamps[::2], tangents[first]) / half[::2]
+        turns[last] = _turn(tangents[last], clamps[1::2]) / half[1::2]
+        tangents[first] -= clamps[::2]
+        tangents[last] += clamps[1::2]
+    return turns, unit(tangents)
+
+
 def _turn(before: Floats, after: Floats) -> Floats:
-    """(b,) integrated curvature 2 tan(phi/2) between unit tangents; exact also for small angles."""
-    binormal = cross(before, after)
-    return np.asarray(2.0 * np.sqrt(dot(binormal, binormal)) / (1.0 + dot(before, after)))
+    """(b, 3) integrated curvature binormal between unit tangents, 2 tan(phi/2) long; exact also for small angles."""
+    return np.asarray(2.0 * cross(before, after) / (1.0 + dot(before, after))[:, None])
+
+
+def _parts(turns: Floats, tangents: Floats, axes: Floats) -> tuple[Floats, Floats]:
+    """(k,) parts of the curvature towards `axes` (k, 3), and towards what lies across them and the rod [1/m]."""
+    across = unit(axes - dot(axes, tangents)[:, None] * tangents)
+    return dot(turns, cross(tangents, across)), dot(turns, across)

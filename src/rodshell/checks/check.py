@@ -1,25 +1,30 @@
 """All checks of a popped-up shell in one call."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 
-from rodshell.checks.bending import Bending, bending, bending_of
+from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
+from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
 from rodshell.formfinding import Popped
-from rodshell.formfinding.popup import Ends
+from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
-from rodshell.units import length_text
+from rodshell.units import length_text, stress_text
 
+WORTH = 0.01  # of the stress: less torsion is not worth a word
 THIN = 0.05  # strain of the outermost fibre up to which rods are thin: radii of ten depths
 
 
@@ -31,6 +36,8 @@ class Checks:
     ----------
     bending, reactions, joints : by end condition.
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
+    self_weight : by end condition, what share of its own weight the shell bears.
+    contact : by end condition; `contact_on_the_way` of the deployment's stages.
     """
 
     bending: dict[Ends, Bending]
@@ -38,15 +45,19 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None
     on_the_way: tuple[Bending, ...]
+    self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
+    contact: dict[Ends, Contact] = field(default_factory=dict)
+    contact_on_the_way: tuple[Contact, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
+        way = (*way, *unknown_weights(self.self_weight), *self.touching)
         bends = [
-            float((bent.strain - np.abs(bent.axial_strain)).max())
+            float(bent.bending_strain.max())
             for bent in (*self.bending.values(), *self.on_the_way)
-            if bent.strain is not None
+            if bent.bending_strain is not None
         ]
         if max(bends, default=0.0) <= THIN:
             return way
@@ -56,8 +67,45 @@ class Checks:
             f"thin rods holds up to {100 * THIN:.0f} % or so; use thinner rods or a larger target",
         )
 
+    @property
+    def nearest_on_the_way(self) -> tuple[float, Contact] | None:
+        """The stage of the deployment in which rods are nearest, by its share; None where nothing was checked."""
+        if self.deployment is None or not self.contact_on_the_way:
+            return None
+        pairs = zip(self.deployment.share.tolist(), self.contact_on_the_way, strict=True)
+        return min(pairs, key=lambda pair: inf if pair[1].clearance is None else pair[1].clearance)
+
+    @property
+    def touching(self) -> tuple[str, ...]:
+        """A sentence where rods touch, or come so near to each other that there is no room for joints."""
+        shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
+        if (nearest := self.nearest_on_the_way) is not None and nearest[0] < 1:
+            share, found = nearest
+            shapes.append((found, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid"))
+        near = [(found, where) for found, where in shapes if found.clearance is not None]
+        if not near:
+            return ()
+        worst, where = min(near, key=lambda pair: pair[0].clearance or 0.0)
+        assert worst.clearance is not None
+        assert worst.rods is not None
+        assert worst.where is not None
+        place = "({:.4g}, {:.4g}, {:.4g}) m".format(*worst.where)
+        who = f"rods {worst.rods[0]} and {worst.rods[1]}" if worst.rods[0] != worst.rods[1] else f"rod {worst.rods[0]}"
+        remedy = "use thinner rods (rod.section) or a larger spacing"
+        if not worst.pairs:
+            return (
+                f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near {place}: that "
+                f"leaves hardly any room for joints; {remedy}",
+            )
+        does = "overlap" if who.startswith("rods") else "runs into itself"
+        count = f" (of {worst.pairs} pairs that touch)" if worst.pairs > 1 else ""
+        return (
+            f"{who} {does} by {length_text(-worst.clearance)} {where}, near {place}{count}: rods cannot run through "
+            f"each other; {remedy}",
+        )
+
     def overstress(self, strength: float | None, mesh: GridMesh) -> tuple[str, ...]:
-        """A sentence where the rods would break, in a final shape or on the way up, with the place.
+        """A sentence where the rods would break, in a final shape or on the way up, with the place and with torsion.
 
         strength : of the rods' material [Pa], or None.
         """
@@ -81,27 +129,54 @@ class Checks:
         only = "" if any(one[0] > 1 for one in final) else ", or close the joints near that place last"
         return (f"the rods would break: {found}; use thinner, softer or stronger rods, or a flatter target{only}",)
 
+    def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
+        """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
+        parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.on_the_way)]
+        sheared = max((float(part.max()) for part in parts if part is not None), default=0.0)
+        if strength is None or sheared <= WORTH * strength:
+            return ()
+        return (
+            f"torsion shears the rods by up to {stress_text(sheared)}, counted by von Mises as in isotropic "
+            "materials; timber and fibre composites bear less along their fibres: give checks.shear_strength",
+        )
 
-def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress: Progress = silent) -> Checks:
+
+def check(
+    popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, shear_weight: float = VON_MISES,
+    progress: Progress = silent,
+) -> Checks:  # fmt: skip
     """Check every shell that converged.
 
-    stages : of the deployment, the way up from flat of the pinned shell; 0: none.
+    Parameters
+    ----------
+    stages : of the deployment from flat of the pinned shell; 0: none.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.fibres`.
     """
     done = {ends: shell for ends, shell in popped.items() if shell.report.converged}
     settled = {ends: settled_shell(shell) for ends, shell in done.items()}
-    bent = {ends: bending_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
+    bent = {
+        ends: bending_of(shell, found.state, rod, shear_weight=shear_weight) for ends, (shell, found) in settled.items()
+    }
+    met = {ends: contact_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
+    weighed = dict[Ends, SelfWeight]()
+    for ends, pair in settled.items():
+        progress("self-weight", f"{ends} ends", 0.0)
+        weighed[ends] = self_weight(*pair)
     if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, ())
+        return Checks(bent, held, carried, None, (), weighed, met)
     last = done["pinned"]
     deployment = deploy(
         last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
         told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
     )  # fmt: skip
-    flat = bending(last.footprint.mesh, deployment.positions[0], rod)
-    on_the_way = (flat, *(bending_of(shell, state, rod) for shell, state in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way)
+    mesh, laid = last.footprint.mesh, deployment.positions[0]
+    flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
+    on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
+    met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
+    met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
+    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way)
 
 
 def _worst(bent: Bending) -> float:
@@ -109,11 +184,16 @@ def _worst(bent: Bending) -> float:
 
 
 def _most_stressed(bent: Bending, mesh: GridMesh) -> str:
-    """The rod, and how far along it."""
+    """The rod, how far along it, and how much of it is torsion."""
     assert bent.stress is not None
+    assert bent.torsion_stress is not None
     at = int(np.argmax(bent.stress))
     rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
-    return f"{rod.name}, {length_text(float(mesh.stations[at]) - rod.start)} from its start"
+    sheared = float(bent.torsion_stress[at])
+    torsion = (
+        f" (with a shear stress of {stress_text(sheared)} of torsion)" if sheared > WORTH * bent.stress[at] else ""
+    )
+    return f"{rod.name}, {length_text(float(mesh.stations[at]) - rod.start)} from its start{torsion}"
 
 
 def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:

@@ -114,7 +114,7 @@ class _Path:
         self.shell, self.pattern, self._smooth = shell, pattern, True
         positions, ends = shell.positions(last), shell.mesh.ends.ravel()
         self.flat = laid_out(shell.mesh.flat, ends, positions)
-        self._first = self.flat[ends] + shell.lift[shell.ends] * np.array([0.0, 0.0, 1.0])
+        self._first = self.flat[ends]
         self._last = last[shell.ends]
         self._length = 0.5 * float(np.ptp(positions, axis=0).max())
 
@@ -190,5 +190,5 @@ def laid_out(flat: Floats, ends: NDArray[np.intp], popped: Floats) -> Floats:
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     result = np.empty_like(flat)
     result[:, :2] = (flat - here.mean(axis=0))[:, :2] @ turn + there.mean(axis=0)[:2]
-    result[:, 2] = there[:, 2].min()
+    result[:, 2] = there[:, 2].min() + flat[:, 2]
     return result

@@ -1,13 +1,15 @@
 """The checks of several shells as of one."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from rodshell.checks.check import Checks
+from rodshell.checks.contact import joined_contact
 from rodshell.checks.deployment import Deployment
+from rodshell.checks.self_weight import weakest
 from rodshell.formfinding.popup import Ends
 
 
@@ -15,7 +17,7 @@ from rodshell.formfinding.popup import Ends
 class JoinedChecks(Checks):
     """The checks of several shells, which are `named`, as of one."""
 
-    named: Mapping[str, Checks]
+    named: Mapping[str, Checks] = field(kw_only=True)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -25,7 +27,8 @@ class JoinedChecks(Checks):
 def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     """Of shells that share nothing: what all were checked for, one after the other.
 
-    The way up has the stages that all were followed through.
+    The way up has the stages that all were followed through. Each shell bears its own weight by itself, what they
+    share being held as supports are: of all the smallest factor counts.
     """
     parts = list(named.values())
     ends = [one for one in parts[0].bending if all(one in part.bending for part in parts)]
@@ -33,16 +36,26 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     def each(table: str) -> dict[Ends, Any]:
         return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
 
+    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in ends}
+    contacts = {end: joined_contact({name: part.contact[end] for name, part in named.items()}) for end in ends}
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), named)
+        return JoinedChecks(
+            each("bending"), each("reactions"), each("joints"), None, (), weighed, contacts, named=named
+        )
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(
         _stacked([part.on_the_way[row[k]] for part, row in zip(parts, rows, strict=True)]) for k in range(len(shared))
     )
     way = _joined_ways(ways, rows)
-    return JoinedChecks(each("bending"), each("reactions"), each("joints"), way, bent, named)
+    found = {
+        name: [part.contact_on_the_way[k] for k in row] for (name, part), row in zip(named.items(), rows, strict=True)
+    }
+    met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
+    return JoinedChecks(
+        each("bending"), each("reactions"), each("joints"), way, bent, weighed, contacts, met, named=named
+    )
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:

@@ -1,95 +1,35 @@
-"""The command line. Only click is imported here, so that --help and --version answer at once."""
+"""The command line. Nothing heavy is imported before signals are handled, so that it ends in one line at any moment."""
 
 import gc
 import os
 import sys
 from collections.abc import Sequence
-from difflib import get_close_matches
-from importlib import import_module
 
-import click
-
-from rodshell.errors import InputError, RodshellError
+from rodshell.cli.interruption import Interrupted, Interruption, end_at_once
 
 RARELY = 500_000  # objects made since Python last looked for garbage that holds itself
-COMMANDS = {
-    "form": "From a target to the flat grid that pops up into it.",
-    "popup": "Pop up a table of rods, or an earlier result, from flat.",
-    "export": "Write drawings, schedules, models or the report of an earlier result again.",
-    "warmup": "Compile all kernels ahead, once, so that no job waits for it.",
-    "paper": "Make a figure of the paper again, with its errors.",
-}
-
-
-class LazyGroup(click.Group):
-    """A group whose commands live in the module of their name and are imported when they are called."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        command = import_module(f"rodshell.cli.{cmd_name}").command
-        assert isinstance(command, click.Command)
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args[0] not in COMMANDS and not args[0].startswith("-"):
-            near = get_close_matches(args[0], COMMANDS, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"the commands are {', '.join(COMMANDS)}"
-            raise InputError(f"unknown command {args[0]}: {hint}")
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
-
-
-def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
-    if wanted:
-        from importlib.metadata import version
-
-        click.echo(f"rodshell {version('rodshell')}")
-        ctx.exit()
-
-
-@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"max_content_width": 110})
-@click.option(
-    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
-    help="Print the version and end.",
-)  # fmt: skip
-@click.pass_context
-def app(ctx: click.Context) -> None:
-    """Form finding of elastic gridshells: a target surface goes in, a flat grid of rods comes out.
-
-    Try: rodshell form hemisphere --out out/dome
-    """
-    if ctx.invoked_subcommand is None:
-        click.echo(ctx.get_help())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; returns its exit code: 0 done, 2 bad input, 3 not converged, 130 interrupted."""
-    try:
-        code = app.main(args=argv, prog_name="rodshell", standalone_mode=False)
-    except RodshellError as error:
-        return _fail(str(error), error.exit_code)
-    except click.NoSuchOption as error:
-        near = f": did you mean {error.possibilities[0]}?" if error.possibilities else ": see --help"
-        return _fail(f"unknown option {error.option_name}{near}", 2)
-    except click.UsageError as error:
-        where = error.ctx.command_path if error.ctx else "rodshell"
-        return _fail(f"{error.format_message().rstrip('.')}: see {where} --help", 2)
-    except click.ClickException as error:
-        return _fail(error.format_message(), 2)
-    except (click.Abort, KeyboardInterrupt) as stopped:
-        kept = str(stopped.__cause__ or "")  # click raises Abort from the interrupt, which may say what was kept
-        click.echo("rodshell: interrupted" + (f": {kept}" if kept else ""), err=True)
-        return 130
-    return code if isinstance(code, int) else 0
+    """Run the command line; returns its exit code.
+
+    0 found, 2 bad input, 3 not converged or out of time, 4 found but not buildable, 130 interrupted by Ctrl-C, 143 by
+    SIGTERM.
+    """
+    with Interruption() as interruption:
+        try:
+            from rodshell.cli.app import app
+
+            code = app.main(args=argv, prog_name="rodshell", standalone_mode=False)
+            return code if isinstance(code, int) else 0
+        except BaseException as error:  # an interrupt in the middle of an import, say, becomes an error of any kind
+            if interruption.number is None and not isinstance(error, Interrupted | KeyboardInterrupt):
+                from rodshell.cli.app import failed
+
+                return failed(error)
+            kept = str(error) if isinstance(error, Interrupted) else ""
+            print("rodshell: interrupted" + (f": {kept}" if kept else ""), file=sys.stderr)
+            return interruption.code
 
 
 def entry() -> None:
@@ -97,13 +37,9 @@ def entry() -> None:
 
     Cycles of garbage are rarely looked for: a form leaves a few hundred small objects in them, and no arrays.
     """
+    end_at_once()
     gc.set_threshold(RARELY)
     code = main()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
-
-
-def _fail(message: str, code: int) -> int:
-    click.echo("rodshell: error: " + " ".join(message.split()), err=True)
-    return code

@@ -4,15 +4,16 @@ from pathlib import Path
 
 import click
 
-from rodshell.cli.outcome import wanted_kinds
+from rodshell.cli.outcome import force_option, wanted_kinds
 
 
 @click.command()
 @click.argument("folder", metavar="DIR")
 @click.option("--only", metavar="KINDS", help="Such as dxf,csv; default: all but 3dm.")
 @click.option("--out", "-o", metavar="DIR", help="Where to write; default: into the result itself.")
+@force_option
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-def command(folder: str, only: str | None, out: str | None, quiet: bool) -> int:
+def command(folder: str, only: str | None, out: str | None, force: bool, quiet: bool) -> int:
     """Write drawings, schedules, models or the report of the result in DIR again.
 
     KINDS are dxf, svg, pdf, csv, obj, gltf, vtp, compas, png, report, and 3dm, which needs the package rhino3dm.
@@ -21,7 +22,7 @@ def command(folder: str, only: str | None, out: str | None, quiet: bool) -> int:
     from rodshell.output.archive import export
 
     where = Path(out or folder).expanduser()
-    names = export(read(folder), where, wanted_kinds(only))
+    names = export(read(folder), where, wanted_kinds(only), force=force)
     if not quiet:
         for name in names:
             click.echo(where / name)

@@ -8,15 +8,19 @@ import click
 
 from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
-from rodshell.cli.outcome import Kept, deliver, output_folder, wanted_kinds
+from rodshell.cli.outcome import Kept, announce_rod, deliver, force_option, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
+from rodshell.output.inputs import kept_case, read_inputs
 from rodshell.units import length_text
 
 if TYPE_CHECKING:
     from rodshell.formfinding.search import Search
     from rodshell.layout import GridLayout
+    from rodshell.output import Archive
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
+
+SEARCH = "search.svg"
 
 
 @click.command(
@@ -27,32 +31,47 @@ if TYPE_CHECKING:
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME.")
 @click.option("--only", metavar="KINDS", help="Files beside the archive, such as dxf,csv; see rodshell export --help.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs.")
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-def command(name: str, out: str | None, only: str | None, as_json: bool, quiet: bool, **values: str | None) -> int:
+def command(
+    name: str, out: str | None, only: str | None, force: bool, as_json: bool, quiet: bool, **values: str | None
+) -> int:
     """From a target to the flat grid that pops up into it: drape, trim, map back, pop up, compare.
 
     NAME is a built-in case, {names}; CASE.toml a case file; SURFACE a mesh (OBJ, STL, PLY, OFF,
     glTF), a Rhino file (3dm), or heights (CSV, PNG). Each key of a case is an option too.
     """
     case = load_case(name, overrides_of(values))
-    return run(case, name, out=out, only=only, as_json=as_json, quiet=quiet)
+    return run(case, name, out=out, only=only, force=force, as_json=as_json, quiet=quiet)
 
 
 assert command.help is not None
 command.help = command.help.format(names=", ".join(BUILT_IN))
 
 
-def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bool, quiet: bool) -> int:
+def run(case: Case, name: str, *, out: str | None, only: str | None, force: bool, as_json: bool, quiet: bool) -> int:
     """Find the form of a case and write it; the exit code."""
-    folder = output_folder(out, name)
-    if case.seams.lines:
-        return _sew(case, folder, only=only, as_json=as_json, quiet=quiet)
-    target, layout, rod, options = case.build()
-    asked, case = case, case.sized(target)
-    takeaway, kinds = case.takeaway(), wanted_kinds(only)
+    from rodshell.output.archive import ARCHIVE
+    from rodshell.output.files import reserved
+
+    kinds = wanted_kinds(only)
+    inputs = read_inputs(case.to_toml())
+    copies = kept_case(case.to_toml(), inputs, Path())[1]
+    names = [*ARCHIVE, *copies, *reserved(kinds), *([SEARCH] if case.undecided else [])]
+    with output_folder(out, name, names, force=force) as place:
+        work = _sew if case.seams.lines else _form
+        found, picture = work(case, inputs, quiet=quiet, table=not (quiet or as_json))
+        kept = Kept(found, kinds, picture)
+        return deliver(kept, kept.save, place, as_json=as_json, quiet=quiet)
+
+
+def _form(case: Case, inputs: dict[str, bytes], *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
+    """The form of a case, and the picture of its search; `table` prints that."""
+    takeaway = case.takeaway()
     announce_compilation(quiet=quiet)
-    _announce_sizes(asked, target, layout, rod, quiet=quiet)
+    target, layout, rod, options = case.build()
+    _announce_sizes(case, target, layout, quiet=quiet)
     from rodshell.form import find_form
 
     with Progress(quiet=quiet) as progress:
@@ -61,40 +80,38 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
             found = _search(case, target, layout, rod, progress)
             layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
             case = case.decided(found.best.anchor, found.best.heading)
+            rod = case.rod_on(target, layout, anchor=found.best.anchor)
+        announce_rod(case, rod, quiet=quiet)
+        case = case.with_rod(rod)
         form = find_form(target, layout, rod, progress=progress, **options)
-        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
-    if found and not (quiet or as_json):
+        archive = form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress)
+    if found and table:
         click.echo(found.table())
-    code = deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
-    if found:
-        (folder / "search.svg").write_text(_picture(found), encoding="utf-8")
-    return code
+    return archive, {SEARCH: _picture(found)} if found else {}
 
 
-def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bool) -> int:
-    """Find the form of a case with seams and write it; the exit code."""
-    target, layout, rod, options = case.build_sewn()
-    asked, case = case, case.sized(target)
-    takeaway, kinds = case.takeaway(), wanted_kinds(only)
+def _sew(case: Case, inputs: dict[str, bytes], *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
+    """The form of a case with seams."""
+    takeaway = case.takeaway()
     announce_compilation(quiet=quiet)
-    _announce_sizes(asked, target, layout, rod, quiet=quiet)
+    target, layout, rod, options = case.build_sewn()
+    _announce_sizes(case, target, layout, quiet=quiet)
+    announce_rod(case, rod, quiet=quiet)
+    case = case.with_rod(rod)
     from rodshell.form import sew
 
     with Progress(quiet=quiet) as progress:
         search = case.layout.rotate == "auto"
         form = sew(target, layout=layout, rod=rod, search=search, progress=progress, **options)
         case = case.headed(form.layout.rotate)
-        kept = Kept(form.archive(case.to_toml(), takeaway=takeaway, progress=progress), kinds)
-    return deliver(kept, kept.save, folder, as_json=as_json, quiet=quiet)
+        return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), {}
 
 
-def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", *, quiet: bool) -> None:
+def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet: bool) -> None:
     """Before a job runs, say what it is and which lengths were left to its target's size: a wrong unit shows here."""
-    section = case.rod.section
     lengths = {
         "spacing": min(layout.spacing) if case.layout.spacing == "auto" else None,
         "edge": layout.edge if case.layout.edge == "auto" else None,
-        "rod radius": getattr(rod.section, "radius", None) if getattr(section, "radius", None) == "auto" else None,
     }
     said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
     if said and not quiet:

@@ -61,9 +61,9 @@ class CaseCommand(click.Command):
                 formatter.write_dl(records, col_max=40)
 
 
-def case_options(table: str = "") -> list[click.Parameter]:
-    """An option for each key, or for each inside a table such as "rod"."""
-    return [CaseOption(key) for key in case_keys().values() if not table or key.path.startswith(f"{table}.")]
+def case_options(*tables: str) -> list[click.Parameter]:
+    """An option for each key, or for each inside some tables such as "rod"."""
+    return [CaseOption(key) for key in case_keys().values() if not tables or key.path.split(".")[0] in tables]
 
 
 def overrides_of(values: Mapping[str, str | None]) -> dict[str, object]:

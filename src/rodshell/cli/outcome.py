@@ -1,17 +1,25 @@
 """Where a job's result goes, and what is said when it is there."""
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+import shutil
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import click
 
-if TYPE_CHECKING:
-    from rodshell.output import Archive
+from rodshell.cli.interruption import Interruption
 
-CONVERGED, NOT_CONVERGED = 0, 3
+if TYPE_CHECKING:
+    from rodshell.case import Case
+    from rodshell.output import Archive
+    from rodshell.output.folder import ResultFolder
+    from rodshell.rods.section import Rod
+
+FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
 
 
 class Result(Protocol):
@@ -30,10 +38,11 @@ class Result(Protocol):
 
 @dataclass(frozen=True)
 class Kept:
-    """An archive as a result; `kinds` of files are written with it (None: all)."""
+    """An archive as a result; `kinds` of files are written with it (None: all), and `more` by name."""
 
     archive: "Archive"
     kinds: list[str] | None = None
+    more: dict[str, str] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
@@ -45,20 +54,30 @@ class Kept:
     def result(self) -> dict[str, Any]:
         return self.archive.result
 
-    def save(self, folder: Path) -> Path:
-        return self.archive.save(folder, self.kinds)
+    def save(self, folder: "ResultFolder") -> Path:
+        return self.archive.save(folder, self.kinds, more=self.more)
 
 
-def output_folder(out: str | None, name: str) -> Path:
-    """The folder for a result, by default out/NAME; asked for before the job starts.
+def output_folder(
+    out: str | None, name: str, names: Iterable[str], *, force: bool
+) -> "AbstractContextManager[ResultFolder]":
+    """The folder for a result, by default out/NAME; opened before the job starts.
+
+    names : patterns of what will be written there.
 
     Raises
     ------
-    OutputError : it cannot be written, or holds other things than a result.
+    OutputError : it cannot be written, or holds files of these names that rodshell did not write.
     """
-    from rodshell.output.folder import check_folder
+    from rodshell.output.folder import open_folder
 
-    return check_folder(out or Path("out") / Path(name).stem)
+    return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)
+
+
+def force_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--force of every command that writes a result folder."""
+    text = "Replace files in DIR that rodshell did not write, or that were changed since, where it has to write."
+    return click.option("--force", is_flag=True, help=text)(command)
 
 
 def wanted_kinds(only: str | None) -> list[str] | None:
@@ -73,15 +92,51 @@ def wanted_kinds(only: str | None) -> list[str] | None:
     return None if only is None else read_kinds(only)
 
 
-def deliver(result: Result, save: Callable[[Path], object], folder: Path, *, as_json: bool, quiet: bool) -> int:
-    """Save a result, print its summary, and return the exit code."""
-    save(folder)
+def announce_rod(case: "Case", rod: "Rod", *, quiet: bool) -> None:
+    """Name a rod of which the case left something open, before the job runs."""
+    if case.rod.left_open and not quiet:
+        from rodshell.output.result import rod_table
+        from rodshell.output.summary import chosen, rod_text
+
+        table = rod_table(rod)
+        click.echo(f"rodshell: rod: {rod_text(table)}; {chosen(case.rod.left_open, table)}", err=True)
+
+
+def deliver(
+    result: Result, save: "Callable[[ResultFolder], object]", place: "ResultFolder", *, as_json: bool, quiet: bool
+) -> int:
+    """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
+    Interruption.check()
+    folder = _saved(save, place)
     if as_json:
         click.echo(json.dumps({"out": str(folder), **result.result()}))
     elif not quiet:
         click.echo(result.summary())
         click.echo(f"written to {folder}")
-    if result.status == "converged":
-        return CONVERGED
-    click.echo(f"rodshell: NOT CONVERGED: {result.status}; partial results are in {folder}", err=True)
-    return NOT_CONVERGED
+    if result.status != "converged":
+        click.echo(f"rodshell: NOT CONVERGED: {result.status}; partial results are in {folder}", err=True)
+        return NOT_CONVERGED
+    verdict = result.result().get("verdict")
+    if verdict and verdict["level"] == "unbuildable":
+        click.echo(f"rodshell: NOT BUILDABLE: {verdict['reasons'][0]}; results are in {folder}", err=True)
+        return UNBUILDABLE
+    return FOUND
+
+
+def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:
+    """Where a result was saved: beside its place, if somebody put files there while the job ran."""
+    from rodshell.output.folder import ForeignFileError, open_folder
+
+    try:
+        save(place)
+        for name in place.kept:
+            click.echo(f"rodshell: kept {place.path / name}: it was changed since an earlier run wrote it", err=True)
+        return place.path
+    except ForeignFileError as error:
+        names = (place.path.with_name(f"{place.path.name}-{k}") for k in count(2))
+        free = next(path for path in names if not path.exists())
+        with open_folder(free) as other:
+            shutil.copytree(place.new, other.new, dirs_exist_ok=True)
+            other.commit()
+        click.echo(f"rodshell: written to {free} instead: {error}", err=True)
+        return free

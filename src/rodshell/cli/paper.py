@@ -1,26 +1,28 @@
 """`rodshell paper`: the paper's figures, made again with their errors."""
 
+from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 
 import click
 
-from rodshell.cli.outcome import deliver, output_folder
+from rodshell.cli.outcome import deliver, force_option, output_folder
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.errors import InputError
-from rodshell.paper import FIGURES
+from rodshell.paper import FIGURES, reserved
 
 
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))
 @click.argument("figure", metavar="FIGURE|all")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the figure; default out/FIGURE; of all: DIR/FIGURE each.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, a line for each figure.")
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 @click.option("--seed", type=click.IntRange(min=0), help="genetic: search anew from this seed, or go on with that.")
 @click.option("--target", metavar="NAME", help="genetic: this target only.")
 @click.option("--jobs", type=click.IntRange(min=1), help="genetic: processes of a search; default 1.")
 @click.option("--generations", type=click.IntRange(min=1), help="genetic: the most of a search; default 300.")
-def command(figure: str, out: str | None, as_json: bool, quiet: bool, **options: int | str | None) -> int:
+def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: bool, **options: int | str | None) -> int:
     """Make a figure of the paper again, or all of them: pictures, tables, errors."""
     if figure not in (*FIGURES, "all"):
         raise InputError(f"there is no figure {figure} here: the figures are {', '.join(FIGURES)}; or all")
@@ -28,11 +30,16 @@ def command(figure: str, out: str | None, as_json: bool, quiet: bool, **options:
     if given and figure != "genetic":
         raise InputError(f"--{next(iter(given))} is for the figure genetic, not for {figure}: leave it out")
     names = list(FIGURES) if figure == "all" else [figure]
-    folders = [output_folder(str(Path(out) / name) if out and figure == "all" else out, name) for name in names]
-    announce_compilation(quiet=quiet)
-    codes = []
-    for name, folder in zip(names, folders, strict=True):  # each is written as soon as it is made
-        with Progress(quiet=quiet) as progress:
-            made = import_module(f"rodshell.paper.{name}").make(progress, **given)
-        codes.append(deliver(made, made.save, folder, as_json=as_json, quiet=quiet))
+    folders = [str(Path(out) / name) if out and figure == "all" else out for name in names]
+    with ExitStack() as stack:
+        places = [
+            stack.enter_context(output_folder(folder, name, reserved(name), force=force))
+            for name, folder in zip(names, folders, strict=True)
+        ]
+        announce_compilation(quiet=quiet)
+        codes = []
+        for name, place in zip(names, places, strict=True):  # each is written as soon as it is made
+            with Progress(quiet=quiet) as progress:
+                made = import_module(f"rodshell.paper.{name}").make(progress, **given)
+            codes.append(deliver(made, made.save, place, as_json=as_json, quiet=quiet))
     return max(codes)

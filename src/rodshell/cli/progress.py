@@ -8,8 +8,14 @@ from typing import TYPE_CHECKING, Self
 
 import click
 
+from rodshell.cli.interruption import Interruption
+from rodshell.uncached import kernels_are_kept
+
 if TYPE_CHECKING:
     from rich.status import Status
+
+
+UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one"
 
 
 class Progress:
@@ -39,6 +45,7 @@ class Progress:
             self._live = None
 
     def __call__(self, stage: str, detail: str, residual: float) -> None:
+        Interruption.check()
         if self._live is not None:
             from rich.text import Text
 
@@ -50,8 +57,12 @@ class Progress:
 
 
 def announce_compilation(*, quiet: bool = False) -> None:
-    """Before the first run, say what it will wait for."""
-    if not quiet and not compiled_before():
+    """Before the first run, say what it will wait for; and before each one, where nothing can be kept."""
+    if quiet:
+        return
+    if not kernels_are_kept():
+        click.echo(f"rodshell: compiling kernels anew, about 20 s: {UNKEPT}", err=True)
+    elif not compiled_before():
         click.echo("rodshell: compiling kernels, once, about 20 s (rodshell warmup compiles all ahead)", err=True)
 
 

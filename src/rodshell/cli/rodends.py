@@ -34,9 +34,9 @@ class RodEnds:
     final: NDArray[np.float64]
 
     @property
-    def longest(self) -> float:
-        """Length of the longest rod [m]."""
-        return float(np.linalg.norm(self.flat[:, 1] - self.flat[:, 0], axis=1).max())
+    def lengths(self) -> NDArray[np.float64]:
+        """(m,) lengths of the rods [m]."""
+        return np.linalg.norm(self.flat[:, 1] - self.flat[:, 0], axis=1)
 
 
 def read_table(path: Path, unit: str) -> RodEnds:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rodshell.cli.progress import Progress
+from rodshell.cli.progress import UNKEPT, Progress
+from rodshell.errors import InputError
+from rodshell.uncached import kernels_are_kept
 
 if TYPE_CHECKING:
     from rodshell.layout import GridLayout
@@ -25,6 +27,8 @@ def command(quiet: bool) -> int:
     It takes one or two minutes after an installation, and nothing later. Jobs work without it: each then compiles what
     it needs.
     """
+    if not kernels_are_kept():
+        raise InputError(f"kernels compiled now would be lost: {UNKEPT}")
     begin = time.perf_counter()
     compiled = warm_up(Progress(quiet=quiet))
     if quiet:

@@ -70,7 +70,7 @@ def fabricate(
             made, pieces, nesting = longer, others, tried
     bracing: tuple[Diagonal, ...] = ()
     if final is not None:
-        places = (mesh.flat[mesh.joint_nodes], final[mesh.joint_nodes])
+        places = (mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1))
         bracing = tuple(diagonals(crossings.rods, crossings.at, *places))
     return Fabricated(
         options, cut, cut * rod.mass_per_length, layers(len(rods), crossings.rods.tolist()),

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Agreement:
-    """Distance between rods and target, over nodes and the middles of edges.
+    """Distance between rods and target, over nodes and the middles of edges; of rods in layers from their own layer.
 
     Parameters
     ----------
@@ -49,10 +49,9 @@ class Agreement:
 
 def agreement(popped: Popped, target: Target) -> Agreement:
     """Distance of the popped-up rods to the target, continued smoothly past its end."""
-    nodes = popped.positions
-    middles = edge_middles(popped.footprint.mesh, nodes)
-    points = np.vstack([nodes, middles])
-    gaps = target.distance(points)
+    nodes, mesh = popped.positions, popped.footprint.mesh
+    points = np.vstack([nodes, edge_middles(mesh, nodes)])
+    gaps = target.distance(points) - np.append(mesh.heights, mesh.heights[mesh.edges[:, 0]])
     k = int(np.argmax(np.abs(gaps)))
     x, y, z = points[k].tolist()
     return Agreement(

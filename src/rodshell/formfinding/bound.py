@@ -5,6 +5,8 @@ leaves open: the shape of each span between its joints. No load and no stretch s
 result does not depend on scale or material. The axes and the anchor are held, as the net holds them.
 """
 
+from collections.abc import Callable
+from dataclasses import replace
 from math import degrees
 
 import numpy as np
@@ -14,6 +16,9 @@ from rodshell.contact.bound import BoundToTarget
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.natural import with_natural_ends
 from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.thickness import layers_left_out, sideways
+from rodshell.geometry.vectors import dot
+from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import whole_rods
 from rodshell.layout.mesh import nodes_along
@@ -22,14 +27,16 @@ from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.mixed_newton import find_equilibrium
+from rodshell.solve.mixed_newton import STRAIN_TOLERANCE, Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
+from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
 
 Floats = NDArray[np.float64]
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
 WARN_ANGLE = 25.0  # degrees
+MOST_TURNS = 3  # solves of a drape in layers; the second leaves strains of 1e-8
 PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces settle by 0.05 a step at 200 rods
 
 
@@ -40,11 +47,13 @@ def bound_drape(
     *,
     anchor: tuple[float, float] | None = None,
     near: Draped | None = None,
+    joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Drape `layout` over `target` by its net; see `drape`."""
     progress("net", "marching", 0.0)
-    net = chebyshev_net(target, layout, anchor=anchor, near=near.net if near else None)
+    eccentricity = joint.eccentricity if joint else 0.0
+    net = chebyshev_net(target, layout, anchor=anchor, near=near.net if near else None, eccentricity=eccentricity)
     grid = with_apron(net, CLEARANCE * layout.edge)
     cuts = [list[FlatRod]() for _ in grid.rods]
     for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
@@ -54,7 +63,7 @@ def bound_drape(
     for k, line in enumerate(grid.rods):
         start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
     rod_within = _within_surface(rod)
-    shell = Shell.of(mesh, rod_within)
+    shell, natural = Shell.of(mesh, rod_within), with_natural_ends(target, mesh, start)
     problem = Problem(
         elements=shell.elements,
         stretch=_penalty(shell.stretch, rod_within, target),
@@ -63,15 +72,21 @@ def bound_drape(
         inextensible=True,
         places=shell.places,
     )
-    found = find_equilibrium(
-        problem,
-        with_natural_ends(target, mesh, start),
-        np.zeros(len(mesh.edges)),
+    found = _in_layers(
+        problem, target, mesh, natural, eccentricity,
         progress=lambda k, step: progress("drape", f"bound, iteration {k}", step),
-    )
+    )  # fmt: skip
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
     warnings = [*target.warnings, *net.warnings]
+    on = np.zeros(mesh.node_count, dtype=bool)
+    on[on_target] = True
+    edges, bends = (np.asarray(on[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
+    wide = sideways(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
+    if wide is not None:
+        warnings += wide.warnings
+    if not eccentricity:
+        warnings += layers_left_out(target, mesh, found.state, edges, rod, min(layout.spacing))
     if found.report.negative_modes:
         warnings.append(
             f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
@@ -102,6 +117,8 @@ def bound_drape(
         anchor=anchor,
         gravity=0.0,
         net=net,
+        eccentricity=eccentricity,
+        sideways=wide,
         dropped=net.dropped,
         warnings=tuple(warnings),
     )
@@ -122,6 +139,42 @@ def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
     weight = max(LEAST_PENALTY, PENALTY * (target.size / float(np.median(stretch.rest_lengths))) ** 2)
     stiffness = weight * rod.bend_stiffness / target.size**2
     return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
+
+
+def _in_layers(
+    problem: Problem,
+    target: Target,
+    mesh: GridMesh,
+    start: Floats,
+    eccentricity: float,
+    progress: Callable[[int, float], None],
+) -> Equilibrium:
+    """Equilibrium on the target of rods whose own lines, in two layers, keep their lengths: once more where sideways
+    motion turned edges towards another curvature."""
+    state, forces, reports = start, np.zeros(len(mesh.edges)), list[SolveReport]()
+    while True:
+        if eccentricity:
+            lengths = _between_layers(target, mesh, state, eccentricity)
+            problem = replace(problem, stretch=replace(problem.stretch, rest_lengths=lengths))
+        found = find_equilibrium(problem, state, forces, progress=progress)
+        state, forces = found.state, found.forces
+        reports.append(found.report)
+        strain = 0.0
+        if eccentricity:
+            strain = float(np.abs(_between_layers(target, mesh, state, eccentricity) / lengths - 1.0).max())
+        if strain < STRAIN_TOLERANCE or not found.report.converged or len(reports) == MOST_TURNS:
+            return replace(found, report=found.report.after(*reports[:-1]))
+        problem = replace(problem, elements=found.elements, pattern=found.pattern)
+
+
+def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentricity: float) -> Floats:
+    """(e,) lengths [m] on the target of edges whose rods' own lines lie in two layers, near `positions` (n, 3): by how
+    much the layers' chords are longer or shorter depends on the target's curvature along them."""
+    above = 0.5 * eccentricity * np.array([1.0 if rod.family == "v" else -1.0 for rod in mesh.grid.rods])
+    normal, (a, b) = target.on_surface(positions).normal, mesh.edges.T
+    chord = positions[b] - positions[a]
+    own = chord + above[mesh.edge_rods, None] * (normal[b] - normal[a])
+    return np.asarray(mesh.edge_lengths * np.sqrt(dot(chord, chord) / dot(own, own)))
 
 
 def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.thickness import Sideways
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.nets import ChebyshevNet
@@ -27,7 +28,7 @@ class Draped:
     Parameters
     ----------
     mesh : the whole mesh, with the lines and tails that are cut off later.
-    positions : (n, 3) of its nodes [m].
+    positions : (n, 3) of its nodes [m]; of rods in two layers, of the surface between the layers.
     rods : the rods to be built, each from end to end of the target (bound), or whole (gravity).
     levels : report of the solve on each level of refinement, the last at the layout's own edge length.
     max_gap : largest distance between the target and a node that should touch it, or depth of a node inside [m].
@@ -38,6 +39,8 @@ class Draped:
     anchor : x, y of the anchor as it was given [m], or None; gravity : [m/s2].
     net : the net that the drape started from; None where it started from the flat grid.
     rest, fall : how it came to rest, and how it fell, where it fell in time (paper).
+    eccentricity : distance of the two layers of rods [m]; 0 where they meet.
+    sideways : how the rods bend within the target, where joints keep them from rolling (bound).
     """
 
     method: str
@@ -60,6 +63,8 @@ class Draped:
     warnings: tuple[str, ...] = ()
     rest: "Rest | None" = None
     fall: Fall | None = None
+    eccentricity: float = 0.0
+    sideways: Sideways | None = None
 
     @property
     def report(self) -> SolveReport:
@@ -102,6 +107,27 @@ def node_normals(mesh: GridMesh, positions: Floats) -> Floats:
         for k in range(3):
             np.add.at(total[:, k], mesh.rod_nodes[here], np.interp(mesh.stations[here], at, normals[:, k]))
     return unit(total)
+
+
+def laid_in_layers(
+    mesh: GridMesh, positions: Floats, normals: Floats, eccentricity: float
+) -> tuple[GridMesh, Floats, Floats]:
+    """A mesh in two layers, so far apart [m], with the places (k, 3) of its nodes and the normals there, from those
+    (n, 3) of the surface between the layers."""
+    layered = mesh.in_layers(eccentricity)
+    own = normals[mesh.rod_nodes]
+    return layered, positions[mesh.rod_nodes] + layered.heights[:, None] * own, own
+
+
+def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floats:
+    """(n, 3) places of the nodes of `mesh` between two layers of rods [m], whose nodes lie at `positions` (k, 3):
+    `layered` is `mesh` in layers, or `mesh` itself."""
+    if not layered.layered:
+        return positions
+    middle = positions - layered.heights[:, None] * node_normals(layered, positions)
+    total = np.zeros((mesh.node_count, 3))
+    np.add.at(total, mesh.rod_nodes, middle)
+    return total / np.bincount(mesh.rod_nodes, minlength=mesh.node_count)[:, None]
 
 
 def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import ConvergenceError, StabilityError
 from rodshell.formfinding.calming import calming
-from rodshell.formfinding.draped import Draped, smallest_joint_angle
+from rodshell.formfinding.draped import Draped, middle_surface, smallest_joint_angle
 from rodshell.formfinding.fall import Fall
 from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
 from rodshell.formfinding.progress import Progress, silent
@@ -72,10 +72,10 @@ def falling_drape(
     mesh = mesh_grid(grid, layout.edge, marks=middle_marks(grid, layout))
     shell = Shell.of(mesh, rod, joint=joint, coupling=fall.coupling)
     falling = _Falling(target, shell, gravity, fall, progress)
-    series = falling.run(over(mesh, layout, top + [0.0, 0.0, fall.height]))
+    series = falling.run(over(shell.mesh, layout, top + [0.0, 0.0, fall.height]))
     rest, report = falling.outcome(series)
     assert series.last is not None
-    positions = shell.positions(series.last.state)
+    positions = middle_surface(mesh, shell.mesh, shell.positions(series.last.state))
     if slid_off(mesh, positions, layout, top, target):
         report = replace(report, status=Status.SLID_OFF)
     angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
@@ -96,6 +96,7 @@ def falling_drape(
         anchor=anchor,
         gravity=gravity,
         net=None,
+        eccentricity=joint.eccentricity if joint else 0.0,
         warnings=_warnings(rest, series, falling),
         rest=rest,
         fall=fall,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.contact.unilateral import UnilateralContact
-from rodshell.formfinding.draped import Draped, node_normals, smallest_joint_angle
+from rodshell.formfinding.draped import Draped, laid_in_layers, middle_surface, node_normals, smallest_joint_angle
 from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint
@@ -49,15 +49,20 @@ def gravity_drape(
     grid = falling_grid(target, layout, anchor)
     mesh: GridMesh | None = None
     state: Floats | None = None
-    levels = list[SolveReport]()
+    levels, apart = list[SolveReport](), joint.eccentricity if joint else 0.0
     for edge in _edges(layout):
         coarse, mesh = mesh, mesh_grid(grid, edge, marks=middle_marks(grid, layout))
         start = over(mesh, layout, top) if coarse is None or state is None else coarse.prolong(state, mesh)
         name = f"level {len(levels) + 1}"
         shell = Shell.of(mesh, rod, joint=joint)
-        found, contact = _settle(target, layout, rod, shell, start, top, gravity, len(levels) == 0, name, progress)
+        normals = node_normals(mesh, start) if shell.angles else None
+        if apart and normals is not None:
+            _, start, normals = laid_in_layers(mesh, start, normals, apart)
+        found, contact = _settle(
+            target, layout, rod, shell, start, normals, top, gravity, len(levels) == 0, name, progress
+        )
         levels.append(found.report)
-        state = shell.positions(found.state)
+        state = middle_surface(mesh, shell.mesh, shell.positions(found.state))
         if not found.report.converged:
             break
     assert mesh is not None
@@ -87,6 +92,7 @@ def gravity_drape(
         anchor=anchor,
         gravity=gravity,
         net=None,
+        eccentricity=apart,
         warnings=tuple(warnings),
     )
 
@@ -120,6 +126,7 @@ def _settle(
     rod: Rod,
     shell: Shell,
     start: Floats,
+    normals: Floats | None,
     top: Floats,
     gravity: float,
     cold: bool,
@@ -136,7 +143,6 @@ def _settle(
     stiffness = np.full(len(nodes), weight * longest / (5e-3 * target.size))
     contact = UnilateralContact(target, nodes[:, None], stiffness, np.zeros(len(nodes)))
     supports = Supports(_held(shell, layout))
-    normals = node_normals(mesh, start) if shell.angles else None
     state, forces, reports = shell.state(start, normals=normals), np.zeros(len(mesh.edges)), list[SolveReport]()
     for update in range(CONTACT_UPDATES):
         problem = Problem(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import degrees, pi, sin
+from math import degrees, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import Method, drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
-from rodshell.formfinding.popup import Ends, Popped, pop_up
+from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.roll import roll
 from rodshell.formfinding.trim import (
@@ -25,12 +25,13 @@ from rodshell.formfinding.trim import (
     trim,
     untrimmed,
 )
-from rodshell.joints import Ball, Joint
+from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
-from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
+from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.units import length_text
+from rodshell.validation import choices_of
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +39,6 @@ SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
 STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
 ROLLED = pi / 4  # rad: a lath that turns by more bends about its other axis rather than its own
 LONG_TAIL = 3.0  # spacings past a rod's last joint
-ROOM = 0.5  # of the clear distance of parallel rods: wider ones leave no room for joints
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,10 @@ class FoundForm:
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
         stretched = _stretched(self.draped)
-        off = _springs_off(self.agreement, advise=not stretched)
-        built = (*_crowded(self.draped), *(_long_tails(self.trimmed) if self.draped.converged else ()))
-        return (*self.draped.warnings, *stretched, *built, *_popped_warnings(self.popped), *off)
+        wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
+        off = _springs_off(self.agreement, advise=not (stretched or wide))
+        tails = _long_tails(self.trimmed) if self.draped.converged else ()
+        return (*self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
 
 
 @dataclass(frozen=True)
@@ -106,10 +107,10 @@ def find_stages(
     *,
     method: Method = "bound",
     anchor: tuple[float, float] | None = None,
-    gravity: float = 9.81,
+    gravity: float | None = None,
     joint: Joint | None = None,
     fall: Fall | None = None,
-    ends: Sequence[Ends] = ("pinned", "clamped"),
+    ends: Ends | Sequence[Ends] = ENDS,
     start: FoundForm | None = None,
     cut: Callable[[Draped], Trimmed] = trim,
     progress: Progress = silent,
@@ -118,6 +119,8 @@ def find_stages(
 
     cut : how the draped shell is trimmed.
     """
+    ends = choices_of("ends", ends, ENDS)
+    require_joint(joint)
     joint = joint or Ball()
     draped = drape(
         layout, rod, target,
@@ -198,18 +201,6 @@ def _stretched(draped: Draped) -> tuple[str, ...]:
     )
 
 
-def _crowded(draped: Draped) -> tuple[str, ...]:
-    """Rods too wide for their distance, where shear brings parallel ones nearest to each other."""
-    apart, wide = min(draped.layout.spacing) * sin(draped.min_angle), _breadth(draped.rod)
-    if not wide > ROOM * apart:
-        return ()
-    what = "they would touch" if wide >= apart else "that leaves hardly any room for joints"
-    return (
-        f"the rods are {1e3 * wide:.3g} mm wide, and parallel ones {1e3 * apart:.3g} mm apart where the families meet "
-        f"at {degrees(draped.min_angle):.0f} degrees: {what}; use thinner rods (rod.section) or a larger spacing",
-    )
-
-
 def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     """Rods that run far past their last joint, since crossings there lie too near to an end."""
     grid = trimmed.mesh.grid
@@ -230,16 +221,6 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
         f"{grid.rods[worst].name} runs {length_text(tails[worst])} past its last joint{others}{why}; another offset or "
         "anchor of the layout may help, or leave such rods out",
     )
-
-
-def _breadth(rod: Rod) -> float:
-    """What a rod covers of the grid's plane across its line [m]; 0 where the shape of its section is not known."""
-    section = rod.section
-    if isinstance(section, GivenSection):
-        return 0.0
-    if isinstance(section, Circle | Tube):
-        return 2 * section.outer_radius
-    return 2 * section.b if isinstance(section, Ellipse) else section.height
 
 
 def _springs_off(compared: dict[Ends, Agreement], *, advise: bool) -> tuple[str, ...]:

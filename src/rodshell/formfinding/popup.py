@@ -6,7 +6,7 @@ hold the direction of the draped rods as well. The end condition decides the sha
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +15,31 @@ from rodshell.errors import InputError
 from rodshell.formfinding.carried import carried_edges, carried_nodes
 from rodshell.formfinding.draped import node_normals
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.trim import Boundary, Footprint
+from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.vectors import dot, unit
-from rodshell.joints import Ball, Joint
+from rodshell.joints import Ball, Joint, require_joint
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import Equilibrium, find_stable
 from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem
-from rodshell.solve.report import SolveReport
+from rodshell.solve.report import SolveReport, Status
+from rodshell.units import length_text
+from rodshell.validation import choice
 
 Floats = NDArray[np.float64]
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
+ENDS: tuple[Ends, ...] = get_args(Ends)
+STARTS: tuple[Start, ...] = get_args(Start)
 
 UP = np.array([0.0, 0.0, 1.0])
 FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
 CLAMP_STEP = 0.25
 MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
 MOST_AGAIN = 8  # iterations from the last form before starting afresh
+HOPELESS = 0.5  # negative modes a joint: laths ended 7 % and more off the target from there, other shells have 0.2
 NEARBY = 0.1  # of the length: a state further from the guess may be another one
 
 
@@ -82,13 +87,28 @@ def pop_up(
         but the displacements and axial forces that it had on the same rods are the first guess. Where that does
         not lead to a stable state nearby, the draped state does.
     joint : what the rods do to each other where they cross: one for all, or one for each crossing; ball joints
-        without. Eccentric rods end half their distance above or below the boundary.
+        without. Eccentric ones lay the rods in two layers: each rod begins on its own line, half of their distance
+        above or below the draped surface, and the boundary's ends lie there.
 
     Raises
     ------
     InputError : `start` is "draped" and the boundary has no draped state; the joints do not fit the grid.
     """
-    job = _PopUp(footprint, boundary, rod, joint or Ball(), progress)
+    choice("ends", ends, ENDS)
+    if not isinstance(start, Popped):
+        choice("start", start, STARTS)
+    require_joint(joint)
+    joint = joint or Ball()
+    joints = joint if isinstance(joint, Sequence) else (joint,)
+    apart = max((one.eccentricity for one in joints), default=0.0)
+    if apart and not footprint.mesh.layered:
+        footprint, boundary = in_layers(footprint, boundary, apart)
+    elif footprint.mesh.layered and apart != (lie := 2 * float(np.abs(footprint.mesh.heights).max(initial=0.0))):
+        raise InputError(
+            f"the grid's rods lie in two layers {length_text(lie)} apart, and its joints hold them "
+            f"{length_text(apart)} apart: drape it with the same joint"
+        )
+    job = _PopUp(footprint, boundary, rod, joint, progress)
     if start == "draped" or isinstance(start, Popped):
         shell, found = (job.again(start) if isinstance(start, Popped) else None) or job.release(ends)
         start = "draped"
@@ -117,6 +137,16 @@ class _PopUp:
         """Characteristic length: half the boundary's width [m]."""
         return 0.5 * float(np.ptp(self.boundary.points, axis=0).max())
 
+    @property
+    def hopeless(self) -> int | None:
+        """Negative modes of the draped state from which no good shape is reached: rods buckle between their joints
+        nearly everywhere, and hundreds of factorisations lead to crumpled states far from the target. None where
+        rods can roll at their joints: laths on edge have as many modes, and lie down."""
+        joints = self.joint if isinstance(self.joint, Sequence) else (self.joint,)
+        if not all(one.holds_normals for one in joints):
+            return None
+        return int(HOPELESS * len(self.footprint.mesh.grid.crossings))
+
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
         """Ends (and ghosts) held, or on their way to `goals`."""
         free = shell.held_ends()
@@ -124,27 +154,35 @@ class _PopUp:
         supports = Supports(free) if goals is None else Supports(free, moved, goals)
         return Problem(shell.elements, shell.stretch, supports, self.length, places=shell.places)
 
-    def upright(self, shell: Shell, positions: Floats, tangents: Floats | None = None) -> Floats:
-        """The state at these node positions (n, 3), the rods' first directors along the normals of the surface."""
-        normals = node_normals(self.footprint.mesh, positions) if shell.angles else None
+    def upright(
+        self, shell: Shell, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None
+    ) -> Floats:
+        """The state at these node positions (n, 3), the rods' first directors along the normals of the surface: those
+        (n, 3) given, or what the crossings of the rods tell of them."""
+        if normals is None and shell.angles:
+            normals = node_normals(self.footprint.mesh, positions)
         return shell.state(positions, tangents, normals)
 
     def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
-        """Let go of the draped state: the ends stay, the target's forces vanish. At once, or down the energy."""
+        """Let go of the draped state: the ends stay, the target's forces vanish. At once, or down the energy.
+
+        Given up where it has more negative modes than is `hopeless`.
+        """
         if self.boundary.draped is None:
             raise InputError('this boundary has no draped state to start from: use start="flat"')
         shell = self.shell(ends)
-        state = self.upright(shell, self.boundary.draped, self.boundary.tangents)
+        state = self.upright(shell, self.boundary.draped, self.boundary.tangents, self.boundary.normals)
         forces = np.zeros(len(self.footprint.mesh.edges))
         at_once = find_stable(
             self.problem(shell),
             state,
             forces,
             cut=True,
+            most_modes=self.hopeless,
             most_iterations=MOST_AT_ONCE,
             progress=lambda k, step: self.progress("pop-up", f"{ends}, iteration {k}", step),
         )
-        if at_once.report.stable:
+        if at_once.report.stable or at_once.report.status is Status.BUCKLED:
             return shell, at_once
         from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
 
@@ -183,12 +221,9 @@ class _PopUp:
         mesh, boundary = self.footprint.mesh, self.boundary
         shell = self.shell("pinned")
         flat = aligned(mesh.flat, mesh.flat[mesh.ends.ravel()], boundary.points)
-        first, up = flat[mesh.ends.ravel()], UP
-        if boundary.draped is not None:
-            up = node_normals(mesh, boundary.draped)[mesh.ends.ravel()]
-        last = boundary.points + shell.lift[shell.ends] * up
+        first = flat[mesh.ends.ravel()]
         found = follow(
-            lambda t: self.problem(shell, (1 - t) * (first + shell.lift[shell.ends] * UP) + t * last),
+            lambda t: self.problem(shell, (1 - t) * first + t * boundary.points),
             self.upright(shell, arched(self.footprint, flat, first, boundary)),
             np.zeros(len(mesh.edges)),
             first_step=FIRST_RISE,
@@ -231,7 +266,7 @@ def aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     result = np.empty_like(flat)
     result[:, :2] = (flat - centre)[:, :2] @ turn.T + there[:2]
-    result[:, 2] = there[2]
+    result[:, 2] = there[2] + flat[:, 2]
     return result
 
 
@@ -254,4 +289,9 @@ def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary
         chord[:, 2] += height * np.sin(np.pi * share[:, 0])
         raised[nodes] += chord
         weight[nodes] += 1
-    return raised / weight[:, None]
+    raised /= weight[:, None]
+    if mesh.layered:  # rods of a joint meet half-way here, too
+        pairs = mesh.joint_pairs
+        middle = raised[pairs].mean(axis=1)
+        raised[pairs] = middle[:, None] + mesh.heights[pairs][:, :, None] * UP
+    return raised

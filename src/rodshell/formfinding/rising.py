@@ -14,7 +14,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding.popup import FIRST_RISE, aligned, arched
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
-from rodshell.formfinding.trim import Boundary, Footprint
+from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.vectors import dot
 from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
@@ -89,6 +89,8 @@ def pop_up_in_time(
     StabilityError, ConvergenceError : explicit ties that are too stiff for any step; a step that fails.
     """
     rise = rise or Rise()
+    if joint and joint.eccentricity and not footprint.mesh.layered:
+        footprint, boundary = in_layers(footprint, boundary, joint.eccentricity)
     mesh = footprint.mesh
     shell = Shell.of(mesh, rod, joint=joint, coupling=rise.coupling)
     ends = mesh.ends.ravel()

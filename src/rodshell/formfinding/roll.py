@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rodshell.formfinding.draped import node_normals
 from rodshell.formfinding.popup import Popped
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.vectors import dot, unit
 from rodshell.rods.bend_twist import BendTwist
 
 Floats = NDArray[np.float64]
@@ -18,10 +18,8 @@ def roll(popped: Popped) -> Floats | None:
     frames = next((one for one in shell.within if isinstance(one, BendTwist)), None)
     if frames is None or not shell.angles:
         return None
-    edges = frames.blocks[: len(mesh.bends), 1]
-    tangents, directors = (part[: len(edges), 0] for part in (frames.source_tangents, frames.source_directors))
-    turn = popped.state[edges, :1]
-    m1 = np.cos(turn) * directors + np.sin(turn) * cross(tangents, directors)
+    bends = slice(len(mesh.bends))
+    tangents, m1 = frames.source_tangents[bends, 0], frames.material_directors(popped.state)[bends, 0]
     normals = node_normals(mesh, popped.positions)[mesh.bends[:, 1]]
     seen = unit(normals - dot(normals, tangents)[:, None] * tangents)
     return np.asarray(np.arccos(np.clip(np.abs(dot(m1, seen)), 0.0, 1.0)))

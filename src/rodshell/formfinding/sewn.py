@@ -16,12 +16,12 @@ from rodshell.formfinding.joined import joined_agreement, joined_report
 from rodshell.formfinding.matching import Point
 from rodshell.formfinding.patches import carried_heading, patches_of
 from rodshell.formfinding.pipeline import FoundForm, find_stages
-from rodshell.formfinding.popup import Ends
+from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.seams import FEWEST, Laid, Meeting, lay_patches
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
-from rodshell.joints import Ball, Joint
+from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout
 from rodshell.layout.side_by_side import SideBySide, side_by_side
 from rodshell.rods.section import Rod
@@ -30,6 +30,7 @@ from rodshell.targets import Target
 from rodshell.targets.patch import Patch
 from rodshell.targets.seam import Seam
 from rodshell.units import shown
+from rodshell.validation import choices_of
 
 Floats = NDArray[np.float64]
 
@@ -168,11 +169,13 @@ def find_sewn_stages(
     *,
     own: Mapping[str, PatchLayout] | None = None,
     joint: Joint | None = None,
-    ends: Sequence[Ends] = ("pinned", "clamped"),
+    ends: Ends | Sequence[Ends] = ENDS,
     search: bool = False,
     progress: Progress = silent,
 ) -> SewnForm:
     """Cut a target into patches, lay their rods such that they meet, and form each; see `rodshell.sew`."""
+    ends = choices_of("ends", ends, ENDS)
+    require_joint(joint)
     own, joint = dict(own or {}), joint or Ball()
     if search:
         layout = replace(layout, rotate=best_heading(target, seams, layout, own, progress=progress))

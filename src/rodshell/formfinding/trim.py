@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError
-from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.draped import Draped, laid_in_layers, node_normals
 from rodshell.geometry.vectors import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
@@ -23,14 +23,16 @@ class Boundary:
 
     Parameters
     ----------
-    points : (2m, 3), start and end of each rod in turn [m].
+    points : (2m, 3), start and end of each rod's own line in turn [m].
     tangents : (2m, 3) outward unit tangents of the draped rods there: the directions of clamps.
     draped : (n, 3) the state of the whole trimmed shell that has these ends, or None [m].
+    normals : (n, 3) of the surface at the draped nodes, where rods lie in layers; else None.
     """
 
     points: Floats
     tangents: Floats
     draped: Floats | None = None
+    normals: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,10 @@ class Footprint:
 
 @dataclass(frozen=True)
 class Trimmed:
-    """The draped grid without what hangs over: `positions` (n, 3) of the nodes of `mesh`, and its boundary."""
+    """The draped grid without what hangs over: `positions` (n, 3) of the nodes of `mesh`, and its boundary.
+
+    Rods in layers have nodes of their own there, on their own lines.
+    """
 
     draped: Draped
     mesh: GridMesh
@@ -85,8 +90,26 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
         )
     mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
     positions = positions[nodes]
-    boundary = Boundary(positions[mesh.ends.ravel()], end_tangents(mesh, positions), positions)
+    normals: Floats | None = None
+    if draped.eccentricity:
+        bound = draped.method == "bound"
+        normals = draped.target.on_surface(positions).normal if bound else node_normals(mesh, positions)
+        mesh, positions, normals = laid_in_layers(mesh, positions, normals, draped.eccentricity)
+    boundary = Boundary(positions[mesh.ends.ravel()], end_tangents(mesh, positions), positions, normals)
     return Trimmed(draped, mesh, positions, boundary, tuple(dropped))
+
+
+def in_layers(footprint: Footprint, boundary: Boundary, eccentricity: float) -> tuple[Footprint, Boundary]:
+    """Footprint and boundary of rods that lie in two layers, from those of a grid whose rods share nodes.
+
+    Without a draped state the boundary's points are the ends of the rods' own lines already.
+    """
+    mesh, draped = footprint.mesh, boundary.draped
+    if draped is None:
+        return Footprint(mesh.in_layers(eccentricity)), boundary
+    layered, positions, normals = laid_in_layers(mesh, draped, node_normals(mesh, draped), eccentricity)
+    ends = layered.ends.ravel()
+    return Footprint(layered), Boundary(positions[ends], boundary.tangents, positions, normals)
 
 
 def untrimmed(draped: Draped) -> Trimmed:

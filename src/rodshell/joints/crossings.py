@@ -15,7 +15,7 @@ class Places:
 
     Parameters
     ----------
-    mesh : the mesh, its rods sharing their nodes at joints.
+    mesh : the mesh, its rods sharing their nodes at joints or lying in layers.
     blocks : (k,) block of the state that holds each place: its node's, or one of its own where rods do not share.
     first_angle : block of the first edge's twist angle; the others follow.
     """
@@ -34,7 +34,7 @@ class Places:
         """(c, 2) places of each crossing of the grid, on its first and its second rod."""
         key = self.rods * self.mesh.node_count + self.mesh.rod_nodes
         order = np.argsort(key, kind="stable")
-        wanted = self.mesh.grid.crossings.rods * self.mesh.node_count + self.mesh.joint_nodes[:, None]
+        wanted = self.mesh.grid.crossings.rods * self.mesh.node_count + self.mesh.joint_pairs
         return np.asarray(order[np.searchsorted(key[order], wanted)])
 
     def has(self, places: Ints, side: int) -> np.ndarray:

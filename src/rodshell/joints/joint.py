@@ -6,6 +6,7 @@ twist). A ball joint has none, a pin (the scissor joint of X-shells) is free abo
 two, a rigid joint is rigid in all. The paper's linker rods are the exception: bends from edge to edge (`Linker`).
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import inf, isfinite, pi
 from typing import Literal, Protocol
@@ -113,6 +114,11 @@ class Spring:
                 )
         _check_rest_angle(self.rest_angle)
         _check_eccentricity(self.eccentricity)
+        if self.eccentricity and not (self.out_of_plane and self.twist):
+            raise InputError(
+                "rods that lie one above the other roll over each other where a spring resists neither: give an "
+                'eccentric spring an out-of-plane and a twist stiffness, or use kind = "pin", which is rigid in both'
+            )
 
     @property
     def turns_frames(self) -> bool:
@@ -146,6 +152,15 @@ class Linker:
     def __post_init__(self) -> None:
         if self.corners not in (2, 4):
             raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {self.corners}")
+
+
+def require_joint(joint: object) -> None:
+    """Refuse what is neither a joint, nor a sequence of joints, nor None, with one sentence."""
+    several = isinstance(joint, Sequence) and not isinstance(joint, str)
+    for one in joint if several else (joint,):  # type: ignore[attr-defined]
+        if one is not None and (isinstance(one, type) or not hasattr(one, "turns_frames")):
+            what = f"the class {one.__name__} itself" if isinstance(one, type) else repr(one)
+            raise InputError(f"joint must be a rodshell joint such as rodshell.Pin(), not {what}")
 
 
 def joint_parameters(joint: Joint) -> dict[str, object]:

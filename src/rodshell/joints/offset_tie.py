@@ -12,12 +12,10 @@ from typing import Self
 import numba as nb
 import numpy as np
 
-from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted
 from rodshell.joints.crossings import Places
 from rodshell.joints.sections import by_edge, carried, edge_tangents, frame, of_edge, spread, stencils
-from rodshell.layout import FlatGrid
-from rodshell.layout.layers import layers
+from rodshell.layout.layers import sides
 from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -70,22 +68,6 @@ def offset_ties(places: Places, eccentricity: Floats, stiffness: float, size: in
         directors = adapted(np.broadcast_to(UP, tangents.shape), tangents)
         sets.append(OffsetTie(blocks, legs, middles, weights, firm, offsets[mine], tangents, directors))
     return sets
-
-
-def sides(grid: FlatGrid) -> Floats:
-    """(m,) -1 for rods of the lower layer and 1 for those of the upper.
-
-    Raises
-    ------
-    InputError : rods cannot be laid in two layers, such as three that cross each other.
-    """
-    layer = layers(len(grid.rods), grid.crossings.rods.tolist())
-    if layer.max(initial=0) > 2:
-        rod = grid.rods[int(np.argmax(layer))].name
-        raise InputError(
-            f"eccentric joints need two layers of rods, but {rod} crosses rods of both: set the eccentricity to 0"
-        )
-    return np.where(layer == 1, -1.0, 1.0)
 
 
 @nb.njit(cache=True, error_model="numpy")

@@ -5,6 +5,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.errors import InputError
+from rodshell.layout.flatgrid import FlatGrid
+
 
 def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> NDArray[np.intp]:
     """(rods,) layer of each rod, 1 the lowest, for `crossings` given as pairs of rods.
@@ -26,3 +29,19 @@ def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> NDArray[np.intp]:
             layer[rod] = next(k for k in range(1, len(taken) + 2) if k not in taken)
             waiting += [other for other in met[rod] if not layer[other]]
     return layer
+
+
+def sides(grid: FlatGrid) -> NDArray[np.float64]:
+    """(m,) -1 for rods of the lower layer and 1 for those of the upper.
+
+    Raises
+    ------
+    InputError : rods cannot be laid in two layers, such as three that cross each other.
+    """
+    layer = layers(len(grid.rods), grid.crossings.rods.tolist())
+    if layer.max(initial=0) > 2:
+        rod = grid.rods[int(np.argmax(layer))].name
+        raise InputError(
+            f"eccentric joints need two layers of rods, but {rod} crosses rods of both: set the eccentricity to 0"
+        )
+    return np.where(layer == 1, -1.0, 1.0)

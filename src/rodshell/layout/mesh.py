@@ -1,7 +1,7 @@
 """Nodes and edges on a flat grid: a node at every joint and rod end, and equal edges between them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rodshell.geometry.curves import on_curve
 from rodshell.layout.flatgrid import FlatGrid, FlatRod, whole_rods
+from rodshell.layout.layers import sides
 
 Ints = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -16,16 +17,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GridMesh:
-    """A flat grid divided into edges; rods share one node at a joint.
+    """A flat grid divided into edges; rods share one node at a joint, or lie in two layers (`in_layers`).
 
     Parameters
     ----------
     grid : the rods and joints that were meshed.
-    flat : (n, 3) node positions in the flat, unstressed state, z = 0 [m].
+    flat : (n, 3) node positions in the flat, unstressed state [m]; z = 0, or the height of the rod's layer.
     rod_nodes : (k,) nodes of all rods in a row, in the order of `grid.rods`.
     rod_start : (m,) where each rod begins in `rod_nodes`.
     stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
-    joint_nodes : (c,) node of each of the grid's crossings.
+    joint_nodes : (c,) node of each of the grid's crossings, on its first rod.
+    second_nodes : (c,) the same on its second rod, where rods lie in layers and share no nodes; None: the same node.
     """
 
     grid: FlatGrid
@@ -34,6 +36,13 @@ class GridMesh:
     rod_start: Ints
     stations: Floats
     joint_nodes: Ints
+    second_nodes: Ints | None = None
+
+    @cached_property
+    def apart(self) -> "GridMesh":
+        """The same rods, each with nodes of its own, k in all, in the order of `rod_nodes`; joints have none."""
+        nodes = np.arange(len(self.rod_nodes))
+        return replace(self, flat=self.flat[self.rod_nodes], rod_nodes=nodes, joint_nodes=np.arange(0))
 
     @property
     def node_count(self) -> int:
@@ -87,6 +96,39 @@ class GridMesh:
     def ends(self) -> Ints:
         """(m, 2) first and last node of each rod."""
         return np.column_stack([self.rod_nodes[self.rod_start], self.rod_nodes[self.rod_stop - 1]])
+
+    @property
+    def joint_pairs(self) -> Ints:
+        """(c, 2) node of each crossing on either of its rods."""
+        second = self.joint_nodes if self.second_nodes is None else self.second_nodes
+        return np.column_stack([self.joint_nodes, second])
+
+    @property
+    def layered(self) -> bool:
+        """Whether rods lie in two layers, with nodes of their own."""
+        return self.second_nodes is not None
+
+    @property
+    def heights(self) -> Floats:
+        """(n,) height of each node's layer above the surface between the layers [m]."""
+        return self.flat[:, 2]
+
+    def in_layers(self, eccentricity: float) -> "GridMesh":
+        """The same rods in two layers, so far apart [m]; node k is entry k of this mesh's `rod_nodes`.
+
+        Raises
+        ------
+        InputError : the rods cannot be laid in two layers.
+        """
+        side = sides(self.grid)[self._rod_of]
+        flat = self.flat[self.rod_nodes]
+        flat[:, 2] = 0.5 * eccentricity * side
+        key = self._rod_of * self.node_count + self.rod_nodes
+        order = np.argsort(key, kind="stable")
+        wanted = self.grid.crossings.rods * self.node_count + self.joint_nodes[:, None]
+        pairs = order[np.searchsorted(key[order], wanted)]
+        own = np.arange(len(self.rod_nodes))
+        return GridMesh(self.grid, flat, own, self.rod_start, self.stations, pairs[:, 0], pairs[:, 1])
 
     @property
     def rod_stop(self) -> Ints:

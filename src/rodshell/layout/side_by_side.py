@@ -83,4 +83,7 @@ def _joined(meshes: list[GridMesh]) -> GridMesh:
         np.concatenate([mesh.rod_start + by for mesh, by in zip(meshes, entries, strict=False)]),
         np.concatenate([mesh.stations for mesh in meshes]),
         np.concatenate([mesh.joint_nodes + by for mesh, by in zip(meshes, nodes, strict=False)]),
+        np.concatenate([mesh.joint_pairs[:, 1] + by for mesh, by in zip(meshes, nodes, strict=False)])
+        if any(mesh.layered for mesh in meshes)
+        else None,
     )

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csc_matrix, diags
 
 from rodshell.errors import InputError
-from rodshell.geometry.given import direction, finite, vector
 from rodshell.geometry.vectors import cross, unit
 from rodshell.model.assembly import Assembly
 from rodshell.model.freedom import Freedom
@@ -27,6 +26,7 @@ from rodshell.rods.elements import Elements
 from rodshell.rods.isotropic_bend import IsotropicBend
 from rodshell.rods.round_bend_twist import RoundBendTwist
 from rodshell.rods.stretch import Stretch
+from rodshell.validation import direction, finite, vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, directors_along, parallel_transport, signed_angle
-from rodshell.geometry.given import direction, finite
 from rodshell.geometry.vectors import cross, dot
 from rodshell.rods.section import Rod
+from rodshell.validation import direction, finite
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

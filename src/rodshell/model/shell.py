@@ -6,6 +6,8 @@ ghost edges, where they matter), then, with a penalty coupling, the nodes and th
 The coupling decides the nodes [HQK 2.2]. With shared DOFs rods have one node at a joint, and linkers no unknowns of
 their own. With a penalty every rod and every linker has its own: `like` says which block of the shared form each
 copies, and the mass of that block is divided among its copies equally, so that none is counted twice.
+
+Eccentric joints lay the rods in two layers, whose mesh gives every rod nodes of its own (`GridMesh.in_layers`).
 """
 
 from collections.abc import Sequence
@@ -22,7 +24,7 @@ from rodshell.joints import Ball, Coupling, ExplicitPenalty, ImplicitPenalty, Jo
 from rodshell.joints.crossings import Places
 from rodshell.joints.elastic import elastic_joints, refuse_mixtures
 from rodshell.joints.linkers import Corners, LinkerBend
-from rodshell.joints.offset_tie import offset_ties, sides
+from rodshell.joints.offset_tie import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.freedom import Freedom
 from rodshell.rods.bend_twist import BendTwist
@@ -35,6 +37,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 UP = (0.0, 0.0, 1.0)
+OFFSET_STIFFNESS = 10.0  # of an edge's: ties of eccentric joints
 SPIN = (1.0, 0.0, 0.0)  # the one component of an angle block that means anything
 
 
@@ -56,7 +59,6 @@ class Shell:
     spinning : (s,) blocks of one twist angle of each rod that nothing else keeps from spinning about itself.
     like : (N,) for each block that of the shared form which it copies; there, the block itself.
     mass : (N, 3) lumped mass of each block's components [kg; of twist angles kg m2].
-    lift : (N, 1) height of each block above the middle surface [m]: eccentric joints lay rods one above the other.
     """
 
     mesh: GridMesh
@@ -71,7 +73,6 @@ class Shell:
     spinning: Ints
     like: Ints
     mass: Floats
-    lift: Floats
 
     @staticmethod
     def of(
@@ -91,6 +92,7 @@ class Shell:
         clamped : each rod goes on to a ghost node past its end that holds its direction there. The end's
             Voronoi length is half its last edge, so that the clamp acts exactly at the end (second order). A rod
             may spin in its clamp.
+        mesh : where joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
         joint : one for all, or one for each crossing of the grid; ball joints without.
         coupling : shared DOFs without. Eccentric joints are tied by springs with any coupling.
         twist : carry twist angles; None: where any energy depends on them.
@@ -140,10 +142,6 @@ class Shell:
         shared = np.zeros((self.like.max() + 1, 3))
         shared[: len(positions)] = positions
         state = shared[self.like]
-        if normals is not None:
-            upright = np.zeros_like(shared)
-            upright[: len(positions)] = normals
-            state += self.lift * upright[self.like]
         if len(self.ghosts):
             assert tangents is not None
             state[self.ghosts] = state[self.ends] + last_edges(self.mesh)[:, None] * tangents
@@ -152,7 +150,7 @@ class Shell:
         return state
 
     def positions(self, state: Floats) -> Floats:
-        """(n, 3) positions of the mesh's nodes in a state [m]; of a joint of rods apart, their middle."""
+        """(n, 3) positions of the mesh's nodes in a state [m]; of nodes that a penalty ties, their middle."""
         result, visits = np.zeros((self.mesh.node_count, 3)), np.zeros(self.mesh.node_count)
         np.add.at(result, self.mesh.rod_nodes, state[self.node_blocks])
         np.add.at(visits, self.mesh.rod_nodes, 1.0)
@@ -199,22 +197,22 @@ class _Builder:
         clamped: bool,
         twist: bool | None,
     ) -> None:
-        self.mesh, self.coupling = mesh, coupling
         self.rods = _one_each(rod, Rod, len(mesh.grid.rods), "rods")
         self.joints = _one_each(joint or Ball(), None, len(mesh.grid.crossings), "crossings")
         if isinstance(joint, Sequence):
             refuse_mixtures(mesh.joint_nodes, self.joints)
+        eccentricity = max((one.eccentricity for one in self.joints), default=0.0)
+        if eccentricity and not mesh.layered:
+            mesh = mesh.in_layers(eccentricity)
+        self.mesh, self.coupling = mesh, coupling
         self.stiffness = np.array([(*one.bend_stiffnesses, one.twist_stiffness) for one in self.rods])
         self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
         needed = not self.isotropic or any(one.turns_frames for one in self.joints)
         self.twist = needed if twist is None else twist
         if needed and not self.twist:
             raise InputError("these rods and joints turn frames: they cannot go without twist angles")
-        self.apart = not isinstance(coupling, SharedDofs) or any(one.eccentricity for one in self.joints)
-        self.parts = mesh
-        if self.apart:
-            k = len(mesh.rod_nodes)
-            self.parts = replace(mesh, flat=mesh.flat[mesh.rod_nodes], rod_nodes=np.arange(k), joint_nodes=np.arange(0))
+        self.apart = mesh.layered or not isinstance(coupling, SharedDofs)
+        self.parts = mesh.apart if self.apart and not mesh.layered else mesh
         n = self.parts.node_count
         ends = 2 * len(mesh.grid.rods)
         self.ghosts = n + np.arange(ends if clamped else 0)
@@ -243,7 +241,7 @@ class _Builder:
         within, between = (*bends, *linkers), (*self._elastic(), *self._ties(), *linker_ties)
         return Shell(
             mesh, self.coupling, parts.node_count, within, between, stretch,
-            parts.ends.ravel(), self.ghosts, self.angles, spinning, self.like, mass, self._lift(),
+            parts.ends.ravel(), self.ghosts, self.angles, spinning, self.like, mass,
         )  # fmt: skip
 
     def _bends(self) -> tuple[Elements, ...]:
@@ -325,7 +323,15 @@ class _Builder:
         eccentric = np.array([one.eccentricity for one in self.joints])
         plain = np.array([n for n, one in enumerate(self.joints) if not (eccentric[n] or isinstance(one, Linker))])
         ties = [self._tied(self.places.blocks[met[plain.astype(np.intp)]], 1)] if len(plain) else []
-        return [*ties, *offset_ties(self.places, eccentric, self._penalty(1), self.size)]
+        return [*ties, *offset_ties(self.places, eccentric, self._offset_stiffness(), self.size)]
+
+    def _offset_stiffness(self) -> float:
+        """Of eccentric ties [N/m]. A hundred thousand times stiffer ones, like a penalty's, would make a geometric
+        stiffness that outweighs bending of the micrometres by which rods miss their distance in a first guess."""
+        if not isinstance(self.coupling, SharedDofs):
+            return self._penalty(1)
+        edge = float(np.median(self.mesh.edge_lengths))
+        return OFFSET_STIFFNESS * min(rod.stretch_stiffness for rod in self.rods) / edge
 
     def _tied(self, pairs: Ints, which: int) -> Ties:
         return Ties(pairs, np.full(len(pairs), self._penalty(which)))
@@ -348,13 +354,6 @@ class _Builder:
             rotary = np.array([rod.rotary_inertia for rod in self.rods])[mesh.edge_rods]
             mass[first : first + len(mesh.edges), 0] = mesh.edge_lengths * rotary
         return mass
-
-    def _lift(self) -> Floats:
-        lift = np.zeros((self.size, 1))
-        eccentric = max((one.eccentricity for one in self.joints), default=0.0)
-        if eccentric:
-            lift[self.places.blocks, 0] = 0.5 * eccentric * sides(self.mesh.grid)[self.places.rods]
-        return lift
 
 
 def _one_each(given, kind, count: int, of_what: str):  # type: ignore[no-untyped-def]

@@ -19,6 +19,7 @@ from rodshell.geometry.curves import on_curve
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import rod_name
+from rodshell.nets.compass import ON_SURFACE
 from rodshell.nets.cuts import Cut, Lines, cut_lines, extrapolated
 from rodshell.nets.lines import LatticeLines, find_lines, march_lines
 from rodshell.nets.reach import Covering
@@ -26,7 +27,7 @@ from rodshell.targets import Target
 
 Floats = NDArray[np.float64]
 
-SMALLEST_ANGLE = 10.0  # degrees; no rodshell can be built beyond
+SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
 SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further
 LOOSE = 0.05  # spacings: ends known no better than that are warned of
 GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count
@@ -75,6 +76,7 @@ def chebyshev_net(
     *,
     anchor: tuple[float, float] | None = None,
     near: ChebyshevNet | None = None,
+    eccentricity: float = 0.0,
 ) -> ChebyshevNet:
     """March the net of `layout` over `target` and cut it at the target's end.
 
@@ -82,6 +84,10 @@ def chebyshev_net(
     ----------
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
     near : a net that may be similar, from which this one is found sooner; it is the same without.
+    eccentricity : distance of the rods' centre lines at their joints [m]. Rods of family u lie half of it below the
+        target and those of family v half of it above, each on the parallel surface there: a rod's material length is
+        that of its own line, so that the flat grid is the layout's straight lattice, and its ends lie over the
+        target's end, along the normal.
 
     Raises
     ------
@@ -94,10 +100,11 @@ def chebyshev_net(
             f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
             "use a smaller spacing"
         )
+    heights = (-0.5 * eccentricity, 0.5 * eccentricity) if eccentricity else ON_SURFACE
     for parts in SEARCHES:
-        lines, rough = find_lines(target, layout, start, heading, near.net if near else None, parts)
-        coarse = march_lines(target, layout, lines, start, heading, 2, rough)
-        fine = march_lines(target, layout, lines, start, heading, 1, coarse, rough)
+        lines, rough = find_lines(target, layout, start, heading, near.net if near else None, parts, heights)
+        coarse = march_lines(target, layout, lines, start, heading, 2, rough, heights=heights)
+        fine = march_lines(target, layout, lines, start, heading, 1, coarse, rough, heights=heights)
         if not (fine.inside[[0, -1]].any() or fine.inside[:, [0, -1]].any()):
             break
     else:

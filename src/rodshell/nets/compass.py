@@ -3,9 +3,13 @@
 A net of inextensible rods is a Chebyshev net; two geodesics through the anchor determine it. Between the two
 axes every new node P lies at one step from its neighbours A and B and on the surface: the compass rule,
 second order in the step, with an error expansion in even powers when every interval is halved.
+
+Where joints hold the two families apart, each rod lies on a surface of its own, parallel to the target: the rule then
+holds for the points P + h n(P), h being the height of the rod's layer and n the target's normal, and the axes are
+geodesics of their layers. The net's points P stay on the target, between the layers.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numba as nb
@@ -13,11 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.geometry.vectors import cross, dot, unit
-from rodshell.targets import Target
+from rodshell.targets import Implicit, Target
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+Heights = tuple[float, float]
+
+ON_SURFACE: Heights = (0.0, 0.0)
 SMALLEST_SINE = 0.02  # of a crossing angle: beyond it the two circles of the compass hardly cut (1.1 degrees)
 NEWTON_STEPS = 12
 TOLERANCE = 1e-7  # of the step: Newton doubles its digits, so that the change that is below it leaves 1e-14
@@ -31,11 +38,13 @@ class Net:
     ----------
     u, v : (nu,), (nv,) ascending material coordinates of the net's lines, both containing 0 [m].
     points : (nu, nv, 3) positions [m]; NaN where the march could not go.
+    heights : of the rods of families u and v above the surface, along its normal [m].
     """
 
     u: Floats
     v: Floats
     points: Floats
+    heights: Heights = field(default=ON_SURFACE, kw_only=True)
 
     @cached_property
     def origin(self) -> tuple[int, int]:
@@ -43,7 +52,9 @@ class Net:
         return int(np.argmin(np.abs(self.u))), int(np.argmin(np.abs(self.v)))
 
 
-def march(target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats) -> Net:
+def march(
+    target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats, *, heights: Heights = ON_SURFACE
+) -> Net:
     """March the net from its two axes.
 
     Parameters
@@ -51,20 +62,29 @@ def march(target: Target, u: Floats, v: Floats, anchor: Floats, heading: Floats)
     u, v : ascending material coordinates of the lines, both containing 0 [m].
     anchor : (3,) point of the surface where the axes cross [m].
     heading : (3,) direction of the u axis there; its part in the tangent plane counts.
+    heights : see `Net`.
     """
     points = np.full((len(u), len(v), 3), np.nan)
-    net = Net(u, v, points)
+    net = Net(u, v, points, heights=heights)
     lay_axes(target, net, anchor, heading)
     fill_quadrants(target, net)
     return net
 
 
 def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
-    """Two discrete geodesics through the anchor: equal chords, straightest at every node."""
+    """Two discrete geodesics through the anchor: equal chords, straightest at every node; each of its own layer."""
     i0, j0 = net.origin
     net.points[i0, j0] = anchor
     steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
-    arms = geodesics(target, np.tile(anchor, (4, 1)), axes(target, anchor, heading), steps)
+    directions = axes(target, anchor, heading)
+    if net.heights == ON_SURFACE:
+        arms = geodesics(target, np.tile(anchor, (4, 1)), directions, steps)
+    else:
+        arms = list[Floats]()
+        for height, own in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
+            layer = Layer(target, height)
+            start = np.tile(layer.of(anchor[None]), (2, 1))
+            arms += [layer.below(arm) for arm in geodesics(layer, start, directions[own], steps[own])]
     net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
     net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
 
@@ -77,7 +97,35 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
     return np.stack([along, -along, across, -across])
 
 
-def geodesics(target: Target, start: Floats, direction: Floats, steps: list[Floats]) -> list[Floats]:
+@dataclass(frozen=True)
+class Layer:
+    """The surface at a `height` [m] above a target, along its normals: as far as a march asks about it."""
+
+    target: Target
+    height: float
+
+    def implicit(self, x: Floats) -> Implicit:
+        """The distance to the layer (n,), its gradient and its Hessian: those of the target's own distance."""
+        gap = self.target.gap(x)
+        return Implicit(gap.distance - self.height, gap.normal, gap.hessian)
+
+    def level(self, x: Floats) -> tuple[Floats, Floats]:
+        """As `Target.level`."""
+        value, gradient, _ = self.implicit(x)
+        return value, gradient
+
+    def of(self, x: Floats) -> Floats:
+        """The layer's points (n, 3) over points of the target."""
+        return x + self.height * self.target.on_surface(x).normal
+
+    def below(self, x: Floats) -> Floats:
+        """The target's points (n, 3) under points of the layer; NaN stays NaN."""
+        result, known = np.full_like(x, np.nan), np.isfinite(x[:, 0])
+        result[known] = self.target.closest(x[known])
+        return result
+
+
+def geodesics(target: Target | Layer, start: Floats, direction: Floats, steps: list[Floats]) -> list[Floats]:
     """Discrete geodesics, several at once, by given chord lengths; second order.
 
     The next chord lies in the plane of the last chord's direction and the surface normal at the node, so that
@@ -149,7 +197,7 @@ def fill_quadrants(target: Target, net: Net, wanted: Mask | None = None) -> None
         if len(i) == 0:
             return
         tried[i, j] = True
-        net.points[i, j] = _compass(target, *rest)
+        net.points[i, j] = _compass(target, net.heights, *rest)
 
 
 @nb.njit(cache=True)
@@ -179,31 +227,44 @@ def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyp
     return first + 1, nodes[:count, 0], nodes[:count, 1], a, b, d, from_a, from_b, side
 
 
-def _compass(target: Target, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: Floats) -> Floats:
-    """Points P (n, 3) of the surface with |P - A| = from_a and |P - B| = from_b, across from D.
+def _compass(
+    target: Target, heights: Heights, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: Floats
+) -> Floats:
+    """Points P (n, 3) of the surface with |P - A| = from_a and |P - B| = from_b, across from D; for rods at `heights`
+    the same of the points of their layers.
 
     NaN where there is none, or where the net folds: (P - B) x (P - A) no longer points along the normal.
     """
     p = a + b - d
+    layered, none = heights != ON_SURFACE, np.empty((0, 3, 3))
+    if layered:  # A and B on the layers of the rods that lead from them to P
+        a, b = Layer(target, heights[1]).of(a), Layer(target, heights[0]).of(b)
     change, sine = np.empty(len(p)), np.empty(len(p))
     for _ in range(NEWTON_STEPS):
-        value, gradient = target.level(p)
-        if not _towards(p, a, b, from_a, from_b, value, gradient, change, sine):
+        value, gradient, hessian = target.implicit(p) if layered else (*target.level(p), none)
+        if not _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change, sine):
             break
     p[~(change < TOLERANCE) | ~(sine * side > SMALLEST_SINE)] = np.nan
     return p
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _towards(p, a, b, from_a, from_b, value, gradient, change, sine):  # type: ignore[no-untyped-def]
+def _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change, sine):  # type: ignore[no-untyped-def]
     """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
-    the crossing angle's before it. Whether to go on, as long as there is hope for any."""
+    the crossing angle's before it. Whether to go on, as long as there is hope for any.
+
+    hessian : (n, 3, 3) of the surface, for layers at `heights`; none without.
+    """
     going = False
     for m in range(len(p)):
-        x = (p[m, 0] - a[m, 0], p[m, 1] - a[m, 1], p[m, 2] - a[m, 2])
-        y = (p[m, 0] - b[m, 0], p[m, 1] - b[m, 1], p[m, 2] - b[m, 2])
+        here = (p[m, 0], p[m, 1], p[m, 2])
+        at_a, at_b = (a[m, 0], a[m, 1], a[m, 2]), (b[m, 0], b[m, 1], b[m, 2])
         slope = (gradient[m, 0], gradient[m, 1], gradient[m, 2])
-        step, sine[m] = compass_step(x, y, slope, from_a[m], from_b[m], value[m])
+        if len(hessian):
+            step, sine[m] = layered_step(here, at_a, at_b, slope, hessian[m], heights, from_a[m], from_b[m], value[m])
+        else:
+            x, y = less(here, at_a), less(here, at_b)
+            step, sine[m] = compass_step(x, y, x, y, slope, from_a[m], from_b[m], value[m])
         for k in range(3):
             p[m, k] -= step[k]
         change[m] = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a[m], from_b[m])
@@ -213,13 +274,14 @@ def _towards(p, a, b, from_a, from_b, value, gradient, change, sine):  # type: i
 
 
 @nb.njit(cache=True, error_model="numpy")
-def compass_step(x, y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
+def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
     gradient g, to be taken away from P; and the sine of the crossing angle, y x x along the normal.
 
-    The three equations have the gradients x, y and g, whose inverse is made of their cross products.
+    `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, but for layers. The inverse of the
+    three gradients is made of their cross products.
     """
-    normal, along, across = _cross(x, y), _cross(y, g), _cross(g, x)
+    normal, along, across = _cross(by_x, by_y), _cross(by_y, g), _cross(g, by_x)
     volume = _dot(normal, g)
     ra, rb = 0.5 * (_dot(x, x) - from_a * from_a) / volume, 0.5 * (_dot(y, y) - from_b * from_b) / volume
     rest = level / volume
@@ -229,6 +291,36 @@ def compass_step(x, y, g, from_a, from_b, level):  # type: ignore[no-untyped-def
         ra * along[2] + rb * across[2] + rest * normal[2],
     )
     return step, -volume / (np.sqrt(_dot(g, g)) * from_a * from_b)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: ignore[no-untyped-def]
+    """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers."""
+    steep = np.sqrt(_dot(g, g))
+    n = (g[0] / steep, g[1] / steep, g[2] / steep)
+    x, y = less(p, a), less(p, b)
+    x = (x[0] + heights[1] * n[0], x[1] + heights[1] * n[1], x[2] + heights[1] * n[2])
+    y = (y[0] + heights[0] * n[0], y[1] + heights[0] * n[1], y[2] + heights[0] * n[2])
+    by_x, by_y = _by_point(x, heights[1] / steep, n, hessian), _by_point(y, heights[0] / steep, n, hessian)
+    return compass_step(x, y, by_x, by_y, g, from_a, from_b, level)
+
+
+@nb.njit(cache=True)
+def _by_point(x, height, n, hessian):  # type: ignore[no-untyped-def]
+    """x (1 + h dn/dP) with dn/dP = (1 - n n) F''/|F'|; the height comes divided by |F'|."""
+    out = _dot(x, n)
+    w = (x[0] - out * n[0], x[1] - out * n[1], x[2] - out * n[2])
+    return (
+        x[0] + height * (hessian[0, 0] * w[0] + hessian[1, 0] * w[1] + hessian[2, 0] * w[2]),
+        x[1] + height * (hessian[0, 1] * w[0] + hessian[1, 1] * w[1] + hessian[2, 1] * w[2]),
+        x[2] + height * (hessian[0, 2] * w[0] + hessian[1, 2] * w[1] + hessian[2, 2] * w[2]),
+    )
+
+
+@nb.njit(cache=True)
+def less(a, b):  # type: ignore[no-untyped-def]
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @nb.njit(cache=True)

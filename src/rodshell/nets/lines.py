@@ -14,7 +14,7 @@ from rodshell.layout import GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import edge_counts
-from rodshell.nets.compass import Net, fill_quadrants, lay_axes
+from rodshell.nets.compass import ON_SURFACE, Heights, Net, fill_quadrants, lay_axes
 from rodshell.nets.cuts import inside_nodes
 from rodshell.nets.reach import Covering, march_covering
 from rodshell.targets import Target
@@ -41,13 +41,19 @@ class LatticeLines:
 
 
 def find_lines(
-    target: Target, layout: GridLayout, start: Floats, heading: Floats, near: Covering | None, parts: int
+    target: Target,
+    layout: GridLayout,
+    start: Floats,
+    heading: Floats,
+    near: Covering | None,
+    parts: int,
+    heights: Heights = ON_SURFACE,
 ) -> tuple[LatticeLines, Covering]:
     """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them, in
     so many parts of a spacing."""
     step, margin = _across(layout) / parts, MARGIN * _across(layout)
     spare = np.repeat(margin, 2)
-    near = near or _stride(target, start, heading)
+    near = near or _stride(target, start, heading, heights)
     reach = np.minimum(near.reach(1) + spare, 4 * target.size)
     for _ in range(12):
         u, v = (
@@ -60,7 +66,7 @@ def find_lines(
                 f"{length_text(min(layout.spacing))} apart on a target {length_text(2 * target.size)} wide: check its "
                 f"unit, or use {_coarser(target)}"
             )
-        near = march_covering(target, u, v, start, heading, margin, near)
+        near = march_covering(target, u, v, start, heading, margin, near, heights=heights)
         if not near.inside.any():
             raise InputError("no node of the net lies inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
@@ -78,15 +84,15 @@ def _across(layout: GridLayout) -> Floats:
     return np.array(layout.spacing[::-1])
 
 
-def _stride(target: Target, start: Floats, heading: Floats) -> Covering:
+def _stride(target: Target, start: Floats, heading: Floats, heights: Heights) -> Covering:
     """The first net of all, in long steps: its axes, and what lies between those parts of them that are inside."""
     s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
-    net = Net(s, s, np.full((len(s), len(s), 3), np.nan))
+    net = Net(s, s, np.full((len(s), len(s), 3), np.nan), heights=heights)
     lay_axes(target, net, start, heading)
     inside = target.margin(np.concatenate([net.points[:, STRIDES], net.points[STRIDES]])).reshape(2, -1) > 0
     rows, columns = (_around(axis) for axis in inside)
     fill_quadrants(target, net, rows[:, None] & columns)
-    return Covering(s, s, net.points, inside_nodes(target, net))
+    return Covering(s, s, net.points, inside_nodes(target, net), heights=heights)
 
 
 def _around(inside: Mask) -> Mask:
@@ -105,11 +111,18 @@ def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> 
 
 
 def march_lines(
-    target: Target, layout: GridLayout, lines: LatticeLines, start: Floats, heading: Floats, every: int, *near: Covering
+    target: Target,
+    layout: GridLayout,
+    lines: LatticeLines,
+    start: Floats,
+    heading: Floats,
+    every: int,
+    *near: Covering,
+    heights: Heights = ON_SURFACE,
 ) -> Covering:
     """The net at all of its nodes or at `every` second one, from one or two nets in longer steps."""
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
-    return march_covering(target, u, v, start, heading, MARGIN * _across(layout), *near)
+    return march_covering(target, u, v, start, heading, MARGIN * _across(layout), *near, heights=heights)
 
 
 def _refuse_too_many(target: Target, layout: GridLayout, lines: LatticeLines) -> None:

@@ -11,18 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.geometry.curves import resampled
-from rodshell.geometry.vectors import cross
+from rodshell.geometry.vectors import cross, unit
 from rodshell.nets.compass import (
     NEWTON_STEPS,
+    ON_SURFACE,
     SMALLEST_SINE,
     TOLERANCE,
+    Heights,
+    Layer,
     Net,
     axes,
     compass_step,
     fill_quadrants,
     lay_axes,
+    layered_step,
+    less,
 )
-from rodshell.targets import Target
+from rodshell.targets import Implicit, Target
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -44,6 +49,7 @@ def march_near(
     *,
     coarser: Net | None = None,
     wanted: Mask | None = None,
+    heights: Heights = ON_SURFACE,
 ) -> Net:
     """As `march`, from a guess taken out of a net `near`; any guess is safe, a bad one is only of no use.
 
@@ -51,7 +57,7 @@ def march_near(
     wanted : (nu, nv) nodes to find beside the axes, with all between them and the axes; the others stay NaN.
     """
     guess = near if coarser is None else _foreseen(near, coarser, u, v)
-    net = Net(u, v, interpolated(guess, u, v))
+    net = Net(u, v, interpolated(guess, u, v), heights=heights)
     if not _settle_axes(target, net, anchor, heading):
         lay_axes(target, net, anchor, heading)
     _settle(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted)
@@ -95,18 +101,36 @@ def _settle_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
     points = np.concatenate([arm for arm, _, _ in arms])
     steps = np.concatenate([step for _, step, _ in arms])
     stops = np.cumsum([0, *(len(arm) for arm, _, _ in arms)])
+    layers = _layers_of_axes(target, net.heights, stops[2], stops[4]) if net.heights != ON_SURFACE else ()
+    starts = [anchor] * 4
+    if layers and np.isfinite(points).all():
+        starts = [layer.of(anchor[None])[0] for layer, _ in layers for _ in range(2)]
+        points = np.concatenate([layer.of(points[own]) for layer, own in layers])
     moved = np.inf if np.isfinite(points).all() else np.nan
     for _ in range(ROUNDS):
         if not moved >= SETTLED * target.size:
             break
-        model = target.implicit(points)
+        if layers:
+            parts = [layer.implicit(points[own]) for layer, own in layers]
+            model = Implicit(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        else:
+            model = target.implicit(points)
         moved = 0.0
         for k, (_, _, direction) in enumerate(arms):
             here = slice(stops[k], stops[k + 1])
-            moved += _geodesic(anchor, direction, normal, steps[here], points[here], *(part[here] for part in model))
+            moved += _geodesic(starts[k], direction, normal, steps[here], points[here], *(part[here] for part in model))
+    if not moved < SETTLED * target.size:
+        return False
+    if layers:
+        points = np.concatenate([layer.below(points[own]) for layer, own in layers])
     for k, (arm, _, _) in enumerate(arms):
         arm[:] = points[stops[k] : stops[k + 1]]
-    return bool(moved < SETTLED * target.size)
+    return True
+
+
+def _layers_of_axes(target: Target, heights: Heights, middle: int, stop: int) -> tuple[tuple[Layer, slice], ...]:
+    """The layer of either axis, and where its nodes stand among those of both."""
+    return (Layer(target, heights[0]), slice(0, middle)), (Layer(target, heights[1]), slice(middle, stop))
 
 
 @nb.njit(cache=True, error_model="numpy")
@@ -156,8 +180,14 @@ def _settle(target: Target, net: Net, wanted: Mask) -> None:
     models, row = np.empty_like(net.points), np.empty(wanted.shape, dtype=np.intp)
     value, gradient, hessian = target.implicit(_chosen(net.points, wanted, i0, j0, models, row))
     moved, new = np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
+    layered = net.heights != ON_SURFACE
+    normals = np.zeros_like(net.points) if layered else np.empty((0, 0, 3))
+    if layered:
+        normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others are found in order
     for _ in range(ROUNDS):
-        _sweep(net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, new, moved)
+        _sweep(
+            net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved
+        )
         new = moved >= SETTLED * target.size
         if not new.any():
             return
@@ -184,11 +214,16 @@ def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _sweep(points, models, row, value, gradient, hessian, u, v, i0, j0, new, moved):  # type: ignore[no-untyped-def]
+def _sweep(  # type: ignore[no-untyped-def]
+    points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
+):
     """One march of the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), whose values, gradients and
     Hessians are in the rows `row` (nu, nv), -1 where there is none; from them the points then lie away by `moved`
     (nu, nv). Nodes whose models and neighbours are not `new` (nu, nv) stay.
+
+    `normals` (nu, nv, 3) of the surface at the points follow them where rods lie at `heights` above it; none without.
     """
+    layered = len(normals) > 0
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         i_stop, j_stop = (len(u) if i_side > 0 else -1), (len(v) if j_side > 0 else -1)
@@ -203,20 +238,31 @@ def _sweep(points, models, row, value, gradient, hessian, u, v, i0, j0, new, mov
                 if r < 0:
                     continue
                 a, b, d, here = _at(points, i, q), _at(points, p, j), _at(points, p, q), _at(models, i, j)
-                away = _less(d, _at(models, p, q))  # as far from its model as its neighbours are from theirs
-                away = _less(_plus(_less(a, _at(models, i, q)), _less(b, _at(models, p, j))), away)
+                away = less(d, _at(models, p, q))  # as far from its model as its neighbours are from theirs
+                away = less(_plus(less(a, _at(models, i, q)), less(b, _at(models, p, j))), away)
                 from_a, from_b = abs(v[j] - v[q]), abs(u[i] - u[p])
+                if layered:
+                    a, b = _raised(a, heights[1], normals, i, q), _raised(b, heights[0], normals, p, j)
                 change, sine, tries = np.inf, 0.0, 0
                 while change > TOLERANCE and tries < NEWTON_STEPS:
                     now = _plus(here, away)
                     level, slope = _model(r, away, value, gradient, hessian)
-                    step, sine = compass_step(_less(now, a), _less(now, b), slope, from_a, from_b, level)
-                    away = _less(away, step)
+                    if layered:
+                        step, sine = layered_step(now, a, b, slope, hessian[r], heights, from_a, from_b, level)
+                    else:
+                        x, y = less(now, a), less(now, b)
+                        step, sine = compass_step(x, y, x, y, slope, from_a, from_b, level)
+                    away = less(away, step)
                     change = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
                     tries += 1
                 if change <= TOLERANCE and sine * i_side * j_side > SMALLEST_SINE:
                     moved[i, j] = max(abs(away[0]), abs(away[1]), abs(away[2]))
                     points[i, j, 0], points[i, j, 1], points[i, j, 2] = _plus(here, away)
+                    if layered:
+                        _, g = _model(r, away, value, gradient, hessian)
+                        steep = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+                        for k in range(3):
+                            normals[i, j, k] = g[k] / steep
                 else:
                     points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
 
@@ -234,6 +280,15 @@ def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)
+def _raised(point, height, normals, i, j):  # type: ignore[no-untyped-def]
+    return (
+        point[0] + height * normals[i, j, 0],
+        point[1] + height * normals[i, j, 1],
+        point[2] + height * normals[i, j, 2],
+    )
+
+
+@nb.njit(cache=True)
 def _at(points, i, j):  # type: ignore[no-untyped-def]
     return points[i, j, 0], points[i, j, 1], points[i, j, 2]
 
@@ -241,11 +296,6 @@ def _at(points, i, j):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True)
 def _plus(a, b):  # type: ignore[no-untyped-def]
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@nb.njit(cache=True)
-def _less(a, b):  # type: ignore[no-untyped-def]
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def _forget(points: Floats, unsettled: Mask, i0: int, j0: int) -> None:

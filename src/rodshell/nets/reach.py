@@ -10,7 +10,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.nets.compass import Net, fill_quadrants
+from rodshell.nets.compass import ON_SURFACE, Heights, Net, fill_quadrants
 from rodshell.nets.cuts import inside_nodes
 from rodshell.nets.nearby import march_near
 from rodshell.targets import Target
@@ -50,13 +50,15 @@ def march_covering(
     margin: Floats,
     near: Covering,
     coarser: Net | None = None,
+    *,
+    heights: Heights = ON_SURFACE,
 ) -> Covering:
     """As `march_near`, as far as the target and a `margin` (2,) along u and v past its end [m]. Where it ends is taken
     from the net `near` in longer steps; where that was wrong, the march goes on."""
     wanted = wanted_nodes(near, 1, u, v, margin)
-    net = march_near(target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted)
+    net = march_near(target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted, heights=heights)
     while True:
-        found = Covering(u, v, net.points, inside_nodes(target, net))
+        found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
         more = wanted_nodes(found, 0, u, v, SURELY * margin) & ~wanted
         if not more.any():
             return found

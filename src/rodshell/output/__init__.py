@@ -4,7 +4,7 @@
 """
 
 from rodshell.output.archive import Archive, read, write
-from rodshell.output.folder import check_folder
+from rodshell.output.folder import ForeignFileError, open_folder
 from rodshell.output.pictures import picture_svg
 
-__all__ = ["Archive", "check_folder", "picture_svg", "read", "write"]
+__all__ = ["Archive", "ForeignFileError", "open_folder", "picture_svg", "read", "write"]

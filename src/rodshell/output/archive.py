@@ -5,17 +5,22 @@ import os
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import wraps
+from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import OutputError
-from rodshell.output.beside import beside
-from rodshell.output.folder import put, read_json, replacing
+from rodshell.output.folder import ResultFolder, open_folder, read_json, reading
+from rodshell.output.inputs import kept_case, opened_case
 
+if TYPE_CHECKING:
+    from rodshell.output.verdict import Verdict
+
+ARCHIVE = ("result.json", "case.toml", "states.npz")  # from which every other file can be made again
 SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
 T = TypeVar("T")
 GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
@@ -33,11 +38,13 @@ class Archive:
         "rod_nodes" (k,) nodes of all rods in a row; "rod_start" (m,) where each rod begins. Some may be
         missing.
     case_toml : the full resolved input; empty if there was none.
+    inputs : contents of the files that it names and that are kept with the result, by their path in it.
     """
 
     result: dict[str, Any]
     states: dict[str, NDArray[Any]]
     case_toml: str = ""
+    inputs: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def as_stored(self) -> "Archive":
@@ -50,9 +57,23 @@ class Archive:
 
         return summary_text(self.result)
 
-    def save(self, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:
+    def save(
+        self,
+        folder: str | os.PathLike[str] | ResultFolder,
+        kinds: Iterable[str] | None = None,
+        *,
+        force: bool = False,
+        more: Mapping[str, str] | None = None,
+    ) -> Path:
         """As `write`."""
-        return write(self, folder, kinds)
+        return write(self, folder, kinds, force=force, more=more)
+
+    @property
+    def verdict(self) -> "Verdict":
+        """What the result is worth: good, check or unbuildable, with the reasons."""
+        from rodshell.output.verdict import verdict_of
+
+        return verdict_of(self.result)
 
     @property
     def name(self) -> str:
@@ -79,51 +100,70 @@ def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
     return kept
 
 
-def write(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> Path:
-    """Write the whole result folder, replacing an older result; returns its absolute path.
+def write(
+    archive: Archive,
+    folder: str | os.PathLike[str] | ResultFolder,
+    kinds: Iterable[str] | None = None,
+    *,
+    force: bool = False,
+    more: Mapping[str, str] | None = None,
+) -> Path:
+    """Write the whole result folder, replacing an older result's files and no others; returns its absolute path.
 
+    Parameters
+    ----------
     kinds : of files beside the archive (see `files.KINDS`); default: all that every installation can.
+    force : also replace files that rodshell did not write, or that were changed since, where it has to write.
+    more : other files, by name.
 
     Raises
     ------
-    OutputError : the folder cannot be written, or holds something that is not a rodshell result.
+    ForeignFileError : such files are there, and `force` is False. OutputError : the folder cannot be written.
     """
-    from rodshell.output.files import ASIDE, DEFAULT, files_of
+    from rodshell.output.files import files_of, reserved
 
     text = json_text(archive.result)
     archive = replace(archive, result=json.loads(text))
-    wanted = list(DEFAULT if kinds is None else kinds)
-
-    def make(aside: bool) -> None:
-        for name, content in files_of(archive, [kind for kind in wanted if (kind in ASIDE) == aside]):
-            put(temporary / name, content)
-
-    def make_aside() -> None:
-        make(aside=True)
-        with open(temporary / "states.npz", "wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, **archive.states)
-
-    with replacing(folder) as temporary, beside(make_aside):
-        put(temporary / "result.json", text)
+    wanted = None if kinds is None else list(kinds)
+    copies = kept_case(archive.case_toml, archive.inputs, Path())[1]
+    names = [name for name in ARCHIVE if name != "case.toml" or archive.case_toml]
+    with open_folder(folder, reserved=[*names, *copies, *reserved(wanted), *(more or ())], force=force) as place:
+        place.put("result.json", text)
         if archive.case_toml:
-            put(temporary / "case.toml", archive.case_toml)
-        make(aside=False)
-    return Path(folder).expanduser().resolve()
+            place.put("case.toml", kept_case(archive.case_toml, archive.inputs, place.path)[0])
+        stream = BytesIO()
+        np.savez_compressed(stream, allow_pickle=False, **archive.states)
+        place.put("states.npz", stream.getvalue())
+        for name, content in (*copies.items(), *files_of(archive, wanted), *(more or {}).items()):
+            place.put(name, content)
+        place.commit()
+        return place.path
 
 
-def export(archive: Archive, folder: str | os.PathLike[str], kinds: Iterable[str] | None = None) -> list[str]:
-    """Write files of some kinds (see `files.KINDS`) into `folder`, each replaced as a whole; returns their names.
+def export(
+    archive: Archive,
+    folder: str | os.PathLike[str],
+    kinds: Iterable[str] | None = None,
+    *,
+    force: bool = False,
+) -> list[str]:
+    """Write files of some kinds (see `files.KINDS`) into `folder`, all of them or none; returns their names.
+
+    force : as of `write`.
 
     Raises
     ------
-    InputError : a kind needs a package that is not installed. OutputError : the folder cannot be written.
+    InputError : a kind needs a package that is not installed. OutputError : as of `write`.
     """
-    from rodshell.output.files import files_of
+    from rodshell.output.files import files_of, reserved
 
     names = []
-    for name, content in files_of(archive.as_stored(), kinds):
-        put(Path(folder) / name, content)
-        names.append(name)
+    wanted = None if kinds is None else list(kinds)
+    with open_folder(folder, reserved=reserved(wanted), force=force) as place:
+        for name, content in files_of(archive.as_stored(), wanted):
+            place.put(name, content)
+            names.append(name)
+        place.commit(keep_others=True)
     return names
 
 
@@ -134,16 +174,16 @@ def read(folder: str | os.PathLike[str]) -> Archive:
     ------
     OutputError : there is no result, or it cannot be read.
     """
-    path = Path(folder).expanduser()
-    result = read_json(path / "result.json")
-    try:
-        with np.load(path / "states.npz", allow_pickle=False) as stored:
-            states = {name: stored[name] for name in stored.files}
-        case = path / "case.toml"
-        case_toml = case.read_text(encoding="utf-8") if case.exists() else ""
-    except Exception as error:  # numpy and zipfile have many ways to say that a file is broken
-        raise OutputError(f"cannot read the result in {path}: {error}") from error
-    return Archive(result, states, case_toml)
+    with reading(folder) as file:
+        result = read_json(file("result.json"))
+        try:
+            with np.load(file("states.npz"), allow_pickle=False) as stored:
+                states = {name: stored[name] for name in stored.files}
+            case = file("case.toml")
+            case_toml, inputs = opened_case(case.read_text(encoding="utf-8") if case.exists() else "", file)
+        except Exception as error:  # numpy and zipfile have many ways to say that a file is broken
+            raise OutputError(f"cannot read the result in {Path(folder).expanduser()}: {error}") from error
+    return Archive(result, states, case_toml, inputs)
 
 
 def json_text(result: Mapping[str, Any]) -> str:
@@ -159,8 +199,8 @@ def json_text(result: Mapping[str, Any]) -> str:
 
 
 def printable(text: str) -> str:
-    """`text` on one line, without the control characters that drawings and models cannot hold."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
+    """`text` on one line, without the control characters and lone surrogates that no file of text can hold."""
+    return text if text.isprintable() else "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _dumps(value: Any) -> str:
@@ -168,13 +208,13 @@ def _dumps(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """`value` in JSON's own types; NumPy's arrays and numbers are converted."""
+    """`value` in JSON's own types; NumPy's arrays and numbers are converted, texts are printable."""
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):
-        return value
+        return printable(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {printable(str(key)): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, list | tuple):

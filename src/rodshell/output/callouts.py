@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.output.drawing import LETTER, Text
+from rodshell.output.drawing import LETTER, SMALL, Text
 from rodshell.output.labels import CLOSE, Label, Room, fits, nearby, off_its_mark, spread, take, upright
 
 Floats = NDArray[np.float64]
 
-SIZES = (1.0, 0.85, 0.7, 0.6)  # of the names, over the usual one: the largest at which all of an outline find room
+SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names, over the usual one: the largest at which all of an outline find room
 OFF = 1.3  # from a place to where its name may begin
 GAPS = (1.1, 1.7, np.inf)  # from name to name, or what there is all around; at the wider ones their ways turn evenly
 EVENED = 6  # times

@@ -15,6 +15,8 @@ Anchor = Literal["start", "middle", "end"]
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
 LETTER = 0.62  # width of a capital or digit over the text size
+CAP = 0.72  # height of a capital over the text size
+SMALL = 0.75  # size of the smallest texts over the usual one: where capitals are 2.5 mm high, these have 1.9 mm
 LINE = 0.95  # height of a line of text over its size, a little air included,
 BELOW = 0.2  # of which this much is below its baseline
 
@@ -114,7 +116,8 @@ class Drawing:
 
     Parameters
     ----------
-    text : usual size of its texts [mm]; pens are as wide as on paper with texts of 2 mm.
+    text : usual size of its texts [mm]; pens are as wide as on paper with texts of 3.5 mm.
+    left_out : what found no room, in words.
     """
 
     name: str
@@ -123,10 +126,11 @@ class Drawing:
     paths: tuple[Path, ...] = ()
     marks: tuple[Mark, ...] = ()
     texts: tuple[Text, ...] = ()
+    left_out: tuple[str, ...] = ()
 
     def pen(self, item: Path | Mark) -> Pen:
         """The item's own pen, or that of its layer."""
-        layer, wide = LAYERS[item.layer], 0.5 * self.text
+        layer, wide = LAYERS[item.layer], self.text / 3.5
         return item.pen or Pen(layer.colour, wide * layer.pen, tuple(wide * dash for dash in layer.dash))
 
     def box(self) -> tuple[Floats, Floats]:
@@ -160,6 +164,7 @@ class Drawing:
                 Text(t.text, scale * t.at + shift, scale * t.size, t.layer, t.anchor, t.angle, t.bold, t.colour, t.halo)
                 for t in self.texts
             ),
+            self.left_out,
         )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
@@ -189,6 +194,7 @@ class Pencil:
     paths: list[Path] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
 
     def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
         self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
@@ -199,8 +205,13 @@ class Pencil:
     def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
         self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
 
+    def leave_out(self, count: int, of: int, what: str) -> None:
+        """Record that `count` of so many texts found no room."""
+        if count:
+            self.left_out.append(f"{count if count < of else 'all'} of {of} {what}")
+
     def done(self, name: str, title: str, text: float) -> Drawing:
-        return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts))
+        return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
 
 
 def _scaled(pen: Pen | None, scale: float) -> Pen | None:

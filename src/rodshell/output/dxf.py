@@ -8,16 +8,18 @@ numbers in hexadecimal that follow those of the frame.
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
-from itertools import count
+from itertools import chain, count
 
 import numpy as np
 
-from rodshell.output.drawing import LAYERS, Drawing, Mark, Path, Text
+from rodshell.output.archive import printable
+from rodshell.output.drawing import CAP, LAYERS, Drawing, Mark, Path, Text
 
-CAP = 0.72  # height of a capital over the text size; DXF measures text by its capitals
 FIRST_LAYER = 0x2F  # handle of the first of our layers, and
 FIRST = 0x39  # of the first entity; the frame's own end before
 SPACE = "17"  # handle of the model space, to which entities belong
+FORBIDDEN = '<>/\\":;?*|=`,'  # in a layer's name [DXF reference]; it holds LONGEST letters at most
+LONGEST = 200
 ALIGNED = {"start": "", "middle": " 72\n1\n", "end": " 72\n2\n"}
 
 
@@ -26,7 +28,7 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
 
     names : for each layer the name that it takes in the file, where that is another.
     """
-    layer = {name: (names or {}).get(name, name) for name in LAYERS}
+    layer = layer_names(names or {})
     handles = count(FIRST)
     entities = [part for path in drawing.paths for part in _path(path, layer[path.layer], handles)]
     entities += [_circle(mark, layer[mark.layer], handles) for mark in drawing.marks]
@@ -34,6 +36,18 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
     head, tables, blocks, objects = _frame()
     parts = (head, f"{next(handles):X}", tables, _layers(layer), blocks, "".join(entities), objects)
     return "".join(parts)
+
+
+def layer_names(names: Mapping[str, str]) -> dict[str, str]:
+    """What each layer is called in a file: without what DXF forbids in a name, no two alike, upper case or lower."""
+    shown, taken = dict[str, str](), {"0", "DEFPOINTS"}  # which every file has
+    for layer in LAYERS:
+        asked = "".join("_" if letter in FORBIDDEN else letter for letter in printable(str(names.get(layer, layer))))
+        asked = asked.strip()[:LONGEST] or layer
+        tries = chain([asked], (f"{asked} {k}" for k in count(2)))
+        shown[layer] = next(name for name in tries if name.upper() not in taken)
+        taken.add(shown[layer].upper())
+    return shown
 
 
 @cache
@@ -91,9 +105,14 @@ def _text(text: Text, layer: str, handles: Iterator[int]) -> str:
     turned = f" 50\n{float(np.degrees(text.angle))}\n" if text.angle else ""
     head = f"{_entity('TEXT', layer, next(handles))}100\nAcDbText\n{_place(x, y)}"
     return (
-        f"{head} 40\n{CAP * text.size}\n  1\n{text.text}\n"
+        f"{head} 40\n{CAP * text.size}\n  1\n{_plain(text.text)}\n"
         f"{turned}{ALIGNED[text.anchor]} 11\n{x}\n 21\n{y}\n 31\n0.0\n100\nAcDbText\n"
     )
+
+
+def _plain(text: str) -> str:
+    """A text as TEXT holds it: a caret would start a control character, two percent signs a symbol [DXF reference]."""
+    return printable(text).replace("^", "^ ").replace("%%", "%%%%%%")
 
 
 def _place(x: float, y: float, z: float = 0.0) -> str:

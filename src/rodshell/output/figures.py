@@ -1,6 +1,6 @@
 """The tables of a report: supports side by side, key figures, levels of the drape."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rodshell.output import wording
@@ -21,7 +21,7 @@ _AGREEMENT: tuple[Entry, ...] = (
 _POP_UP: tuple[Entry, ...] = (
     ("Pop-up", "status", str),
     ("Started from", "start", str),
-    ("Stable equilibrium", "stable", wording.yes_or_no),
+    ("Stable equilibrium, unloaded", "stable", wording.yes_or_no),
     ("Negative modes", "negative_modes", str),
     ("Largest strain", "max_strain", wording.small),
     ("Force residual", "force_residual", wording.newtons),
@@ -49,8 +49,12 @@ _DRAPE: tuple[Entry, ...] = (
 )
 _BENDING: tuple[Entry, ...] = (
     ("Smallest radius of curvature", "min_radius", wording.millimetres),
+    ("\N{EN DASH} largest curvature out of the shell", "normal_curvature", wording.curvature),
+    ("\N{EN DASH} largest curvature within the shell", "geodesic_curvature", wording.curvature),
+    ("Largest twist of a rod", "twist_rate", wording.twist_rate),
     ("Largest strain, bending and axial", "max_strain", wording.percent),
-    ("Largest stress, bending and axial", "max_stress", wording.stress),
+    ("Largest stress, bending, axial and torsion", "max_stress", wording.stress),
+    ("\N{EN DASH} of torsion alone", "torsion_stress", wording.stress),
     ("Utilisation of the strength", "utilisation", wording.percent),
     ("Sharpest at this share of the way", "share", wording.stage),
 )
@@ -76,7 +80,20 @@ def supports_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
             values = [tables[name].get(end, {}).get(key) for end in ends]
             if any(value is not None for value in values):
                 rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
+        if name == "agreement":
+            rows += _weight_rows(result, ends)
     return {"ends": ends, "rows": rows} if rows else None
+
+
+def _weight_rows(result: Mapping[str, Any], ends: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """How much of its own weight the shell bears with each kind of ends."""
+    found = [entries(result, "self_weight").get(end) for end in ends]
+    if not any(found):
+        return []
+    shares = [wording.share_of_weight(one) if one else wording.UNKNOWN for one in found]
+    sunk = [wording.millimetres(one.get("deflection") if one else None) for one in found]
+    rows = [("Own weight that it bears", shares)]
+    return rows if set(sunk) == {wording.UNKNOWN} else [*rows, ("Largest deflection under its own weight", sunk)]
 
 
 def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:

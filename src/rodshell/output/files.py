@@ -44,6 +44,11 @@ def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
         yield from KINDS[kind](content)
 
 
+def reserved(kinds: Iterable[str] | None = None) -> list[str]:
+    """Patterns (of `Path.glob`) of every name that `files_of` may give for some kinds, whatever the archive."""
+    return [name for kind in (DEFAULT if kinds is None else kinds) for name in NAMES[kind]]
+
+
 def read_kinds(words: str) -> list[str]:
     """The kinds named in "dxf, csv"."""
     kinds = [word.strip().lower() for word in words.split(",") if word.strip()]
@@ -78,6 +83,7 @@ def _pdf(content: Content) -> Files:
 
 def _csv(content: Content) -> Files:
     from rodshell.output import schedules
+    from rodshell.output.csvtext import csv_text
 
     archive = content.archive
     made = archive.result.get("fabrication") or {}
@@ -91,7 +97,8 @@ def _csv(content: Content) -> Files:
     tables |= {"seams": schedules.seams_table} if archive.result.get("seams") else {}
     tables |= {"end_paths": schedules.end_paths_table} if "history" in archive.states else {}
     for name, table in tables.items():
-        yield f"schedule/{name}.csv", schedules.table_csv(table(archive))
+        columns, rows = table(archive)
+        yield f"schedule/{name}.csv", csv_text([columns, *rows])
 
 
 def _obj(content: Content) -> Files:
@@ -168,4 +175,25 @@ KINDS: dict[str, Callable[[Content], Files]] = {
     "3dm": _rhino, "png": _png, "report": _report,
 }  # fmt: skip
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # which needs another package
-ASIDE = ("png", "csv", "obj", "gltf", "vtp", "compas")  # about half of the work, which shares nothing with the rest
+
+_DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
+_SCHEDULES = ("rods", "joints", "supports", "bracing", "stock", "seams", "end_paths")
+_STAGES = ("flat", "stage_[0-9]*", "popped_pinned")
+
+NAMES: dict[str, list[str]] = {
+    "dxf": [f"drawings/{name}.dxf" for name in _DRAWINGS],
+    "svg": [f"drawings/{name}.svg" for name in _DRAWINGS],
+    "pdf": ["drawings/drawings.pdf"],
+    "csv": [f"schedule/{name}.csv" for name in _SCHEDULES],
+    "obj": [f"model/{state}.obj" for state in SHELLS],
+    "gltf": [f"model/{state}.glb" for state in SHELLS],
+    "vtp": [
+        *(f"model/{state}.vtp" for state in SHELLS), "model/pop_up.pvd",
+        *(f"model/pop_up/{state}.vtp" for state in _STAGES),
+    ],
+    "compas": [f"model/{state}.json" for state in SHELLS],
+    "3dm": ["model/rodshell.3dm"],
+    "png": [f"pictures/{state}{what}.png" for state in (*SHELLS, *_STAGES) for what in ("", "-stress")],
+    "report": ["report.html"],
+}  # fmt: skip
+"""Of the files of each kind: what may stand in the way of a result is asked before the work."""

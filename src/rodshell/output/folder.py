@@ -1,75 +1,190 @@
-"""A result folder that is replaced as a whole: a kill leaves the old result or the new one."""
+"""Writing into a result folder: only files that rodshell wrote are replaced, and all of them or none.
 
-import ctypes
+New files are staged in a hidden folder inside the result folder (so that it may be a mount point). `commit` writes
+down what is to be moved, and from then on the new result counts: should the process be killed while files are moved,
+readers take what was not moved from the stage, and the next writer moves it. What a killed process left before its
+commit is removed by the next writer.
+"""
+
 import json
 import os
 import shutil
+import signal
 import tempfile
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rodshell.errors import OutputError
+from rodshell.output.manifest import FILE, Mark, above, foreign, manifest_text, mark, read_manifest
+
+try:
+    import fcntl
+except ImportError:  # Windows: two runs into one folder at the same time are not kept apart there
+    fcntl = None  # type: ignore[assignment]
 
 FORMAT = "rodshell-result"
 FORMATS = (FORMAT, "gridshell-result")  # what is read: the second was written until November 2026
 VERSION = 1
-FORGOTTEN = 3600.0  # s; writing takes seconds, so an older temporary folder has lost its process
+STAGE, NEW, RECORD = ".rodshell-stage-", "new", "commit.json"
+FORGOTTEN = 3600.0  # s: age of a stage that has lost its process, where locks do not tell
 
 
-def check_folder(folder: str | os.PathLike[str]) -> Path:
-    """The absolute path of `folder` if a result can be written there; worth asking before a long computation.
+class ForeignFileError(OutputError):
+    """Files that rodshell did not write stand where it has to write."""
 
-    Raises
-    ------
-    OutputError : it is a file, another folder's content, the working folder, or it cannot be made.
+
+@dataclass
+class ResultFolder:
+    """A folder that is written into; nothing in it changes before `commit`.
+
+    Parameters
+    ----------
+    path : of the folder, absolute; stage : the hidden folder inside it, which is removed in the end.
+    force : whether files that rodshell did not write may be replaced where it has to write.
+    kept : after `commit`, files of an earlier result that somebody has changed since: they stay.
     """
-    path = Path(folder).expanduser().resolve()
-    if path.exists():
-        _check_replaceable(path)
-    parent = _existing_parent(path)
-    try:  # asking for permission is not enough: to root everything is permitted, even in /proc
-        os.rmdir(tempfile.mkdtemp(prefix=_prefix(path), dir=parent))
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror} in {parent}; choose another folder") from error
-    return path
+
+    path: Path
+    stage: Path
+    force: bool = False
+    kept: tuple[str, ...] = field(default=(), init=False)
+
+    @property
+    def new(self) -> Path:
+        """The staged files, in their tree."""
+        return self.stage / NEW
+
+    def put(self, name: str, content: str | bytes) -> None:
+        """Stage a file.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        file = self.new / name
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content if isinstance(content, bytes) else content.encode())
+        except OSError as error:
+            raise OutputError(f"cannot write {self.path / name}: {error.strerror}; choose another folder") from error
+
+    def check(self, names: Iterable[str]) -> dict[str, Mark | None]:
+        """What stands at `names` now, and at what they need.
+
+        Raises
+        ------
+        ForeignFileError : something that rodshell did not write, and that `force` does not allow to replace.
+        """
+        marks = {name: mark(self.path, name) for name in names}
+        strange = foreign(self.path, marks)
+        marks |= {name: mark(self.path, name) for name in strange}
+        stuck = [name for name in strange if not {"size", "link"} & (marks[name] or {"size": 0}).keys()]
+        if stuck:
+            raise ForeignFileError(
+                f"{self.path / stuck[0]} is in the way of a file that has to be written there: move it, or choose "
+                "another folder"
+            )
+        if strange and not self.force:
+            raise ForeignFileError(_refusal(self.path, strange))
+        return marks
+
+    def commit(self, *, keep_others: bool = False) -> None:
+        """Put all staged files in their places, and remove those of an earlier result that are not among them.
+
+        keep_others : leave files of an earlier result that are not staged, as parts of it.
+
+        Raises
+        ------
+        ForeignFileError : as of `check`; nothing was changed. OutputError : files cannot be moved.
+        """
+        try:
+            staged = (file.relative_to(self.new).as_posix() for file in self.new.rglob("*") if file.is_file())
+            written = {name: found for name in sorted(staged) if (found := mark(self.new, name)) is not None}
+            with _locked(self.path):
+                _recover(self.path, but=self.stage)
+                there = self.check([*written, FILE])
+                old = {name: found for name, found in read_manifest(self.path).items() if name not in written}
+                now = {} if keep_others else {name: mark(self.path, name) for name in old}
+                removed = {name: found for name, found in now.items() if found == old[name]}
+                self.kept = tuple(name for name, found in now.items() if found is not None and name not in removed)
+                self.put(FILE, manifest_text({**(old if keep_others else {}), **written}))
+                record = {"files": [*written, FILE], "replaces": there | removed, "removes": list(removed)}
+                (self.stage / "record").write_text(json.dumps(record), encoding="utf-8")
+                with _uninterrupted():
+                    (self.stage / "record").replace(self.stage / RECORD)  # from here on the new result counts
+                    _apply(self.path, self.stage)
+        except OSError as error:
+            if isinstance(error, OutputError):
+                raise
+            state = "the next run completes it" if (self.stage / RECORD).exists() else "nothing was changed"
+            raise OutputError(f"cannot write {self.path}: {error.strerror or error}; {state}") from error
 
 
 @contextmanager
-def replacing(folder: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary folder beside `folder`, which takes its place when the block ends without an error."""
-    path = check_folder(folder)
+def open_folder(
+    folder: "str | os.PathLike[str] | ResultFolder", *, reserved: Iterable[str] = (), force: bool = False
+) -> Iterator[ResultFolder]:
+    """A folder to write into, made if need be, and as it was if nothing is committed.
+
+    Parameters
+    ----------
+    reserved : patterns (of `Path.glob`) of the names that will be written, to be asked for before a long computation.
+
+    Raises
+    ------
+    OutputError : it cannot be written. ForeignFileError : as of `ResultFolder.check`, of `reserved`.
+    """
+    if isinstance(folder, ResultFolder):
+        yield folder
+        return
+    path = Path(folder).expanduser().resolve()
+    made = list[Path]()
+    stage, lock = None, None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _sweep(path)
-        temporary = Path(tempfile.mkdtemp(prefix=_prefix(path), dir=path.parent))
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}; choose another folder") from error
-    try:
-        temporary.chmod(0o777 & ~_umask())  # mkdtemp's folder is private, a result is not
-        yield temporary
-        _take_place(temporary, path)
-    except OSError as error:
-        if isinstance(error, OutputError):
-            raise
-        raise OutputError(f"cannot write {path}: {error.strerror or error}; nothing was changed") from error
+        try:
+            made = _make(path)
+            with _locked(path):
+                _recover(path)
+                stage = Path(tempfile.mkdtemp(prefix=STAGE, dir=path))
+                lock = _lock(stage)
+            (stage / NEW).mkdir()
+            place = ResultFolder(path, stage, force)
+            place.check(_standing(path, [*reserved, FILE]))
+        except OSError as error:
+            if isinstance(error, OutputError):
+                raise
+            raise OutputError(f"cannot write {path}: {error.strerror or error}; choose another folder") from error
+        yield place
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        if stage is not None and not (stage / RECORD).exists():
+            shutil.rmtree(stage, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+        for one in reversed(made):
+            with suppress(OSError):
+                one.rmdir()
 
 
-def put(file: Path, content: str | bytes) -> None:
-    """Write a file as a whole: a kill leaves the old one or the new one."""
-    beside = file.with_name(f".{file.name}.new")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(content if isinstance(content, bytes) else content.encode())
-        beside.replace(file)
-    except OSError as error:
-        with suppress(OSError):
-            beside.unlink()
-        raise OutputError(f"cannot write {file}: {error.strerror}; choose another folder") from error
+@contextmanager
+def reading(folder: str | os.PathLike[str]) -> Iterator[Callable[[str], Path]]:
+    """Where each file of a result is, by name: in its folder, or still in the stage of a commit that was killed."""
+    path = Path(folder).expanduser()
+    with _locked(path, shared=True):
+        stage = next((one for one in _stages(path) if (one / RECORD).exists()), None)
+        record = _record(stage) if stage else {"files": (), "removes": ()}
+
+        def where(name: str) -> Path:
+            if stage is None or name not in (*record["files"], *record["removes"]):
+                return path / name
+            staged = stage / NEW / name
+            return staged if staged.exists() or name in record["removes"] else path / name
+
+        yield where
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -85,72 +200,149 @@ def read_json(path: Path) -> dict[str, Any]:
     version = result.get("version")
     if not isinstance(version, int) or version > VERSION:
         raise OutputError(f"{path} has version {version}, this rodshell reads {VERSION}: install a newer one")
+    if "version_gridshell" in result:
+        result["version_rodshell"] = result.pop("version_gridshell")
     return result
 
 
-def _check_replaceable(path: Path) -> None:
-    if not path.is_dir():
+def _refusal(path: Path, names: list[str]) -> str:
+    shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    if not read_manifest(path) and "result.json" in names:
+        why = f"there is no {FILE}: the result was copied, or written by an earlier version"
+    else:
+        why = "not written by rodshell, or changed since"
+    return (
+        f"will not replace {shown} in {path} ({why}): choose another folder, move what you want to keep, or use "
+        "--force (in Python force=True)"
+    )
+
+
+def _standing(path: Path, patterns: Iterable[str]) -> list[str]:
+    """What there is of the names that match; and a pattern itself, where no folder is but something else."""
+    found = dict[str, None]()
+    for pattern in patterns:
+        found |= {one.relative_to(path).as_posix(): None for one in path.glob(pattern)}
+        if any((path / part).exists() and not (path / part).is_dir() for part in above(pattern)):
+            found[pattern] = None
+    return list(found)
+
+
+def _make(path: Path) -> list[Path]:
+    """Make `path` and the folders above it that are missing; returns those made, the outermost first."""
+    if path.exists() and not path.is_dir():
         raise OutputError(f"cannot write {path}: it is a file; choose a folder")
-    if Path.cwd().is_relative_to(path):
-        raise OutputError(f"cannot replace {path} while working in it: choose a folder inside, or leave it first")
-    if any(path.iterdir()):
-        try:
-            read_json(path / "result.json")
-        except OutputError as error:
-            raise OutputError(
-                f"will not replace {path}: it is not empty and holds no rodshell result; choose another folder"
-            ) from error
-
-
-def _existing_parent(path: Path) -> Path:
-    parent = path.parent
-    while not parent.exists():
-        parent = parent.parent
-    if not parent.is_dir():
-        raise OutputError(f"cannot write {path}: {parent} is a file; choose another folder")
-    return parent
-
-
-def _take_place(temporary: Path, path: Path) -> None:
-    """Move `temporary` to `path`; what was there is left at `temporary`, or is gone."""
-    if not path.exists():
-        temporary.rename(path)
-    elif not _exchange(temporary, path):
-        backup = Path(tempfile.mkdtemp(prefix=f".{path.name[:100]}.old-", dir=path.parent))
-        path.rename(backup / path.name)
-        try:
-            temporary.rename(path)
-        except OSError:
-            (backup / path.name).rename(path)
-            raise
-        finally:
-            with suppress(OSError):
-                shutil.rmtree(backup)
-
-
-def _exchange(one: Path, other: Path) -> bool:
-    """Swap two folders in one step (Linux); False where the system cannot."""
+    missing = [one for one in (path, *path.parents) if not one.exists()]
+    there = missing[-1].parent if missing else path
+    if not there.is_dir():
+        raise OutputError(f"cannot write {path}: {there} is a file; choose another folder")
+    made = list[Path]()
     try:
-        renameat2 = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError, TypeError):
-        return False
-    here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
-    return bool(renameat2(here, os.fsencode(one), here, os.fsencode(other), exchange) == 0)
+        for one in reversed(missing):
+            one.mkdir()
+            made.append(one)
+    except OSError as error:
+        for one in reversed(made):
+            with suppress(OSError):
+                one.rmdir()
+        raise OutputError(f"cannot write {path}: {error.strerror} in {there}; choose another folder") from error
+    return made
 
 
-def _sweep(path: Path) -> None:
-    """Remove what runs that were killed left beside `path`."""
-    for left in path.parent.iterdir():
+def _stages(path: Path) -> list[Path]:
+    return [one for one in path.glob(f"{STAGE}*") if one.is_dir() and not one.is_symlink()]
+
+
+def _recover(path: Path, but: Path | None = None) -> None:
+    """Complete a commit that was killed, and remove the stages of processes that are gone."""
+    for stage in _stages(path):
+        if stage == but:
+            continue
+        try:
+            lock = _lock(stage, wait=False)
+        except BlockingIOError:
+            continue
+        try:
+            if (stage / RECORD).exists():
+                _apply(path, stage)
+            elif lock is None and time.time() - stage.stat().st_mtime < FORGOTTEN:
+                continue
+            shutil.rmtree(stage, ignore_errors=True)
+        finally:
+            if lock is not None:
+                os.close(lock)
+
+
+def _record(stage: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((stage / RECORD).read_text(encoding="utf-8"))
+    return content
+
+
+def _apply(path: Path, stage: Path) -> None:
+    """Move and remove what the stage's record says; what somebody has changed since it was written stays."""
+    record = _record(stage)
+    replaces: dict[str, Mark | None] = record["replaces"]
+    for name in record["removes"]:
+        if mark(path, name) == replaces[name]:
+            (path / name).unlink(missing_ok=True)
+    for name in record["files"]:
+        source, target = stage / NEW / name, path / name
+        if not source.exists():
+            continue  # it was moved before the kill
+        for part in above(name):  # a file or a link in a folder's place, which --force gave away
+            if part in replaces and mark(path, part) == replaces[part]:
+                (path / part).unlink(missing_ok=True)
+        if mark(path, name) in (None, replaces.get(name)):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            source.replace(target)
+    for folder in {path / part for name in record["removes"] for part in above(name)}:
         with suppress(OSError):
-            if left.name.startswith(_prefix(path)) and time.time() - left.stat().st_mtime > FORGOTTEN:
-                shutil.rmtree(left)
+            folder.rmdir()
+    (stage / RECORD).unlink()
 
 
-def _prefix(path: Path) -> str:
-    return f".{path.name[:100]}.rodshell-"
+@contextmanager
+def _locked(path: Path, *, shared: bool = False) -> Iterator[None]:
+    """Wait until no other process writes into `path`."""
+    lock = _lock(path, shared=shared)
+    try:
+        yield
+    finally:
+        if lock is not None:
+            os.close(lock)
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _lock(path: Path, *, shared: bool = False, wait: bool = True) -> int | None:
+    """A descriptor that holds the folder's lock until it is closed; None on a file system without locks.
+
+    Raises
+    ------
+    BlockingIOError : another process holds it, and `wait` is False.
+    """
+    if fcntl is None or not path.is_dir():
+        return None
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB))
+    except BaseException as error:
+        os.close(descriptor)
+        if isinstance(error, OSError) and not isinstance(error, BlockingIOError):
+            return None
+        raise
+    return descriptor
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Ctrl-C and SIGTERM wait until the block is over."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    late = list[int]()
+    before = {one: signal.signal(one, lambda number, _: late.append(number)) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, signal.SIG_DFL if handler is None else handler)
+        for number in late:
+            signal.raise_signal(number)

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.output.archive import Archive
+from rodshell.output.drawing import LETTER, SMALL
 from rodshell.output.rods import JointRecord, RodRecord, joints_of, outlines_of, rods_of
+from rodshell.output.rounding import Rounding, rounding_of
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +29,7 @@ class FlatPlan:
     footprint : closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
     boundary : closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if they
         are not known.
+    rounding : how finely lengths are shown.
     """
 
     name: str
@@ -37,6 +40,7 @@ class FlatPlan:
     marks: Floats
     footprint: list[Floats]
     boundary: list[Floats]
+    rounding: Rounding
 
     @cached_property
     def extent(self) -> float:
@@ -54,15 +58,17 @@ class FlatPlan:
     @cached_property
     def text(self) -> float:
         """Size of the rods' labels at 1:1 [mm]: joint ids find room between the rods."""
-        return min(0.25 * self.spacing, 0.015 * self.extent)
+        longest = max((len(joint.id) for joint in self.joints), default=1)
+        return min(self.spacing / (SMALL * LETTER * longest + 0.7), 0.25 * self.spacing, 0.015 * self.extent)
 
     @cached_property
     def summary(self) -> str:
         """The cut list in one line; lengths as cut."""
-        lengths = [1e3 * rod.cut_length for rod in self.rods]
+        lengths = [rod.cut_length for rod in self.rods]
         return (
-            f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths) / 1e3:.2f} m in total, "
-            f"longest {max(lengths, default=0):.1f} mm" + (", with allowances" if self.allowances else "")
+            f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths):.1f} m in total, "
+            f"longest {self.rounding.mm(max(lengths, default=0.0))} mm"
+            + (", with allowances" if self.allowances else "")
         )
 
     @property
@@ -85,6 +91,7 @@ def flat_plan(archive: Archive) -> FlatPlan:
         archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks,
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
+        rounding_of(archive.result),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
 from rodshell.output.shapes import CAPTIONS
 from rodshell.output.svg import drawing_svg, inline
-from rodshell.output.verdict import unknown_below, verdict
+from rodshell.output.verdict import facts, unknown_below
 from rodshell.output.viewer import viewer_data, viewer_json
 from rodshell.output.wording import percent, stage
 
@@ -49,8 +49,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         name=archive.name,
         note=NOTE,
         summary=plan.summary,
-        warnings=[str(word) for word in result.get("warnings") or []],
-        verdict=verdict(archive),
+        verdict=archive.verdict,
+        facts=facts(result),
         dropped=result.get("dropped") or [],
         view=_view(archive),
         supports=supports_table(result),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rodshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
 from rodshell.formfinding.bound import shape_of_net
 from rodshell.joints import joint_parameters
+from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod
 from rodshell.solve.report import SolveReport
 
@@ -65,7 +66,7 @@ def form_states(form: FoundForm) -> States:
     target = form.target
     states = _mesh_states(form.footprint)
     states["draped"] = form.trimmed.positions
-    states["gap_draped"] = target.gap(form.trimmed.positions).distance
+    states["gap_draped"] = target.gap(form.trimmed.positions).distance - form.trimmed.mesh.heights
     for ends, shell in form.popped.items():
         states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:
@@ -140,8 +141,10 @@ def grid_table(
 def rod_table(rod: Rod) -> dict[str, Any]:
     """Section, material and stiffnesses."""
     first, second = rod.bend_stiffnesses
+    known = PRESETS[rod.material.name] if rod.material is not None and rod.material.name is not None else None
     return {
         **rod.parameters(),
+        **({"preset": {"name": rod.material.name, **asdict(known)}} if known is not None and rod.material else {}),
         "EA": rod.stretch_stiffness,
         **({"EI": first} if first == second else {"EI1": first, "EI2": second}),
         "GJ": rod.twist_stiffness,

@@ -12,7 +12,8 @@ from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.plan import nice_step, nice_ticks
 from rodshell.output.shapes import STAGE, Shape
 from rodshell.output.svg import number
-from rodshell.output.wording import MINUS, PRESSURES
+from rodshell.output.wording import MINUS
+from rodshell.units import PRESSURES
 
 Floats = NDArray[np.float64]
 Colour = Literal["gap", "stress"]

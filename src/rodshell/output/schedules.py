@@ -1,8 +1,7 @@
 """Schedules as tables and as CSV: what to cut, where to drill, where each end goes. Millimetres, degrees, kg, MPa."""
 
-import csv
-import io
 from collections.abc import Callable, Iterator, Mapping
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -10,20 +9,22 @@ from numpy.typing import NDArray
 
 from rodshell.output.archive import Archive
 from rodshell.output.rods import RodRecord, joints_of, rods_of
+from rodshell.output.rounding import FINEST, Rounding, rounding_of
 from rodshell.output.verdict import ENDS
 
 Floats = NDArray[np.float64]
 Rows = list[list[str]]
 Table = tuple[list[str], Rows]
+UNITS = {"mm": "mm", "kg": "kg", "MPa": "MPa", "deg": "\N{DEGREE SIGN}", "N": "N", "Nm": "N m"}
+Show = Callable[[float | None], str]
 
 
-def table_csv(table: Table) -> str:
-    """A table as CSV."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(table[0])
-    writer.writerows(table[1])
-    return stream.getvalue()
+def head(column: str) -> tuple[str, str]:
+    """A column of a schedule as people read it: "cut_length_mm" is ("cut length", "mm"); "" where it has no unit."""
+    words = column.split("_")
+    unit = next((word for word in words[1:] if word in UNITS), "")
+    name = " ".join(word for word in words if word != unit)
+    return (f"angle {name}" if unit == "deg" else name), UNITS.get(unit, "")
 
 
 def rods_table(archive: Archive, *, brief: bool = False) -> Table:
@@ -31,28 +32,34 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
 
     Bending is that of the final shape; where a column is named `pop_up`, the worst of all shapes, the way up included.
     """
-    final = archive.final
+    final, mm = archive.final, rounding_of(archive.result).mm
     columns: list[tuple[str, bool, Callable[[RodRecord], str]]] = [
         ("id", True, lambda rod: rod.id),
         ("family", False, lambda rod: rod.family),
         ("layer", True, lambda rod: _whole(rod.layer)),
-        ("offset_mm", False, lambda rod: _mm(rod.offset)),
-        ("start_mm", False, lambda rod: _mm(rod.start)),
-        ("end_mm", False, lambda rod: _mm(rod.end)),
-        ("length_mm", True, lambda rod: _mm(rod.length)),
-        ("cut_length_mm", True, lambda rod: _mm(rod.cut_length)),
-        ("mass_kg", True, lambda rod: _number(rod.more.get("mass"), 5)),
+        ("offset_mm", False, lambda rod: mm(rod.offset)),
+        ("start_mm", False, lambda rod: mm(rod.start)),
+        ("end_mm", False, lambda rod: mm(rod.end)),
+        ("length_mm", True, lambda rod: mm(rod.length)),
+        ("cut_length_mm", True, lambda rod: mm(rod.cut_length)),
+        ("mass_kg", True, lambda rod: _significant(rod.more.get("mass"))),
         ("joints", True, lambda rod: str(len(rod.joints))),
-        ("min_radius_mm", True, lambda rod: _mm(rod.more.get("min_radius"), 1)),
+        ("min_radius_mm", True, lambda rod: mm(rod.more.get("min_radius"))),
+        ("max_normal_curvature_per_m", False, lambda rod: _figure(rod.more.get("normal_curvature"))),
+        ("max_geodesic_curvature_per_m", False, lambda rod: _figure(rod.more.get("geodesic_curvature"))),
+        ("max_twist_deg_per_m", False, lambda rod: _figure(rod.more.get("twist_rate"), 180 / pi)),
         ("max_strain", True, lambda rod: _number(rod.more.get("max_strain"), 6)),
         ("max_stress_MPa", True, lambda rod: _mpa(rod.more.get("max_stress"))),
+        ("max_torsion_stress_MPa", False, lambda rod: _figure(rod.more.get("torsion_stress"), 1e-6)),
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
         ("utilisation_pop_up", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
-        ("splices_at_mm", True, lambda rod: "; ".join(_mm(at) for at in rod.more.get("splices") or ())),
-        *_ends("flat", 2, lambda rod: rod.flat),
+        ("splices_at_mm", True, lambda rod: "; ".join(mm(at) for at in rod.more.get("splices") or ())),
+        *_ends(mm, "flat", 2, lambda rod: rod.flat),
         ("final_state", False, lambda rod: final or "" if len(rod.nodes) else ""),
-        *_ends("final", 3, lambda rod: archive.states[final][rod.nodes[[0, -1]]] if final and len(rod.nodes) else None),
-        ("joints_at_mm", False, _joints_at),
+        *_ends(
+            mm, "final", 3, lambda rod: archive.states[final][rod.nodes[[0, -1]]] if final and len(rod.nodes) else None
+        ),
+        ("joints_at_mm", False, lambda rod: _joints_at(rod, mm)),
     ]
     chosen = [column for column in columns if column[1] or not brief]
     rows = [[cell(rod) for _, _, cell in chosen] for rod in rods_of(archive)]
@@ -65,7 +72,7 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines. Each entry of
     `columns` is a name and what it says of a joint: more may be added there.
     """
-    rods, final = rods_of(archive), archive.final
+    rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.result).mm
     placed = [_joints_in_space(archive, rod, final) for rod in rods]
     loads = _joint_loads(archive, final)
     rows, columns = list[list[str]](), dict[str, str]()
@@ -73,18 +80,18 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
         (i, j), (a, b) = joint.rods, (rods[k] for k in joint.rods)
         on_a, on_b = placed[i].get(b.id), placed[j].get(a.id)
         x, y = a.point(joint.at[0])
-        space = map(_mm, on_a[0]) if on_a else ("", "", "")
+        space = map(mm, on_a[0]) if on_a else ("", "", "")
         columns = {
             "id": joint.id,
             **({} if brief else {"rod_a": a.id, "rod_b": b.id}),
-            "at_a_mm": _mm(joint.at[0]),
-            "at_b_mm": _mm(joint.at[1]),
+            "at_a_mm": mm(joint.at[0]),
+            "at_b_mm": mm(joint.at[1]),
             "over": joint.over(rods),
-            **({} if brief else {"flat_x_mm": _mm(x), "flat_y_mm": _mm(y)}),
+            **({} if brief else {"flat_x_mm": mm(x), "flat_y_mm": mm(y)}),
             **({} if brief else {"final_state": (final or "") if on_a else ""}),
             **dict(zip(("final_x_mm", "final_y_mm", "final_z_mm"), space, strict=True)),
-            "flat_deg": f"{_degrees(a.flat[1] - a.flat[0], b.flat[1] - b.flat[0]):.{2 if brief else 4}f}",
-            "final_deg": f"{_degrees(on_a[1], on_b[1]):.{2 if brief else 4}f}" if on_a and on_b else "",
+            "flat_deg": f"{_degrees(a.flat[1] - a.flat[0], b.flat[1] - b.flat[0]):.2f}",
+            "final_deg": f"{_degrees(on_a[1], on_b[1]):.2f}" if on_a and on_b else "",
             **({} if brief else loads.get((a.id, b.id), dict.fromkeys(_CARRIED, "") if loads else {})),
         }  # fmt: skip
         rows.append(list(columns.values()))
@@ -99,7 +106,7 @@ def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], d
     table = (archive.result.get("joint_loads") or {}).get((final or "").removeprefix("popped_"), [])
     return {
         tuple(one["rods"]): {
-            "scissor_deg": f"{one['scissor_deg']:.4f}",
+            "scissor_deg": f"{one['scissor_deg']:.2f}",
             "force_N": f"{np.linalg.norm(one['force']):.6g}",
             **{f"{name}_{unit}": f"{one[name]:.6g}" for name, unit in _LOADS},
         }
@@ -113,13 +120,13 @@ _LOADS = (("normal_force", "N"), ("shear_moment", "Nm"), ("out_of_plane_moment",
 def supports_table(archive: Archive, *, brief: bool = False) -> Table:
     """One row a rod end: its place on the final boundary, its outward direction, and its reactions."""
     boundary, tangents = archive.result.get("boundary") or [], archive.result.get("end_tangents") or []
-    reactions = archive.result.get("reactions") or {}
+    reactions, mm = archive.result.get("reactions") or {}, rounding_of(archive.result).mm
     columns = ["id", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"tangent_{a}" for a in "xyz")]
     columns += [f"{kind}_{a}_{unit}_{ends}" for ends in reactions for kind, unit in _FORCES for a in "xyz"]
     names = [(rod.id, end) for rod in rods_of(archive) for end in (0, 1)]
     rows = []
     for k, ((name, end), place) in enumerate(zip(names, boundary, strict=False)):
-        row = [f"{name}.{end}", name, str(end), *map(_mm, place)]
+        row = [f"{name}.{end}", name, str(end), *map(mm, place)]
         row += [f"{round(t, 5) + 0.0:.5f}" for t in tangents[k]] if k < len(tangents) else [""] * 3
         for held in reactions.values():
             row += [f"{value:.6g}" for kind in ("forces", "moments") for value in held[kind][k]]
@@ -145,9 +152,8 @@ def seams_table(archive: Archive) -> Table:
     ends = [end for end in ENDS if all(end in (seam.get("forces") or {}) for seam in seams)]
     columns = ["meeting", "first_end", "second_end", "x_mm", "y_mm", "z_mm"]
     columns += [f"{end}_f{axis}_N" for end in ends for axis in "xyz"]
-    rows = [
-        [number, *meeting["ends"], *map(_mm, meeting["point"])] for number, meeting in seam_meetings(archive.result)
-    ]
+    mm = rounding_of(archive.result).mm
+    rows = [[number, *meeting["ends"], *map(mm, meeting["point"])] for number, meeting in seam_meetings(archive.result)]
     carried = [
         [force for end in ends for force in seam["forces"][end]["each"][k]]
         for seam in seams
@@ -159,46 +165,52 @@ def seams_table(archive: Archive) -> Table:
 def bracing_table(archive: Archive) -> Table:
     """One row a diagonal."""
     braces = (archive.result.get("fabrication") or {}).get("bracing", [])
-    rows = [[brace["from"], brace["to"], _mm(brace["flat"], 2), _mm(brace["final"], 2)] for brace in braces]
+    mm = rounding_of(archive.result).mm
+    rows = [[brace["from"], brace["to"], mm(brace["flat"]), mm(brace["final"])] for brace in braces]
     return ["from", "to", "flat_mm", "final_mm"], rows
 
 
 def stock_table(archive: Archive) -> Table:
     """One row a bar of stock: its pieces, named rod.number from the datum end, and what is left of it."""
     stock = (archive.result.get("fabrication") or {}).get("stock") or {"bars": []}
+    mm = rounding_of(archive.result).mm
     rows = [
-        [str(k), "; ".join(f"{one['piece']} {_mm(one['length'], 2)}" for one in bar["pieces"]), _mm(bar["left"], 2)]
+        [str(k), "; ".join(f"{one['piece']} {mm(one['length'])}" for one in bar["pieces"]), mm(bar["left"])]
         for k, bar in enumerate(stock["bars"], start=1)
     ]
     return ["bar", "pieces_mm", "left_mm"], rows
 
 
 def end_paths_table(archive: Archive) -> Table:
-    """Where each rod end is at each stage of the deployment, and how far it moved: for a finite element program."""
+    """Where each rod end is at each stage of the deployment, and how far it moved.
+
+    It is read by finite element programs, in which a rounded displacement is a stress: it has all digits to 0.001 mm.
+    """
+    mm = Rounding(FINEST).mm
     history, shares = archive.states["history"], archive.states["history_share"]
     columns = ["share", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"u{a}_mm" for a in "xyz")]
     rows = []
     for share, positions in zip(shares, history, strict=True):
         for rod in rods_of(archive):
             for end, node in zip((0, 1), rod.nodes[[0, -1]], strict=True):
-                row = [f"{share:.6f}", rod.id, str(end), *map(_mm, positions[node])]
-                rows.append([*row, *map(_mm, positions[node] - history[0][node])])
+                row = [f"{share:.6f}", rod.id, str(end), *map(mm, positions[node])]
+                rows.append([*row, *map(mm, positions[node] - history[0][node])])
     return columns, rows
 
 
-def _joints_at(rod: RodRecord) -> str:
-    return "; ".join(f"{other} {_mm(at)}" for other, at in sorted(rod.joints, key=lambda joint: joint[1]))
+def _joints_at(rod: RodRecord, mm: Show) -> str:
+    return "; ".join(f"{other} {mm(at)}" for other, at in sorted(rod.joints, key=lambda joint: joint[1]))
 
 
 def _ends(
-    name: str, axes: int, places: Callable[[RodRecord], Any]
+    mm: Show, name: str, axes: int, places: Callable[[RodRecord], Any]
 ) -> list[tuple[str, bool, Callable[[RodRecord], str]]]:
     """Columns of the coordinates of both ends."""
 
     def cell(end: int, axis: int) -> Callable[[RodRecord], str]:
         def show(rod: RodRecord) -> str:
             found = places(rod)
-            return "" if found is None else _mm(found[end][axis])
+            return "" if found is None else mm(found[end][axis])
 
         return show
 
@@ -232,13 +244,17 @@ def _degrees(a: Floats, b: Floats) -> float:
     return float(np.degrees(2.0 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b))))
 
 
-def _mm(value: float | None, digits: int = 3) -> str:
-    """A length [m] in mm; without a minus before a zero."""
-    return "" if value is None else f"{round(1e3 * value, digits) + 0.0:.{digits}f}"
-
-
 def _mpa(value: float | None) -> str:
     return "" if value is None else f"{1e-6 * value:.5g}"
+
+
+def _significant(value: float | None) -> str:
+    """Four figures, as a balance has them."""
+    return "" if value is None else f"{float(f'{value:.4g}'):.10f}".rstrip("0").rstrip(".")
+
+
+def _figure(value: float | None, factor: float = 1.0) -> str:
+    return "" if value is None else f"{round(factor * value, 9):.5g}"
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -1,23 +1,25 @@
 """One screen of text about a result."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from math import degrees
 from typing import Any
 
-from rodshell.output.verdict import unknown_below, utilisation
-from rodshell.output.wording import NAMES, case_rows, percent, rounded, stage, stress
+from rodshell.output.verdict import unknown_below, verdict_of
+from rodshell.output.wording import NAMES, case_rows, percent, rounded, share_of_weight, stage, stress
 
-RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1], what a case has by default
+RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
+
+STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
 
 
 def summary_text(result: dict[str, Any]) -> str:
     """What was found, how good it is, and what to read first."""
     rods = result["rods"]
     joints = sum(len(rod["joints"]) for rod in rods) // 2
-    verdict = "converged" if result["status"] == "converged" else f"NOT CONVERGED: {result['status']}"
-    if (utilisation(result) or 0.0) > 1:
-        verdict += ", but the rods would break"
-    lines = [f"{result['name']}: {verdict}", f"  grid      {len(rods)} rods, {joints} joints"]
+    verdict = verdict_of(result)
+    lines = [f"{result['name']}: {verdict.headline}"]
+    lines += [f"            {reason}" for reason in verdict.reasons[1:]]
+    lines.append(f"  grid      {len(rods)} rods, {joints} joints")
     lines += _rod(result["rod"])
     lines += _sewn(result)
     if net := result.get("net"):
@@ -35,7 +37,7 @@ def summary_text(result: dict[str, Any]) -> str:
         if own := drape.get("own_ends"):
             lines.append(f"            its own rod ends within {_mm(own['max'])}, median {_mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
-        state = "stable" if shell["stable"] else shell["status"] + ", NOT STABLE"
+        state = "stable, unloaded" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
         if gap := result.get("agreement", {}).get(ends):
             line += f"; gap max {_mm(gap['max'])} ({percent(gap['max_relative'])}), "
@@ -45,22 +47,49 @@ def summary_text(result: dict[str, Any]) -> str:
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
     if len(result["dropped"]) > 6:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
-    lines += [f"  WARNING   {warning}" for warning in result["warnings"]]
     return "\n".join(lines)
 
 
 def _rod(rod: dict[str, Any]) -> Iterator[str]:
-    """Section and material in one line, and whether it is the paper's rubber."""
-    line = "  rod       " + ", ".join(" ".join(row) for row in case_rows(rod["section"])).removeprefix("kind ")
+    """Section and material in a line; what is known of a preset, and what the program chose, in lines of their own."""
+    yield f"  rod       {rod_text(rod)}"
+    if chosen_here := rod.get("chosen"):
+        yield f"            {chosen(chosen_here, rod)}"
+    if known := rod.get("preset"):
+        line = f"            {known['name']}: {known['grade']}"
+        if known["bending_strength"] is not None:
+            line += f"; bending strength {stress(known['bending_strength'])}, {known['strength_note']}"
+        yield line
+
+
+def chosen(what: Iterable[str], rod: Mapping[str, Any]) -> str:
+    """That the program chose a rod's material, section or both, and by what."""
+    parts = list(what)
+    missing, verb = " and ".join(parts), "were" if len(parts) > 1 else "was"
+    sized = "section" in parts
+    known = (rod.get("preset") or {}).get("bending_strength") is not None
+    by = ", for bends that use at most half of the bending strength in the final shape"
+    return f"{missing} {verb} not given: chosen to fit{by if sized and known else ''}"
+
+
+def rod_text(rod: Mapping[str, Any]) -> str:
+    """Section and material in a few words, and whether it is the paper's rubber."""
+    line = ", ".join(" ".join(row) for row in case_rows(rod["section"])).removeprefix("kind ")
     if material := rod.get("material"):
-        line += f"; E = {stress(material['youngs_modulus'])}, {rounded(material['density'], 4)} kg/m3"
+        preset = material.get("preset")
+        line += f"; {preset}, " if preset and preset != "rubber" else "; "
+        line += f"E = {stress(material['youngs_modulus'])}, {rounded(material['density'], 4)} kg/m3"
+        if preset and preset != "rubber":
+            known = rod.get("preset") or {}
+            changed = [NAMES.get(key, key) for key, value in material.items() if known.get(key, value) != value]
+            return line + (f" ({' and '.join(changed)} not {preset}'s own)" if changed else "")
         rubber = [NAMES.get(key, key) for key, value in RUBBER.items() if material.get(key) == value]
         if len(rubber) == len(RUBBER):
             line += " (the paper's rubber; for another: rod.material)"
         elif rubber:
             verb = "are" if len(rubber) > 1 else "is"
             line += f" ({' and '.join(rubber)} {verb} the paper's rubber's; for another: rod.material)"
-    yield line
+    return line
 
 
 def _sewn(result: dict[str, Any]) -> Iterator[str]:
@@ -80,25 +109,43 @@ def _sewn(result: dict[str, Any]) -> Iterator[str]:
 
 
 def _checked(result: dict[str, Any]) -> list[str]:
-    """Bending and reactions, in a line each."""
+    """Bending, own weight and reactions, in a line each."""
     lines, unknown = [], unknown_below(result)
+    of = (result.get("bending") or {}).get("strength_of")
+    strength = f"{of}'s bending strength" if of else "the strength"
     for place, bent in result.get("bending", {}).items():
         if place == "pop_up" and unknown >= 1:
             continue
         if isinstance(bent, dict) and bent.get("min_radius") is not None:
             name = "way up" if place == "pop_up" else place
-            line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}"
+            line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}{_curved(bent)}"
             if bent.get("max_stress") is not None:
                 line += f", largest stress {stress(bent['max_stress'])}"
+            if bent.get("torsion_stress"):
+                line += f" (torsion alone {stress(bent['torsion_stress'])})"
             if bent.get("utilisation") is not None:
-                line += f", {percent(bent['utilisation'])} of the strength"
+                line += f", {percent(bent['utilisation'])} of {strength}"
             if place == "pop_up" and unknown:
                 line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
+    for ends, weighed in result.get("self_weight", {}).items():
+        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}"
+        if weighed.get("deflection") is not None:
+            line += f"; sinks by {_mm(weighed['deflection'])} under it"
+        lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
         lines.append(f"  reactions {ends:<8}largest {rounded(held['largest_force'])} N; sums of {sums}")
     return lines
+
+
+def _curved(bent: dict[str, Any]) -> str:
+    """How the rods are curved out of the shell and within it, by radii, and twisted."""
+    parts = [("normal_curvature", "out of the shell"), ("geodesic_curvature", "within it")]
+    words = [f"{where} {_mm(1 / bent[key])}" for key, where in parts if (bent.get(key) or 0.0) > STRAIGHT]
+    if (bent.get("twist_rate") or 0.0) > STRAIGHT:
+        words.append(f"twist {rounded(degrees(bent['twist_rate']))} deg/m")
+    return f" ({', '.join(words)})" if words else ""
 
 
 def _mm(metres: float) -> str:

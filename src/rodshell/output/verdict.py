@@ -1,62 +1,96 @@
-"""A result in words: is it converged, stable, near the target, and which supports are worth it."""
+"""The verdict on a result, computed once from all that was found: good, check or unbuildable, and the reasons.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+Summary, report, JSON and exit code show what stands here and judge nothing themselves. A figure that is missing was
+not checked, and then the result is not good.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from rodshell.output.archive import Archive
-from rodshell.output.wording import millimetres, percent, stage
+from rodshell.output.wording import millimetres, percent, place, rounded, stage
+
+Level = Literal["good", "check", "unbuildable"]
+Result = Mapping[str, Any]
 
 ENDS = ("clamped", "pinned")
+WORDS: dict[Level, str] = {"good": "Good", "check": "Check", "unbuildable": "Not buildable"}
+
+FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
+# leaves a tenth of the second
+THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
+NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
+LARGE = 1.0  # m; a wider shell is built by people who have to know whether the rods hold
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
 NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
-SPRUNG = 0.02  # of the target's size: with clamped ends a convex shell leaves a tenth of it
-
-Level = Literal["good", "caution", "bad"]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What to think of a result: a level, one headline, and the sentences that carry it."""
+    """What a result is worth.
+
+    Parameters
+    ----------
+    level : "good": it pops up, stands under its own weight and can be built; "check": something has to be looked at
+        first; "unbuildable": no end condition that was asked for gives a shell that can be built.
+    reasons : sentences, the gravest first; of a good result what makes it good.
+    """
 
     level: Level
-    headline: str
-    sentences: list[str]
+    reasons: tuple[str, ...]
+
+    @property
+    def headline(self) -> str:
+        """The first sentence that everybody is shown."""
+        return f"{WORDS[self.level]}: {self.reasons[0]}"
+
+    def table(self) -> dict[str, Any]:
+        """As it stands in result.json."""
+        return {**asdict(self), "reasons": list(self.reasons)}
 
 
-def verdict(archive: Archive) -> Verdict:
-    """The verdict on an archive."""
-    result = archive.result
-    failed, unstable = _failed(result), _unstable(result)
-    used, unknown = utilisation(result), unknown_below(result)
-    sentences = [*failed, *unstable, *_gaps(result), *_strength(result, used, unknown)]
-    if failed:
-        return Verdict("bad", "Not converged: do not build from these drawings", sentences)
-    if used is not None and used > 1:
-        return Verdict("bad", "Converged, but the rods would break", sentences)
-    if unstable:
-        return Verdict("caution", "Converged, but not stable with every kind of support", sentences)
-    known = [entry.get("stable") for entry in entries(result, "pop_up").values()]
-    if not known:
-        return Verdict("caution", "Not checked: there is no pop-up in this result", sentences)
-    if not all(known):
-        return Verdict("caution", "Converged; whether it is stable was not checked", sentences)
-    left = [gap["max_relative"] for gap in entries(result, "agreement").values() if gap.get("max_relative") is not None]
-    if min(left, default=0.0) > SPRUNG:
-        return Verdict("caution", "Converged and stable, but it does not keep to the target", sentences)
-    if used is not None and (unknown or _snaps(result)):
-        headline = "Converged and stable; whether the rods hold on the way up is not known"
-        return Verdict("caution", headline, sentences)
-    return Verdict("good", "Converged and stable", sentences)
+def verdict_of(result: Result) -> Verdict:
+    """The verdict that a result holds, or that on its figures (results of versions before verdicts)."""
+    held = result.get("verdict")
+    return Verdict(held["level"], tuple(held["reasons"])) if held else verdict(result)
 
 
-def entries(result: Mapping[str, Any], table: str) -> dict[str, dict[str, Any]]:
+def verdict(result: Result) -> Verdict:
+    """The verdict on the figures of a result.
+
+    An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
+    enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
+    """
+    shells = entries(result, "pop_up")
+    faults = {ends: [*_shell_faults(result, ends)] for ends in shells}
+    usable = [ends for ends, found in faults.items() if not found]
+    deployment = [*_fibre_faults(result, "pop_up"), *_contact_faults(result, "deployment")]
+    grave = [sentence for found in faults.values() for sentence in found] + deployment
+    if (result.get("target") or {}).get("flat"):
+        return Verdict("unbuildable", ("the target is flat, nothing pops up",))
+    if not shells:
+        status = result.get("status", "unknown")
+        why = "there is no pop-up in this result" if status == "converged" else f"it did not converge: {status}"
+        return Verdict("unbuildable", (why,))
+    best = _best(result, usable)
+    off = 0.0 if best is None else float(best[1]["max_relative"])
+    far = [_off_words(best)] if best is not None and off > OFF else []
+    open_points = [*_open_points(result, usable), *map(str, result.get("warnings") or [])]
+    if not usable or deployment or off > FAR_OFF:
+        gravest = [*far, *grave] if off > FAR_OFF else [*grave, *far]
+        return Verdict("unbuildable", tuple(dict.fromkeys([*gravest, *open_points])))
+    if to_check := [*grave, *far, *open_points]:
+        return Verdict("check", tuple(dict.fromkeys(to_check)))
+    return Verdict("good", tuple(_merits(result, usable)))
+
+
+def entries(result: Result, table: str) -> dict[str, dict[str, Any]]:
     """What `result[table]` holds for each kind of ends; empty where nothing is known."""
     known = result.get(table) or {}
     return {ends: entry for ends, entry in known.items() if isinstance(entry, dict)}
 
 
-def unknown_below(result: Mapping[str, Any]) -> float:
+def unknown_below(result: Result) -> float:
     """Share of the way from flat below which nothing is known: 0 all of it was followed, 1 the final shape alone is."""
     way = result.get("deployment") or {}
     if way and way.get("lost_at") is None:
@@ -64,85 +98,205 @@ def unknown_below(result: Mapping[str, Any]) -> float:
     return min((float(stage["share"]) for stage in way.get("stages") or [] if stage["share"] > 0), default=1.0)
 
 
-def utilisation(result: Mapping[str, Any]) -> float | None:
-    """The largest of all shapes that are known, those of the way up among them; None where no strength was given."""
+def utilisation(result: Result) -> float | None:
+    """The largest of all shapes that are known, those of the deployment among them; None without a strength."""
     bent = (result.get("bending") or {}).values()
     known = [entry["utilisation"] for entry in bent if isinstance(entry, dict) and entry.get("utilisation") is not None]
     return max(known, default=None)
 
 
-def _failed(result: Mapping[str, Any]) -> list[str]:
-    """What did not converge, one sentence each."""
-    shells, status = entries(result, "pop_up"), result.get("status", "unknown")
-    failed = {ends: entry.get("status") for ends, entry in shells.items() if not _converged(entry)}
-    words = [f"The pop-up with {ends} ends did not converge: {how}." for ends, how in failed.items()]
-    return words if words or status == "converged" else [f"The computation did not converge: {status}."]
+def facts(result: Result) -> list[str]:
+    """What was found, in sentences that judge nothing: gaps, supports, strength."""
+    return [*_gaps(result), *_strength(result)]
 
 
-def _unstable(result: Mapping[str, Any]) -> list[str]:
-    words = []
-    for ends, entry in entries(result, "pop_up").items():
-        if entry.get("stable") is False and _converged(entry):
-            modes = entry.get("negative_modes")
-            count = f" ({modes} buckling mode{'s' if modes != 1 else ''})" if modes else ""
-            words.append(f"With {ends} ends the shell would snap away from this unstable equilibrium{count}.")
-    return words
+def _shell_faults(result: Result, ends: str) -> Iterator[str]:
+    """Why the shell with these ends cannot be built."""
+    shell = result["pop_up"][ends]
+    status = shell.get("status", "converged")
+    if status != "converged":
+        yield f"the pop-up with {ends} ends did not converge: {status}"
+        return
+    if shell.get("stable") is False:
+        modes = shell.get("negative_modes")
+        count = f" ({modes} buckling mode{'s' if modes != 1 else ''})" if modes else ""
+        yield f"with {ends} ends the shell is unstable{count} and would snap to another shape"
+    yield from _contact_faults(result, ends)
+    yield from _fibre_faults(result, ends)
 
 
-def _gaps(result: Mapping[str, Any]) -> list[str]:
+def _contact_faults(result: Result, shape: str) -> Iterator[str]:
+    touching = entries(result, "contact").get(shape) or {}
+    if not touching.get("pairs"):
+        return
+    first, second = touching["rods"]
+    pairs = f"{touching['pairs']} pairs of rods touch or cross, worst" if touching["pairs"] > 1 else "rods touch:"
+    overlap = f"overlap {millimetres(-touching['clearance'])}"
+    yield f"{_shape(shape, touching)} {pairs} {first} and {second} near ({place(touching['where'])}), {overlap}"
+
+
+def _fibre_faults(result: Result, shape: str) -> Iterator[str]:
+    """Stress above the strength, strain beyond thin rods."""
+    bent = entries(result, "bending").get(shape) or {}
+    used, strain = bent.get("utilisation"), bent.get("max_bending_strain")
+    if used is not None and used > 1:
+        yield f"{_shape(shape, bent)} the rods would break: {percent(max(used, 1.01))} of their strength"
+    if strain is not None and strain > THIN:
+        yield (
+            f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for their bends, "
+            f"the theory of thin rods holds up to some {percent(THIN)}"
+        )
+
+
+def _shape(shape: str, entry: Mapping[str, Any]) -> str:
+    """Which shape a sentence is about."""
+    if shape in ENDS:
+        return f"with {shape} ends"
+    share = entry.get("share")
+    return "during deployment" if share is None else f"during deployment (at {stage(share)} of the way)"
+
+
+def _best(result: Result, usable: list[str]) -> tuple[str, Mapping[str, Any]] | None:
+    """Of the shells that can be used the one that is nearest to the target, and its gap; None without a target."""
+    gaps = entries(result, "agreement")
+    known = [(ends, gaps[ends]) for ends in usable if gaps.get(ends, {}).get("max_relative") is not None]
+    return min(known, key=lambda pair: float(pair[1]["max_relative"]), default=None)
+
+
+def _off_words(best: tuple[str, Mapping[str, Any]]) -> str:
+    ends, gap = best
+    where = f", near ({place(gap['where'])})" if gap.get("where") else ""
+    return (
+        f"with {ends} ends, the best that was asked for, the shell is off the target by {millimetres(gap['max'])} "
+        f"({percent(gap['max_relative'])} of its size){where}: dips and ridges need seams, graded stiffness or supports"
+    )
+
+
+def _open_points(result: Result, usable: list[str]) -> Iterator[str]:
+    """What has to be looked at although the shell can be built."""
+    if result.get("status", "converged") != "converged" and all(
+        shell.get("status", "converged") == "converged" for shell in entries(result, "pop_up").values()
+    ):
+        yield f"the job is not complete: {result['status']}"
+    if any(result["pop_up"][ends].get("stable") is None for ends in usable):
+        yield "whether the shell is stable was not checked"
+    yield from _weight(result, usable)
+    yield from _from_flat(result)
+    yield from _other_shapes(result, usable)
+    if utilisation(result) is None and _width(result) > LARGE:
+        yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
+
+
+def _weight(result: Result, usable: list[str]) -> Iterator[str]:
+    """Shells that cannot stand; `load_factor` is null above 100."""
+    borne = {ends: entry["load_factor"] for ends, entry in entries(result, "self_weight").items() if ends in usable}
+    if set(borne) != set(usable):
+        yield "whether it bears its own weight was not checked"
+    weak = {ends: factor for ends, factor in borne.items() if factor is not None and factor < 1}
+    if weak:
+        each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
+        yield f"it bears only {each}: it does not stand unless it is held, braced or made of stiffer rods"
+
+
+def _from_flat(result: Result) -> Iterator[str]:
+    """Whether the final shape is reached from the flat grid."""
+    way = result.get("deployment")
+    if not way:
+        if "pinned" in entries(result, "pop_up"):
+            yield "whether the shell is reached from flat was not checked (checks.stages = 0)"
+        return
+    unknown = unknown_below(result)
+    if unknown >= 1:
+        yield "the deployment from flat could not be followed: whether the shell is reached from flat is not known"
+    elif unknown:
+        yield f"the deployment from flat could not be followed below {stage(unknown)} of the way"
+
+
+def _other_shapes(result: Result, usable: list[str]) -> Iterator[str]:
+    for ends, searched in entries(result, "other_shapes").items():
+        near = [
+            one
+            for one in searched.get("found") or []
+            if not one.get("mirror") and one["distance"] < NEAR and one["energy"] < AKIN
+        ]
+        if ends in usable and near:
+            first = min(near, key=lambda one: float(one["distance"]))
+            yield (
+                f"with {ends} ends the shell has another stable shape, {percent(first['distance'])} of its size away "
+                f"at {rounded(first['energy'])} times the energy: make sure on site that it takes the right one"
+            )
+
+
+def _width(result: Result) -> float:
+    """Longest side in plan [m] of what the shell stands on."""
+    points = result.get("boundary") or []
+    return max((max(column) - min(column) for column in list(zip(*points, strict=True))[:2]), default=0.0)
+
+
+def _merits(result: Result, usable: list[str]) -> Iterator[str]:
+    """Why a result is good."""
+    borne = [entry["load_factor"] for key, entry in entries(result, "self_weight").items() if key in usable]
+    least = min((factor for factor in borne if factor is not None), default=None)
+    weight = "over 100" if least is None else f"{'at least ' if len(usable) > 1 else ''}{rounded(least)}"
+    best = _best(result, usable)
+    near = (
+        f"; with {best[0]} ends it keeps to the target within {percent(best[1]['max_relative'])} of its size"
+        if best
+        else ""
+    )
+    yield f"with {' and '.join(usable)} ends the shell is stable and bears {weight} times its own weight{near}"
+    yield "no other load than its own weight was checked: neither snow, wind nor people"
+
+
+def _gaps(result: Result) -> Iterator[str]:
     """How near the converged shells come to the target, and what the better support is."""
-    shells, gaps = entries(result, "pop_up"), entries(result, "agreement")
-    known = [ends for ends in ENDS if gaps.get(ends, {}).get("max") is not None and _converged(shells.get(ends, {}))]
-    words = []
+    gaps = entries(result, "agreement")
+    faults = {ends: [*_shell_faults(result, ends)] for ends in entries(result, "pop_up")}
+    shells = entries(result, "pop_up")
+    known = [
+        ends
+        for ends in ENDS
+        if gaps.get(ends, {}).get("max") is not None and shells.get(ends, {}).get("status") == "converged"
+    ]
     for ends in known:
         size = gaps[ends].get("max_relative")
         share = "" if size is None else f" ({percent(size)} of its size)"
-        words.append(f"With {ends} ends the shell stays within {millimetres(gaps[ends]['max'])} of the target{share}.")
-    if len(known) == len(ENDS):
-        words.append(_advice(gaps["clamped"], gaps["pinned"]))
-    elif shells and not result.get("target"):
-        words.append("There is no target in this result, so there is no gap to tell.")
-    return words
+        yield f"With {ends} ends the shell stays within {millimetres(gaps[ends]['max'])} of the target{share}."
+    if set(known) == set(ENDS) and not any(faults.values()):
+        yield from _advice(gaps["clamped"], gaps["pinned"])
+    elif faults and not result.get("target"):
+        yield "There is no target in this result, so there is no gap to tell."
 
 
-def _strength(result: Mapping[str, Any], used: float | None, unknown: float) -> list[str]:
-    """How much of the strength is used, and whether the way up is smooth."""
-    words = []
-    if used is not None:
-        words.append(f"The rods use {percent(used)} of their strength at most, {_known(result, unknown)}")
-    elif result.get("bending"):
-        words.append("No strength was given, so it is not known whether the rods hold (checks.strength).")
-    if not unknown and not _snaps(result):
-        words.append("On the way up from flat the shell moves smoothly, as far as its stages tell.")
-    return words
-
-
-def _known(result: Mapping[str, Any], unknown: float) -> str:
-    """In which shapes that is; no more is said of the way up than was followed."""
-    if not result.get("deployment"):
-        return "in the final shape; the way up from flat was not followed."
-    if unknown >= 1:
-        return "in the final shape; nothing is known of the way up, which could not be followed."
-    if unknown:
-        return f"in the final shape and above {stage(unknown)} of the way up; below, nothing is known of it."
-    if _snaps(result):
-        return "in the final shape and the stages of the way up; what a snap asks of them is not known."
-    return "the way up included."
-
-
-def _snaps(result: Mapping[str, Any]) -> bool:
-    return bool((result.get("deployment") or {}).get("snaps"))
-
-
-def _advice(clamped: Mapping[str, Any], pinned: Mapping[str, Any]) -> str:
+def _advice(clamped: Mapping[str, Any], pinned: Mapping[str, Any]) -> Iterator[str]:
+    """Which support is worth it, of two that can both be used."""
     relative = pinned.get("max_relative")
     if clamped["max"] < MUCH_LESS * pinned["max"] and (relative is None or relative > NEGLIGIBLE):
-        return (
+        yield (
             "A support that holds the rod's direction (clamped) is worth it: it leaves "
             f"{percent(clamped['max'] / pinned['max'])} of the gap left by one that is free to turn (pinned)."
         )
-    return "A support that holds the rod's direction (clamped) gains little here: pinned supports will do."
+    elif relative is None or relative <= OFF:
+        yield "A support that holds the rod's direction (clamped) gains little here: pinned supports will do."
 
 
-def _converged(entry: dict[str, Any]) -> bool:
-    return bool(entry.get("status", "converged") == "converged")
+def _strength(result: Result) -> Iterator[str]:
+    """How much of the strength is used, and in which shapes that is known."""
+    used, unknown = utilisation(result), unknown_below(result)
+    if used is not None:
+        yield f"The rods use {percent(used)} of their strength at most, {_known(result, unknown)}"
+    elif result.get("bending"):
+        yield "No strength was given, so it is not known whether the rods hold (checks.strength)."
+
+
+def _known(result: Result, unknown: float) -> str:
+    """In which shapes; no more is said of the deployment than was followed."""
+    if not result.get("deployment"):
+        return "in the final shape; the deployment from flat was not followed."
+    if unknown >= 1:
+        return "in the final shape; nothing is known of the deployment, which could not be followed."
+    if unknown:
+        return f"in the final shape and above {stage(unknown)} of the deployment; below, nothing is known of it."
+    if (result.get("deployment") or {}).get("snaps"):
+        return "in the final shape and the stages of the deployment; what a snap asks of them is not known."
+    return "deployment included."

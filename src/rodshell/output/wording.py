@@ -1,13 +1,14 @@
 """Numbers as they stand in a report, with their units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite, pi
 from typing import Any
+
+from rodshell.units import stress_text
 
 UNKNOWN = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
-PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of the case, by its key
     **dict.fromkeys(
         ("radius", "height", "base", "size", "reference_size", "a", "b", "c", "spacing", "length"), (1e3, "mm")
@@ -54,6 +55,19 @@ def percent(share: float | None) -> str:
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
+def share_of_weight(found: Mapping[str, Any]) -> str:
+    """What an entry of `self_weight` says: how much of its own weight a shell bears."""
+    factor, limit = found.get("load_factor"), found.get("limit")
+    if limit == "no mass":
+        return "unknown: no mass was given"
+    if factor is None:
+        return "more than 100 times"
+    if factor == 0:
+        return "none: unstable unloaded"
+    least = "at least " if limit == "not followed" else ""
+    return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
+
+
 def stage(share: float) -> str:
     """A share of the way up from flat in whole percents, as warnings and drawings name stages."""
     return f"{100 * share:.0f} %"
@@ -69,8 +83,15 @@ def newton_metres(moment: float) -> str:
 
 def stress(pascals: float) -> str:
     """A stress [Pa] in a unit of its size."""
-    unit, name = next((one for one in PRESSURES if abs(pascals) >= one[0]), PRESSURES[-1])
-    return f"{rounded(pascals / unit)} {name}"
+    return stress_text(pascals)
+
+
+def curvature(value: float) -> str:
+    return f"{rounded(value)} 1/m"
+
+
+def twist_rate(value: float) -> str:
+    return f"{rounded(value * 180 / pi)}\N{DEGREE SIGN}/m"
 
 
 def seconds(time: float) -> str:

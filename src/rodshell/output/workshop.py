@@ -1,12 +1,13 @@
 """What is kept of checks and fabrication in result.json and states.npz."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.checks import Bending, Checks, JointLoads, Reactions
+from rodshell.checks import Bending, Checks, JointLoads, Reactions, SelfWeight
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 
@@ -21,9 +22,11 @@ def sharpest(checks: Checks) -> Floats | None:
 
 
 def workshop_result(
-    result: Mapping[str, Any], mesh: GridMesh, checks: Checks, made: Fabricated, strength: float | None
-) -> dict[str, Any]:
+    result: Mapping[str, Any], mesh: GridMesh, checks: Checks, made: Fabricated, strength: float | None,
+    shear_strength: float | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """`result` with all that was checked and made: more of each rod, and tables of their own."""
+    torsion = checks.shear_unknown(strength) if _anisotropic(result) and shear_strength is None else ()
     rods = [dict(entry) for entry in result["rods"]]
     final = next((ends for ends in PREFERRED if ends in checks.bending), None)
     for k, entry in enumerate(rods):
@@ -39,14 +42,27 @@ def workshop_result(
             entry["pop_up"] = _bent([*checks.bending.values(), *checks.on_the_way], here, strength)
     return {
         **result,
-        "warnings": [*result["warnings"], *checks.overstress(strength, mesh), *checks.warnings, *made.warnings],
+        "warnings": [
+            *result["warnings"],
+            *checks.overstress(strength, mesh),
+            *torsion,
+            *checks.warnings,
+            *made.warnings,
+        ],
         "rods": rods,
-        "bending": _bending(checks, strength),
+        "bending": {"shear_strength": shear_strength, **_bending(checks, strength)},
         "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
         "joint_loads": {ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
+        "self_weight": {ends: _self_weight(one) for ends, one in checks.self_weight.items()},
         **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
+        "contact": _contact(checks),
         "fabrication": _fabrication(result, mesh, made),
     }
+
+
+def _anisotropic(result: Mapping[str, Any]) -> bool:
+    """Whether the rods' material has a shear modulus of its own, as timber has."""
+    return (result["rod"].get("material") or {}).get("shear") is not None
 
 
 def workshop_states(checks: Checks) -> dict[str, NDArray[Any]]:
@@ -69,6 +85,15 @@ def _stacked(rows: list[Any]) -> NDArray[np.float32]:
     return np.array(rows, dtype=np.float32)  # for colours: single precision is plenty
 
 
+_PARTS = {
+    "max_bending_strain": "bending_strain",
+    "normal_curvature": "normal_curvature",
+    "geodesic_curvature": "geodesic_curvature",
+    "twist_rate": "twist_rate",
+    "torsion_stress": "torsion_stress",
+}
+
+
 def _bent(bent: list[Bending], where: slice, strength: float | None) -> dict[str, float | None]:
     """Worst figures over a part of the rods' nodes, in any of the states."""
     sharp = max(float(one.curvature[where].max()) for one in bent)
@@ -77,6 +102,9 @@ def _bent(bent: list[Bending], where: slice, strength: float | None) -> dict[str
     stresses = [float(one.stress[where].max()) for one in bent if one.stress is not None]
     figures["max_strain"] = max(strains, default=None)
     figures["max_stress"] = max(stresses, default=None)
+    for key, name in _PARTS.items():
+        parts = [float(np.abs(part[where]).max()) for one in bent if (part := getattr(one, name)) is not None]
+        figures[key] = max(parts, default=None)
     if strength is not None and stresses:
         figures["utilisation"] = max(stresses) / strength
     return figures
@@ -94,6 +122,14 @@ def _bending(checks: Checks, strength: float | None) -> dict[str, Any]:
     return table
 
 
+def _contact(checks: Checks) -> dict[str, Any]:
+    table: dict[str, Any] = {ends: asdict(met) for ends, met in checks.contact.items()}
+    if checks.nearest_on_the_way is not None:
+        share, met = checks.nearest_on_the_way
+        table["deployment"] = {**asdict(met), "share": share}
+    return table
+
+
 def _reactions(held: Reactions) -> dict[str, Any]:
     return {
         "force_sum": held.sum_of_forces,
@@ -105,6 +141,10 @@ def _reactions(held: Reactions) -> dict[str, Any]:
         "forces": held.forces,
         "moments": held.moments,
     }
+
+
+def _self_weight(weighed: SelfWeight) -> dict[str, Any]:
+    return {"load_factor": weighed.load_factor, "deflection": weighed.deflection, "limit": weighed.limit}
 
 
 def _joint_loads(mesh: GridMesh, loads: JointLoads) -> list[dict[str, Any]]:

@@ -9,3 +9,11 @@ FIGURES = {
     "genetic": "a genetic algorithm's G0 and popped-up shape beside those of the direct method",
     "studies": "G0 when H, E, r, g, C1 or C2 changes over decades: two claims of the text",
 }
+
+_MORE = {"fig4": ["angles-?.csv"], "genetic": ["hemisphere.json", "paraboloid.json", "ellipsoid.json"]}
+
+
+def reserved(figure: str) -> list[str]:
+    """Patterns (of `Path.glob`) of the names that a figure's files may have."""
+    own = [f"{figure}{end}" for end in (".svg", "-*.svg")]
+    return ["result.json", "table.txt", "table.csv", *own, *_MORE.get(figure, [])]

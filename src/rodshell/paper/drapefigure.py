@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
+from rodshell.output.folder import ResultFolder
 from rodshell.paper.drape_pictures import rows_svg
 from rodshell.paper.drapes import COLUMNS, METHODS, Drape
 from rodshell.paper.tables import aligned, result_of, write
@@ -37,7 +38,7 @@ class DrapeFigure:
         """The content of result.json."""
         return result_of(self.name, self.status, drapes=[one.result() for one in self.drapes])
 
-    def save(self, folder: str | PathLike[str]) -> None:
+    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write pictures and tables to `folder`: the paper's method in NAME.svg, each method in NAME-METHOD.svg."""
         pictures = {
             self.name if method == "paper" else f"{self.name}-{method}": rows_svg(

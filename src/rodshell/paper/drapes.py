@@ -12,7 +12,8 @@ from rodshell.formfinding import Draped, Fall, Trimmed, drape, trim
 from rodshell.formfinding.drape import Method
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.nets import chebyshev_net
-from rodshell.rods.section import Circle, Material, Rod
+from rodshell.rods.materials import Material
+from rodshell.rods.section import Circle, Rod
 from rodshell.targets import Target
 
 Floats = NDArray[np.float64]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.formfinding import FoundForm, find_stages
+from rodshell.output.folder import ResultFolder
 from rodshell.output.svg import tag
 from rodshell.paper.drapes import ROD, Case, Progress
 from rodshell.paper.fig6 import CASES
@@ -117,7 +118,7 @@ class Fig1:
         above, below = (list(zip(names, panels, strict=True)) for panels in (shells, plans))
         return rows_of_panels([(ROWS[0], above), (ROWS[1], below)])
 
-    def save(self, folder: str | PathLike[str]) -> None:
+    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write picture and tables to `folder`."""
         write(folder, self.result(), self.summary(), COLUMNS, self.rows(), {"fig1": self.picture()})
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
+from rodshell.output.folder import ResultFolder
 from rodshell.paper.fig4_pictures import animation_svg, instants_svg, lag_svg
 from rodshell.paper.tables import aligned, result_of, write
 from rodshell.paper.two_rods import RATE, Demonstration, Run, run, run_statics
@@ -60,7 +61,7 @@ class Fig4:
         ]  # fmt: skip
         return result_of("fig4", self.status, runs=runs)
 
-    def save(self, folder: str | PathLike[str]) -> None:
+    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write pictures, animation and tables to `folder`."""
         shown = [self._first(*which) for which in SHOWN]
         pictures = {

@@ -13,6 +13,7 @@ from typing import Any
 from rodshell.formfinding import Draped, Fall, drape, map_back, trim
 from rodshell.formfinding.progress import silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
+from rodshell.output.folder import ResultFolder
 from rodshell.paper.bare_solves import BareSolves
 from rodshell.paper.drapes import ROD, Case, Progress
 from rodshell.paper.fig6 import CASES
@@ -94,7 +95,7 @@ class Fig8:
         timings = [asdict(one) for one in self.timings]
         return result_of("fig8", self.status, falling=FALLING, timings=timings, ratios=self.ratios())
 
-    def save(self, folder: str | PathLike[str]) -> None:
+    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write picture and tables to `folder`."""
         write(folder, self.result(), self.summary(), COLUMNS, self.rows(), {"fig8": times_svg(self.timings)})
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, FoundForm, agreement, find_stages
 from rodshell.formfinding.progress import silent
+from rodshell.output.folder import ResultFolder
 from rodshell.paper.charts import Chart, Series, charts_svg
 from rodshell.paper.drapes import ROD, Case, Progress
 from rodshell.paper.fig6 import CASES
@@ -137,7 +138,7 @@ class Genetic:
         """The content of result.json."""
         return result_of("genetic", self.status, comparisons=[one.result() for one in self.comparisons])
 
-    def save(self, folder: str | PathLike[str]) -> None:
+    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write the table, the convergence as a picture, and each history, to `folder`.
 
         Raises

@@ -4,13 +4,15 @@ Differential evolution, DE/best/1/bin of pymoo. Each individual has one child: t
 of two others and crossed with the parent, which gives way to it if the child is better.
 """
 
+import os
 import signal
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import repeat
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -107,13 +109,24 @@ def _evaluators(design: Design, jobs: int) -> Iterator[Evaluate]:
     if jobs == 1:
         yield lambda individuals: (_judge(design, one) for one in individuals)
         return
-    # Ctrl-C reaches every process of a terminal: the parent alone ends the others
-    quiet = (signal.SIGINT, signal.SIG_IGN)
-    pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=signal.signal, initargs=quiet)
+    pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_follow_parent)
     try:
         yield lambda individuals: pool.map(_judge, repeat(design), individuals)
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _follow_parent() -> None:
+    """End with the parent however it ends, and not before it: Ctrl-C reaches every process of a terminal."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _judge(design: Design, variables: Floats) -> Judged:

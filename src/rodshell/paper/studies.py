@@ -20,10 +20,12 @@ from rodshell.formfinding import Draped, Fall, drape, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
 from rodshell.nets import chebyshev_net
+from rodshell.output.folder import ResultFolder
 from rodshell.paper.drapes import EDGE, HEIGHT, LENGTH, ROD, Progress
 from rodshell.paper.studies_pictures import studies_svg
 from rodshell.paper.tables import aligned, result_of, write
-from rodshell.rods.section import Circle, GivenSection, Material, Rod
+from rodshell.rods.materials import Material
+from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere
 
 Floats = NDArray[np.float64]
@@ -92,7 +94,7 @@ class Studies:
         lines = [{k: None if v != v else v for k, v in asdict(one).items()} for one in self.lines]
         return result_of("studies", self.status, lines=lines)
 
-    def save(self, folder: str | PathLike[str]) -> None:
+    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
         """Write picture and table to `folder`."""
         write(folder, self.result(), self.summary(), COLUMNS, self.rows(), {"studies": studies_svg(self.lines)})
 

@@ -1,12 +1,12 @@
 """A figure's table as text, and its files: every figure has result.json, table.txt, table.csv and its pictures."""
 
-import csv
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from typing import Any
 
-from rodshell.output.folder import FORMAT, VERSION, replacing
+from rodshell.output.csvtext import csv_text
+from rodshell.output.folder import FORMAT, VERSION, ResultFolder, open_folder
 
 Rows = Sequence[tuple[str, ...]]
 
@@ -25,7 +25,7 @@ def result_of(figure: str, status: str, **content: Any) -> dict[str, Any]:
 
 
 def write(
-    folder: str | PathLike[str],
+    folder: str | PathLike[str] | ResultFolder,
     result: dict[str, Any],
     summary: str,
     columns: tuple[str, ...],
@@ -40,17 +40,12 @@ def write(
 
     Raises
     ------
-    OutputError : it cannot be written, or holds other things than a result.
+    OutputError : it cannot be written, or files that rodshell did not write stand where it has to write.
     """
-    with replacing(folder) as temporary:
-        (temporary / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-        (temporary / "table.txt").write_text(summary + "\n", encoding="utf-8")
-        for name, table in {"table": [columns, *rows], **(more or {})}.items():
-            with (temporary / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows(table)
-        for name, picture in pictures.items():
-            (temporary / f"{name}.svg").write_text(picture, encoding="utf-8")
-        for name, text in (texts or {}).items():
-            (temporary / name).write_text(text, encoding="utf-8")
-        for name, text in (texts or {}).items():
-            (temporary / name).write_text(text, encoding="utf-8")
+    files = {"result.json": json.dumps(result, indent=1) + "\n", "table.txt": summary + "\n"}
+    files |= {f"{name}.csv": csv_text(table) for name, table in {"table": [columns, *rows], **(more or {})}.items()}
+    files |= {f"{name}.svg": picture for name, picture in pictures.items()} | dict(texts or {})
+    with open_folder(folder, reserved=list(files)) as place:
+        for name, content in files.items():
+            place.put(name, content)
+        place.commit()

@@ -21,7 +21,8 @@ from rodshell.geometry.vectors import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, Joint
 from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model.shell import Shell
-from rodshell.rods.section import Circle, Material, Rod
+from rodshell.rods.materials import Material
+from rodshell.rods.section import Circle, Rod
 from rodshell.solve.constraint import Supports
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.simulate import simulate

@@ -107,14 +107,18 @@ class BendTwist:
     def strains(self, state: Floats) -> Floats:
         """(b, 3) curvatures k1, k2 [-] and twist tau [rad]."""
         moved = self.refreshed(state)
-        tangents, d1 = moved.source_tangents, moved.source_directors
-        theta = state[self.blocks[:, 1:4:2], 0]
-        cos, sin, d2 = np.cos(theta)[..., None], np.sin(theta)[..., None], cross(tangents, d1)
-        te, tf = tangents[:, 0], tangents[:, 1]
+        theta, m1 = state[self.blocks[:, 1:4:2], 0], moved.material_directors(state)
+        te, tf = moved.source_tangents[:, 0], moved.source_tangents[:, 1]
         both = 1.0 + dot(te, tf)
-        m1, m2 = cos * d1 + sin * d2, cos * d2 - sin * d1
+        m2 = cross(moved.source_tangents, m1)
         k1, k2 = ((dot(tf, m[:, 0]) - dot(te, m[:, 1])) / both for m in (m1, m2))
         return np.column_stack([k1, k2, theta[:, 1] - theta[:, 0] + moved.source_twist])
+
+    def material_directors(self, state: Floats) -> Floats:
+        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`."""
+        theta = state[self.blocks[:, 1:4:2], 0, None]
+        d1 = self.source_directors
+        return np.asarray(np.cos(theta) * d1 + np.sin(theta) * cross(self.source_tangents, d1))
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         return float(

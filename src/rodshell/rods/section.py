@@ -1,4 +1,4 @@
-"""Cross-sections and material of a rod, and the stiffnesses that follow.
+"""Cross-sections of a rod, and the stiffnesses that follow from one and a material.
 
 A section has two axes, those of the material directors m1 and m2. The second moments (I1, I2) resist bends
 *towards* m1 and m2: I1 is the integral of the square of the coordinate along m1.
@@ -6,9 +6,11 @@ A section has two axes, those of the material directors m1 and m2. The second mo
 
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from math import inf, isfinite, pi, tanh
+from math import inf, pi, tanh
 
 from rodshell.errors import InputError
+from rodshell.rods.materials import Material as Material
+from rodshell.validation import instance, positive
 
 
 class _Round:
@@ -36,7 +38,7 @@ class Circle(_Round):
     radius: float
 
     def __post_init__(self) -> None:
-        _positive("section radius", self.radius, "m")
+        positive("section radius", self.radius, "m")
 
     @property
     def outer_radius(self) -> float:
@@ -65,8 +67,8 @@ class Tube(_Round):
     thickness: float
 
     def __post_init__(self) -> None:
-        _positive("section radius", self.radius, "m")
-        _positive("section thickness", self.thickness, "m")
+        positive("section radius", self.radius, "m")
+        positive("section thickness", self.thickness, "m")
         if self.thickness > self.radius:
             raise InputError(f"tube thickness {self.thickness} m is larger than its radius {self.radius} m")
 
@@ -101,8 +103,8 @@ class Ellipse:
     b: float
 
     def __post_init__(self) -> None:
-        _positive("half-axis a", self.a, "m")
-        _positive("half-axis b", self.b, "m")
+        positive("half-axis a", self.a, "m")
+        positive("half-axis b", self.b, "m")
 
     @property
     def area(self) -> float:
@@ -132,8 +134,8 @@ class RectangularSection:
     height: float
 
     def __post_init__(self) -> None:
-        _positive("section width", self.width, "m")
-        _positive("section height", self.height, "m")
+        positive("section width", self.width, "m")
+        positive("section height", self.height, "m")
 
     @property
     def area(self) -> float:
@@ -169,6 +171,10 @@ class GivenSection:
     GJ : twist stiffness [N m2].
     mass : per length [kg/m].
     rotary_inertia : about the tangent, per length [kg m]; wanted by dynamics with twist only.
+    fibre_distances : of the outermost fibres from the axis, along m1 and m2 [m]. With this and the next two its stress
+        is known, which a strength needs.
+    fibre_modulus : Young's modulus of the outermost fibres [Pa].
+    torsion_modulus : twisting moment over the largest shear stress that it causes [m3]; of rods that are twisted.
     """
 
     EA: float
@@ -177,54 +183,30 @@ class GivenSection:
     GJ: float
     mass: float = 0.0
     rotary_inertia: float = 0.0
+    fibre_distances: tuple[float, float] | None = None
+    fibre_modulus: float | None = None
+    torsion_modulus: float | None = None
 
     def __post_init__(self) -> None:
         for name, unit in (("EA", "N"), ("EI1", "N m2"), ("EI2", "N m2"), ("GJ", "N m2")):
-            _positive(name, getattr(self, name), unit)
+            positive(name, getattr(self, name), unit)
+        for distance in self.fibre_distances or ():
+            positive("fibre distance", distance, "m")
+        for name, unit in (("fibre_modulus", "Pa"), ("torsion_modulus", "m3")):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name), unit)
         for name, unit in (("mass", "kg/m"), ("rotary_inertia", "kg m")):
             if not 0 <= getattr(self, name) < inf:
                 raise InputError(f"{name} must not be negative, but is {getattr(self, name)} {unit}")
 
     def parameters(self) -> dict[str, object]:
         """The section's kind and numbers in SI, as they stand in a case file."""
-        return {"kind": "given", **asdict(self)}
+        known = {name: value for name, value in asdict(self).items() if value is not None}
+        return {"kind": "given", **known}
 
 
 Section = Circle | Tube | Ellipse | RectangularSection
-
-
-@dataclass(frozen=True)
-class Material:
-    """Linear elastic material: `youngs_modulus` [Pa], `density` [kg/m3], and `poisson_ratio` [-].
-
-    In place of Poisson's ratio a shear modulus `shear` [Pa] may be given, as of timber, which is not isotropic.
-    """
-
-    youngs_modulus: float
-    density: float
-    poisson_ratio: float = 0.5
-    shear: float | None = None
-
-    def __post_init__(self) -> None:
-        _positive("Young's modulus", self.youngs_modulus, "Pa")
-        _positive("density", self.density, "kg/m3")
-        if not -1 < self.poisson_ratio <= 0.5:
-            raise InputError(f"Poisson's ratio must lie above -1 and not above 0.5, not {self.poisson_ratio}")
-        if self.shear is not None:
-            _positive("shear modulus", self.shear, "Pa")
-            if self.poisson_ratio != 0.5:
-                raise InputError(f"give Poisson's ratio ({self.poisson_ratio}) or a shear modulus, not both")
-
-    @property
-    def shear_modulus(self) -> float:
-        """As given, or E / 2(1 + nu) [Pa]: E/3 for an incompressible material, as in the paper."""
-        return self.youngs_modulus / (2 * (1 + self.poisson_ratio)) if self.shear is None else self.shear
-
-    def parameters(self) -> dict[str, object]:
-        """The numbers given, in SI, as they stand in a case file."""
-        given: dict[str, object] = asdict(self)
-        del given["poisson_ratio" if self.shear is not None else "shear"]
-        return given
+SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 
 
 @dataclass(frozen=True)
@@ -235,6 +217,9 @@ class Rod:
     material: Material | None = None
 
     def __post_init__(self) -> None:
+        instance("section", self.section, Section | GivenSection, SECTIONS)
+        if self.material is not None:
+            instance("material", self.material, Material)
         if isinstance(self.section, GivenSection):
             if self.material is not None:
                 raise InputError("a given section says all stiffnesses and masses itself: leave the material out")
@@ -296,8 +281,3 @@ class Rod:
         """Section and material in SI, as they stand in a case file."""
         material = {} if self.material is None else {"material": self.material.parameters()}
         return {"section": self.section.parameters(), **material}
-
-
-def _positive(name: str, value: float, unit: str) -> None:
-    if not (isfinite(value) and 0 < value < inf):
-        raise InputError(f"{name} must be positive, not {value} {unit}")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodshell.errors import InputError
-from rodshell.geometry.given import finite
+from rodshell.validation import finite
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

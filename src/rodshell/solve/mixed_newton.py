@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rodshell.rods.elements import Elements
 from rodshell.solve.linear import SingularError
-from rodshell.solve.newton_step import NewtonStep
+from rodshell.solve.newton_step import HopelessError, NewtonStep
 from rodshell.solve.problem import Pattern, Problem
 from rodshell.solve.report import SolveReport, Status
 
@@ -56,6 +56,7 @@ def find_equilibrium(
     *,
     descend: bool = False,
     cut: bool = False,
+    most_modes: int | None = None,
     most_iterations: int = 60,
     progress: Progress | None = None,
 ) -> Equilibrium:
@@ -67,14 +68,18 @@ def find_equilibrium(
     ----------
     descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
     cut : for a start from afar: cut the steps that were too long. Not on a path, which has steps of its own to cut.
+    most_modes : where the start has more negative modes, it is given up at once (BUCKLED); None: never.
     """
     begin = time.perf_counter()
-    step = NewtonStep(problem, state, cut=cut)
+    step = NewtonStep(problem, state, cut=cut, most_modes=most_modes)
     status, steps = Status.STALLED, list[float]()
     while step.iterations + step.counts <= most_iterations:
         new = step.counts
         try:
             moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
+        except HopelessError:
+            status = Status.BUCKLED
+            break
         except SingularError:
             status = Status.DIVERGED
             break
@@ -120,6 +125,7 @@ def find_stable(
     forces: Floats,
     *,
     cut: bool = False,
+    most_modes: int | None = None,
     most_iterations: int = 60,
     progress: Progress | None = None,
 ) -> Equilibrium:
@@ -128,7 +134,9 @@ def find_stable(
     Returns the saddle, with its negative modes counted, where neither side leads to a stable equilibrium.
     The report counts the work of all solves.
     """
-    first = find_equilibrium(problem, state, forces, cut=cut, most_iterations=most_iterations, progress=progress)
+    first = find_equilibrium(
+        problem, state, forces, cut=cut, most_modes=most_modes, most_iterations=most_iterations, progress=progress
+    )
     tries = [first]
     if first.mode is not None:
         for side in (1.0, -1.0):

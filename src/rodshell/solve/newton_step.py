@@ -51,11 +51,15 @@ class _Stride:
     share: float
 
 
+class HopelessError(Exception):
+    """The start of an iteration has too many negative modes for an equilibrium to be near."""
+
+
 class NewtonStep:
     """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
 
-    def __init__(self, problem: Problem, state: Floats, *, cut: bool = False) -> None:
-        self._problem, self._cut = problem, cut
+    def __init__(self, problem: Problem, state: Floats, *, cut: bool = False, most_modes: int | None = None) -> None:
+        self._problem, self._cut, self._most_modes = problem, cut, most_modes
         self.elements = problem.elements
         free = problem.constraint.freedom(state)
         everywhere = np.arange(len(state))[:, None]
@@ -203,6 +207,8 @@ class NewtonStep:
             return self._solver.solve(right)
         self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
         regular = self._count_negative_modes()
+        if self.factorizations == 1 and self._most_modes is not None and self.negative_modes > self._most_modes:
+            raise HopelessError
         if self.negative_modes and regular and not descend:
             step = self._solver.solve(right)
             if self._near(float(np.abs(step).max()) / self._problem.length):

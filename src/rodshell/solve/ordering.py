@@ -1,4 +1,4 @@
-"""Elimination orders: nested dissection by place, which knows that a rodshell's mesh lies in a plane."""
+"""Elimination orders: nested dissection by place, which knows that a gridshell's mesh lies in a plane."""
 
 import numba as nb
 import numpy as np

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodshell.errors import ConvergenceError, InputError
-from rodshell.geometry.given import finite, vector
 from rodshell.geometry.vectors import cross, unit
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.freedom import Freedom
@@ -24,6 +23,7 @@ from rodshell.solve.mixed_newton import NUDGE, Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport, Status
 from rodshell.solve.rod_supports import RodSupports, SupportPath, index_of
+from rodshell.validation import finite, vector
 
 Floats = NDArray[np.float64]
 _NONE: Mapping[int, ArrayLike] = {}

@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
-from rodshell.geometry.given import direction, finite, vector
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.model.elastic_rod import ElasticRod
 from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
 from rodshell.solve.constraint import Supports
+from rodshell.validation import direction, finite, vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

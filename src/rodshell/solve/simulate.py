@@ -43,6 +43,7 @@ def simulate(
     matrix: MakeMatrix = narrow_or_sparse,
     stepper: Stepper | None = None,
     stop: Callable[[Moment], bool] | None = None,
+    interruptible: bool = False,
 ) -> TimeSeries:
     """Move from `state` (N, 3) and `velocity` (N, 3; at rest without) at the time `start` to `until` [s].
 
@@ -60,10 +61,8 @@ def simulate(
     progress : told of every moment that is recorded.
     stepper : takes the steps; `ImplicitEuler` with `matrix` without.
     stop : asked at every moment of the grid of times whether to end there.
-
-    Returns
-    -------
-    The record. After a KeyboardInterrupt too: of what was finished, and `report.end` says so.
+    interruptible : whether a KeyboardInterrupt ends the motion and what was finished is returned, `report.end` saying
+        so; else it is raised, as everywhere.
 
     Raises
     ------
@@ -115,6 +114,8 @@ def simulate(
                 end = End.STOPPED
                 break
     except KeyboardInterrupt:
+        if not interruptible:
+            raise
         end = End.INTERRUPTED
     report = MotionReport(
         end, tally.steps, tally.refused, tally.iterations, tally.factorizations, tally.smallest,

@@ -1,7 +1,7 @@
 """The innermost loops of dense linear algebra, in the processor's own registers.
 
 A tile is some rows by some registers of columns, from which the product of two tall matrices is subtracted without
-leaving the registers (Goto and van de Geijn 2008). BLAS is slow on matrices of ten to fifty rows, which a rodshell's
+leaving the registers (Goto and van de Geijn 2008). BLAS is slow on matrices of ten to fifty rows, which a gridshell's
 factorisation is made of, and loops as short as theirs are hardly vectorised by a compiler. So these few are written in
 LLVM's vector types, which fit whatever processor they are compiled for.
 

@@ -1,14 +1,13 @@
 """Regions of the plan: where a height field is defined, and the wall that stands under a target's rim."""
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import Protocol
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.errors import InputError
+from rodshell.validation import positive
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +36,7 @@ class Disc:
     radius: float
 
     def __post_init__(self) -> None:
-        require_positive("domain radius", self.radius)
+        positive("domain radius", self.radius, "m")
 
     @property
     def half_extent(self) -> tuple[float, float]:
@@ -95,7 +94,7 @@ class Rectangle:
 
     def __post_init__(self) -> None:
         for side in self.size:
-            require_positive("domain size", side)
+            positive("domain size", side, "m")
 
     @property
     def half_extent(self) -> tuple[float, float]:
@@ -131,8 +130,3 @@ def _find_roots(ap, shift, least, t):  # type: ignore[no-untyped-def]
             t[n] = max(t[n] + step, least)
             if abs(step) <= 1e-14 * t[n]:
                 break
-
-
-def require_positive(name: str, value: float) -> None:
-    if not (isfinite(value) and value > 0):
-        raise InputError(f"{name} must be positive, not {value} m")

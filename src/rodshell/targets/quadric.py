@@ -3,15 +3,16 @@
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite, sqrt
+from math import sqrt
 
 import numba as nb
 import numpy as np
 
 from rodshell.errors import InputError
-from rodshell.targets.domain import Disc, Domain, EllipseDomain, require_positive
+from rodshell.targets.domain import Disc, Domain, EllipseDomain
 from rodshell.targets.standing import Standing
 from rodshell.targets.target import Floats, Implicit
+from rodshell.validation import number, positive
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class Hemisphere(_Quadric):
     radius: float
 
     def __post_init__(self) -> None:
-        require_positive("target radius", self.radius)
+        positive("target radius", self.radius, "m")
 
     @property
     def name(self) -> str:
@@ -123,8 +124,9 @@ class Cap(Hemisphere):
     def __init__(self, radius: float, base: float) -> None:
         object.__setattr__(self, "radius", radius)
         object.__setattr__(self, "base_height", base)
-        require_positive("target radius", radius)
-        if not (isfinite(base) and abs(base) < radius):
+        positive("target radius", radius, "m")
+        number("target base", base, "m")
+        if not abs(base) < radius:
             raise InputError(
                 f"the cap's base plane z = {base} m must cut the sphere of radius {radius} m: "
                 f"give a base between {-radius} and {radius} m"
@@ -161,8 +163,8 @@ class Paraboloid(_Quadric):
     def __init__(self, radius: float, height: float) -> None:
         object.__setattr__(self, "radius", radius)
         object.__setattr__(self, "peak", height)
-        require_positive("target radius", radius)
-        require_positive("target height", height)
+        positive("target radius", radius, "m")
+        positive("target height", height, "m")
 
     @property
     def name(self) -> str:
@@ -203,7 +205,7 @@ class Ellipsoid(_Quadric):
 
     def __post_init__(self) -> None:
         for axis in "abc":
-            require_positive(f"target {axis}", getattr(self, axis))
+            positive(f"target {axis}", getattr(self, axis), "m")
 
     @property
     def name(self) -> str:

@@ -5,7 +5,7 @@ from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.bracing import bracing_drawing
 from rodshell.output.drawings.final import elevations_drawing, erection_drawing
 from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, room, table, tiled
+from rodshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, parts, room, table, tiled
 from rodshell.output.drawings.strips import per_sheet, strips_drawing
 from rodshell.output.drawings.supports import supports_drawing
 from rodshell.output.drawings.titleblock import title_block, with_title
@@ -27,21 +27,23 @@ def drawing_set(archive: Archive, plan: FlatPlan) -> dict[str, Drawing]:
 def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[float, float]]:
     """All sheets in mm of paper, and the paper's size."""
     paper = PAPERS[(archive.result.get("drawings") or {}).get("paper", "A3")]
-    sheets = [fitted(lambda text: flat_drawing(plan, text), paper)]
-    sheets += tiled(lambda text: flat_drawing(plan, text), paper)
+    flat = fitted(lambda text: flat_drawing(plan, text), paper)
+    true_size = list(tiled(lambda text: flat_drawing(plan, text), paper))
+    sheets = [flat, *(true_size or parts(lambda text: flat_drawing(plan, text), paper, flat))]
     sheets += _strips(plan, paper)
     for name, make in _of_the_shell(archive, plan).items():
-        sheets.append(fitted(make, paper))
+        whole = fitted(make, paper)
+        sheets += [whole, *parts(make, paper, whole)]
         if name == "supports":
-            sheets += table("Supports", *supports_table(archive, brief=True), paper)
+            sheets += table("Supports", supports_table(archive, brief=True), paper)
         elif name == "bracing":
-            sheets += table("Bracing", *bracing_table(archive), paper)
-    sheets += table("Rods", *rods_table(archive, brief=True), paper)
-    sheets += table("Joints", *joints_table(archive, brief=True), paper)
+            sheets += table("Bracing", bracing_table(archive), paper)
+    sheets += table("Rods", rods_table(archive, brief=True), paper)
+    sheets += table("Joints", joints_table(archive, brief=True), paper)
     if archive.result.get("seams"):
-        sheets += table("Seams", *seams_table(archive), paper)
+        sheets += table("Seams", seams_table(archive), paper)
     if (archive.result.get("fabrication") or {}).get("stock"):
-        sheets += table("Stock", *stock_table(archive), paper)
+        sheets += table("Stock", stock_table(archive), paper)
     return bound(sheets, title_block(archive, plan.summary), paper), paper
 
 

@@ -4,15 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.output.archive import Archive
-from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Pen, Pencil, Text
+from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Drawing, Pen, Pencil, Text
 from rodshell.output.drawings.final import axes, seen_from_above
 from rodshell.output.labels import Room, runs_through, upright
 from rodshell.output.rods import joint_places
+from rodshell.output.rounding import rounding_of
 
 Floats = NDArray[np.float64]
 
 ENDS = ("from", "to")
-NUMBERS = (0.75, 0.65, 0.55, 0.47, 0.4, 0.33)  # sizes of a number that are tried, in text sizes
+NUMBERS = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
 CLEAR = 0.2  # of its size, between a number and the middle of its cell
 SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, and its baseline off it in its sizes
 
@@ -34,7 +35,10 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     for brace, line in zip(braces, ends, strict=True):
         pencil.line(line, "DIM", pen=Pen("#b08a2e", 0.07 * text), note=f"{brace['from']} to {brace['to']}")
     other = ends.reshape(-1, 2, 2, 2)[:, ::-1].reshape(-1, 2, 2)
-    pencil.texts += _numbers([f"{1e3 * brace['final']:.1f}" for brace in braces], ends, other, text)
+    mm = rounding_of(archive.result).mm
+    found = _numbers([mm(brace["final"]) for brace in braces], ends, other, text)
+    pencil.texts += found
+    pencil.leave_out(len(braces) - len(found), len(braces), "lengths of diagonals (table Bracing)")
     axes(pencil, text)
     return pencil.done("bracing", "Bracing, true lengths in the final shape", text)
 

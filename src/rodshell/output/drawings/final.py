@@ -7,6 +7,7 @@ from rodshell.output.archive import Archive
 from rodshell.output.drawing import INK, PALE, SOFT, Drawing, Pen, Pencil
 from rodshell.output.plan import nice_ticks
 from rodshell.output.rods import rods_of
+from rodshell.output.rounding import Rounding, rounding_of
 
 Floats = NDArray[np.float64]
 
@@ -22,17 +23,16 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
     assert final is not None
     curves = rod_curves(archive, archive.states[final])
     heights = np.concatenate(curves)[:, 2]
-    tall, digits = float(np.ptp(heights)) + 10 * text, decimals(float(np.ptp(np.concatenate(curves), axis=0).max()))
+    tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.result)
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
         flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
         for curve in flat:
             pencil.line(thinned(curve), "CUT", pen=Pen(INK, 0.08 * text))
         cloud = np.concatenate(flat)
         low, high = cloud.min(axis=0), cloud.max(axis=0)
-        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, digits)
-        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, digits)
+        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
+        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, rounding)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
-        words = f"{words}, dimensions to {10.0**-digits:g} mm"
         pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
     return pencil.done("elevations", "Elevations", text)
 
@@ -40,7 +40,7 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
 def erection_drawing(archive: Archive, text: float) -> Drawing:
     """Ways of the rod ends from flat to their supports, seen from above, and the shell's side at each stage."""
     pencil, history = Pencil(), archive.states["history"]
-    stages = archive.result["deployment"]["stages"]
+    stages, mm = archive.result["deployment"]["stages"], rounding_of(archive.result).mm
     ends = np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive) if len(rod.nodes) > 1])
     ways = 1e3 * history[:, ends, :2]
     for way in ways.transpose(1, 0, 2):
@@ -61,15 +61,10 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
         shift = np.array([left - low[0], top - tall - cloud[:, 1].min()])
         for curve in curves:
             pencil.line(thinned(curve) + shift, "CUT", pen=Pen(INK, 0.04 * text))
-        words = f"{k}: ends {100 * stage['share']:.0f} % of the way, {1e3 * stage['height']:.1f} mm high"
+        words = f"{k}: ends {100 * stage['share']:.0f} % of the way, {mm(stage['height'])} mm high"
         pencil.write(words, (left, top - tall - 1.8 * text), text, "LABEL")
         top -= tall + 5 * text
     return pencil.done("erection", "Erection stages, front elevations", text)
-
-
-def decimals(largest: float) -> int:
-    """Of dimensions [mm], the largest of which is shown to about a ten-thousandth of it, whole mm at the coarsest."""
-    return max(round(4 - float(np.log10(max(largest, 1e-9)))), 0)
 
 
 def thinned(curve: Floats) -> Floats:
@@ -85,7 +80,7 @@ def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
 
 
 def _span(
-    pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, digits: int
+    pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, rounding: Rounding
 ) -> None:
     """A dimension line with its length [mm] beside it."""
     start, end = np.array(a), np.array(b)
@@ -96,7 +91,7 @@ def _span(
         pencil.line([place_ - across, place_ + across], "DIM")
     angle = float(np.arctan2(along[1], along[0]))
     side = 0.5 * text * np.array([-along[1], along[0]]) if angle else np.array([0.0, -1.4 * text])
-    pencil.write(f"{length:.{digits}f}", 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
+    pencil.write(rounding.mm(1e-3 * length), 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
 
 
 def axes(pencil: Pencil, text: float) -> None:

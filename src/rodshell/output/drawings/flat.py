@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rodshell.layout.outline import opens
 from rodshell.output.callouts import callouts, outward
-from rodshell.output.drawing import INK, LETTER, LINE, Drawing, Pen, Pencil
+from rodshell.output.drawing import INK, LETTER, LINE, SMALL, Drawing, Pen, Pencil
 from rodshell.output.labels import Label, Room, closed_segments, lines_meet, place, take
 from rodshell.output.plan import FlatPlan, nice_ticks
 from rodshell.output.rods import outlines_of
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
 TITLE = "Flat plan"
 ROD = 0.18  # width of a rod's line, in text sizes
-LARGEST, SMALLEST = 0.6, 0.5  # of a joint's id, in text sizes: 1.2 and 1 mm on a sheet
+LARGEST = 0.85  # size of a joint's id at most, in text sizes
 GAP = 0.06  # from an id to a rod, in text sizes
 CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
@@ -45,7 +45,7 @@ def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     """Each rod as cut; a dot at the end from which its joints are measured, a tick where it is held."""
     for rod, cut, line in zip(plan.rods, plan.cuts, plan.lines, strict=True):
         pen = Pen(FAMILY.get(rod.family, INK), ROD * text)
-        pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {1e3 * rod.cut_length:.3f} mm")
+        pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {plan.rounding.mm(rod.cut_length)} mm")
         pencil.mark(line[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))
         if rod.allowance > 0:
             along = line[1] - line[0]
@@ -62,19 +62,22 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
     """
     radius = min(0.25 * text, 0.04 * plan.spacing, 1.0)
     clear = max(radius, 0.5 * ROD * text) + GAP * text
-    room, both = Room(plan.spacing), np.concatenate([lines, across])
+    room, both, left_out = Room(plan.spacing), np.concatenate([lines, across]), 0
     for written in pencil.texts:
         room.take(written.box())
     for joint, mark in zip(plan.joints, plan.marks, strict=True):
-        a, b = (f"{plan.rods[k].id} at {1e3 * at:.2f} mm" for k, at in zip(joint.rods, joint.at, strict=True))
+        a, b = (f"{plan.rods[k].id} at {plan.rounding.mm(at)} mm" for k, at in zip(joint.rods, joint.at, strict=True))
         pencil.mark(mark, radius, "MARK", note=f"{joint.id}: {a}, {b}")
         size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
-        for clear_of, corner in product((both, lines), CORNERS if size >= SMALLEST * text else ()):
+        for clear_of, corner in product((both, lines), CORNERS if size >= SMALL * text else ()):
             off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
             label = Label(joint.id, mark + off * corner, 0.0, mark, moved=False)
             if not lines_meet(label.box(size), clear_of) and room.claim(label.box(size)):
                 pencil.texts.append(label.written(size))
                 break
+        else:
+            left_out += 1
+    pencil.leave_out(left_out, len(plan.joints), "joint ids (named by the rods that cross)")
 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
@@ -84,6 +87,7 @@ def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
     outside = np.ones(2 * len(names), dtype=bool)
     outside[[end for loop in inside for end in loop]] = False
     labels, room = place(names, plan.cuts, text, at=outside.reshape(-1, 2)), Room(4 * text)
+    named = {label.text for label in labels}
     for label in labels:
         pencil.texts.append(label.written(text))
         take(label, text, room)
@@ -93,8 +97,10 @@ def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
         places = plan.cuts.reshape(-1, 2)[loop]
         away = outward(places)
         for callout in callouts([names[end // 2] for end in loop], places, away, text, room, lines):
+            named.add(callout.written.text)
             pencil.texts.append(callout.written)
             pencil.line(callout.line, "DIM")
+    pencil.leave_out(len(set(names) - named), len(names), "names of rods")
 
 
 def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
@@ -150,12 +156,12 @@ def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float
     """A thin line with its length, written off the labels, a third of the way along if it can be."""
     along = b - a
     pencil.line([a, b], "DIM", pen=Pen("#b08a2e", 0.05 * text, (1.5 * text, 0.5 * text, 0.3 * text, 0.5 * text)))
-    words, angle = f"{np.linalg.norm(along):.1f}", float(np.arctan2(along[1], along[0]))
+    words, angle = plan.rounding.mm(1e-3 * float(np.linalg.norm(along))), float(np.arctan2(along[1], along[0]))
     room = Room(plan.spacing)
     for other in pencil.texts:
         room.take(other.box())
     shares = sorted(np.linspace(0.1, 0.9, 81).tolist(), key=lambda share: abs(share - 0.33))
-    for size, share in ((size, share) for size in (0.7 * text, 0.5 * text) for share in shares):
+    for size, share in ((size, share) for size in (text, SMALL * text) for share in shares):
         pencil.write(words, a + share * along, size, "DIM", anchor="middle", angle=angle, colour="#8a6a1c")
         if room.free(pencil.texts[-1].box()):
             return

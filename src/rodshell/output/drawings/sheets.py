@@ -3,20 +3,24 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.output.drawing import INK, LETTER, SOFT, Drawing, Pen, Pencil, Text
-from rodshell.output.drawings.titleblock import TitleBlock, scale_bar
+from rodshell.output.drawing import INK, LETTER, SMALL, SOFT, Drawing, Pen, Pencil, Text
+from rodshell.output.drawings.titleblock import TitleBlock, scale_bar, shortened, write_entries
 from rodshell.output.labels import Room
+from rodshell.output.schedules import Table, head
 
 Floats = NDArray[np.float64]
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
-TEXT = 2.0  # mm of paper
-MARGIN, BLOCK = 10.0, 20.0  # around the frame; height of the title block
+TEXT = 3.5  # mm of paper: capitals are 2.5 mm high, the nominal size of ISO 3098 that is usual on A3
+FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the least on a sheet
+MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
+LEADING = 1.9 * FINE  # from line to line of a table
 OVERLAP = 10.0  # mm of paper that a sheet shows beyond its match lines
 MOST_TILES = 12  # sheets that a true-size plan may take
 
@@ -48,12 +52,34 @@ def fitted(compose: Compose, paper: tuple[float, float]) -> Sheet:
     return Sheet(drawing.title, drawing.placed(1 / scale, shift), scale)
 
 
-def tiled(compose: Compose, paper: tuple[float, float]) -> Iterator[Sheet]:
-    """A drawing at true size over as many sheets as it takes, with match lines; nothing where those are too many."""
+def parts(compose: Compose, paper: tuple[float, float], whole: Sheet) -> Iterator[Sheet]:
+    """What a drawing's one sheet leaves out, on several: at the smallest scale that shows all, or the largest there is.
+
+    whole : its one sheet. Nothing is yielded where that leaves nothing out.
+    """
+    if not whole.content.left_out:
+        return
+    best: list[Sheet] = []
+    for scale in (one for one in reversed(SCALES) if one < whole.scale):
+        sheets = list(tiled(compose, paper, scale))
+        if not sheets and best:
+            break
+        best = sheets
+        if sheets and not sheets[0].content.left_out:
+            break
+    yield from best
+
+
+def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
+    """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where those are too many."""
     low, high = room(paper)
-    drawing = compose(1.5 * TEXT)
-    bottom, top = drawing.box()
     size = high - low - 2 * OVERLAP
+    least = np.ceil(np.subtract(*compose(0.01).box()[::-1]) / scale / size).astype(int)
+    if np.maximum(least, 1).prod() > MOST_TILES:
+        return
+    whole = compose(TEXT * scale)
+    drawing = whole.placed(1 / scale, np.zeros(2))
+    bottom, top = drawing.box()
     count = np.maximum(np.ceil((top - bottom) / size).astype(int), 1)
     if not 1 < count.prod() <= MOST_TILES:
         return
@@ -65,30 +91,36 @@ def tiled(compose: Compose, paper: tuple[float, float]) -> Iterator[Sheet]:
             part = drawing.clipped(low - shift, high - shift).placed(1.0, shift)
             lines = _match_lines(low + OVERLAP, high - OVERLAP, (row, column), count, part.texts)
             yield Sheet(
-                f"{drawing.title} 1:1, part {_part(row, column)} of {_part(*(count[::-1] - 1))}", part + lines, 1
+                f"{drawing.title} 1:{scale:g}, part {_part(row, column)} of {_part(*(count[::-1] - 1))}",
+                part + lines,
+                scale,
             )
 
 
-def table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], paper: tuple[float, float]
-) -> Iterator[Sheet]:
+def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
     """A table over as many sheets as it takes, in as many columns side by side as fit."""
-    low, high = room(paper)
-    widths = [max(map(len, cells)) for cells in zip(columns, *rows, strict=True)]
-    steps = TEXT * (LETTER * np.array(widths) + 1.2)
-    width = float(steps.sum()) + 2 * TEXT
-    beside = max(int((high[0] - low[0] + 2 * TEXT) // width), 1)
-    line = 1.9 * TEXT
-    tall = int((high[1] - low[1]) // line) - 2
+    (columns, rows), (low, high) = content, room(paper)
+    cells = [max((len(row[k]) for row in rows), default=0) for k in range(len(columns))]
+    heads = [_wrapped(*head(column), width) for column, width in zip(columns, cells, strict=True)]
+    widths = [max(width, *map(len, words)) for width, words in zip(cells, heads, strict=True)]
+    steps = FINE * (LETTER * np.array(widths) + 1.2)
+    width = float(steps.sum()) + 2 * FINE
+    beside = max(int((high[0] - low[0] + 2 * FINE) // width), 1)
+    tall = int((high[1] - low[1]) // LEADING) - max(map(len, heads)) - 1
     per_sheet = tall * beside
     pages = max(ceil(len(rows) / per_sheet), 1)
     for page in range(pages):
         pencil = Pencil()
         mine = rows[page * per_sheet : (page + 1) * per_sheet]
         for block in range(ceil(len(mine) / tall) or 1):
-            _block(pencil, columns, mine[block * tall : (block + 1) * tall], low[0] + block * width, high[1], steps)
+            _block(pencil, heads, mine[block * tall : (block + 1) * tall], low[0] + block * width, high[1], steps)
         many = f", {page + 1} of {pages}" if pages > 1 else ""
         yield Sheet(title + many, pencil.done("table", title, TEXT), 0)
+
+
+def _wrapped(words: str, unit: str, width: int) -> list[str]:
+    """A head in lines of about the width of its column's cells [letters], its unit in the last."""
+    return wrap(words, max(width, 8), break_long_words=False) + ([f"[{unit}]"] if unit else [])
 
 
 def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: tuple[float, float]) -> list[Drawing]:
@@ -103,17 +135,25 @@ def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: tuple[float, float]
 
 
 def _block(
-    pencil: Pencil, columns: Sequence[str], rows: Sequence[Sequence[str]], left: float, top: float, steps: Floats
-) -> None:
-    line = 1.9 * TEXT
-    edges = left + np.append(0.0, np.cumsum(steps))
-    for k, cells in enumerate((columns, *rows)):
-        y = top - (k + 1) * line
+    pencil: Pencil, heads: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: float, top: float,
+    steps: Floats,
+) -> None:  # fmt: skip
+    """Heads over a line, their last lines level, and the rows."""
+    edges, deep = left + np.append(0.0, np.cumsum(steps)), max(map(len, heads))
+    numeric = [all(_number(row[k]) or not row[k] for row in rows) for k in range(len(heads))]
+    lines = zip(*([""] * (deep - len(words)) + list(words) for words in heads), strict=True)
+    for k, cells in enumerate((*lines, *rows), start=1):
+        y = top - k * LEADING
         for j, cell in enumerate(cells):
-            number = k > 0 and cell[-1:].isdigit() and cell[:1] in "-.0123456789"
-            x, anchor = (edges[j + 1] - 1.2 * TEXT, "end") if number else (edges[j], "start")
-            pencil.write(cell, (x, y), TEXT, "LABEL", anchor=anchor, bold=k == 0)
-        pencil.line([(left, y - 0.5 * TEXT), (edges[-1] - TEXT, y - 0.5 * TEXT)], "DIM")
+            x, anchor = (edges[j + 1] - 1.2 * FINE, "end") if numeric[j] else (edges[j], "start")
+            if cell:
+                pencil.write(cell, (x, y), FINE, "LABEL", anchor=anchor, bold=k <= deep)
+        if k >= deep:
+            pencil.line([(left, y - 0.5 * FINE), (edges[-1] - FINE, y - 0.5 * FINE)], "DIM")
+
+
+def _number(cell: str) -> bool:
+    return cell[-1:].isdigit() and cell[:1] in "-.0123456789"
 
 
 def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tuple[float, float]) -> Drawing:
@@ -125,15 +165,17 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     )  # fmt: skip
     top = MARGIN + BLOCK
     pencil.line([(MARGIN, top), (width - MARGIN, top)], "TITLE", pen=Pen(INK, 0.35))
-    right = width - MARGIN - 4
-    left, y = MARGIN + 4, top - 6.5
-    pencil.write(f"{block.name}: {sheet.title}", (left, y), 4.0, "TITLE", bold=True)
-    for k, line in enumerate(block.lines, start=1):
-        pencil.write(line, (left, y - 3.9 * k), 2.2, "TITLE", colour=INK if k == 1 else SOFT)
-    pencil.write(f"Sheet {number} of {count}", (right, y), 3.0, "TITLE", anchor="end")
+    left, right, y = MARGIN + 4, width - MARGIN - 4, top - 7.0
+    title = shortened(f"{block.name}: {sheet.title}", right - left - 80, 5.0, bold=True)
+    pencil.write(title, (left, y), 5.0, "TITLE", bold=True)
+    pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
+    y = write_entries(pencil, block, left, y - 6.2, right - left, FINE, 1.7 * FINE)
+    for k, line in enumerate(block.notes(sheet.content)):
+        written = shortened(line, right - left - 75, FINE)
+        pencil.write(written, (left, y - 0.4 - 1.7 * FINE * k), FINE, "TITLE", colour=SOFT if k == 0 else "#b3372c")
     if sheet.scale:
-        pencil.write(f"Scale 1:{sheet.scale:g}", (right - 38, y), 3.0, "TITLE", anchor="end")
-        scale_bar(pencil, right, MARGIN + 5.2, 60.0, 2.2, sheet.scale)
+        pencil.write(f"Scale 1:{sheet.scale:g}", (right - 38, top - 7.0), TEXT, "TITLE", anchor="end")
+        scale_bar(pencil, right, MARGIN + 5.2, 60.0, TEXT, sheet.scale)
     return pencil.done("", "", TEXT)
 
 

@@ -8,6 +8,7 @@ from rodshell.output.drawing import INK, PAPER, Drawing, Pen, Pencil
 from rodshell.output.labels import spread
 from rodshell.output.plan import FlatPlan
 from rodshell.output.rods import RodRecord
+from rodshell.output.schedules import Show
 
 TITLE = "Rod strips, distances from the datum end in mm"
 LEGEND = "Datum: left end. Full mark: the other rod lies over this one. S: splice. Open triangle: support."
@@ -20,7 +21,7 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[RodRecord] | None
     layer = {rod.id: rod.layer for rod in plan.rods}
     chosen = plan.rods if rods is None else rods
     for k, rod in enumerate(chosen):
-        _strip(pencil, rod, -k * TALL * text, text, layer)
+        _strip(pencil, rod, -k * TALL * text, text, layer, plan.rounding.mm)
     pencil.write(LEGEND, (0.0, -len(chosen) * TALL * text + 5 * text), text, "DIM")
     return pencil.done("strips", TITLE, text)
 
@@ -30,13 +31,13 @@ def per_sheet(height: float, text: float) -> int:
     return max(int((height / text - 3) // TALL), 1)
 
 
-def _strip(pencil: Pencil, rod: RodRecord, y: float, text: float, layer: dict[str, int | None]) -> None:
+def _strip(pencil: Pencil, rod: RodRecord, y: float, text: float, layer: dict[str, int | None], mm: Show) -> None:
     """One rod: above it the distances, below it the rods that are met."""
     cut, start = 1e3 * rod.cut_length, 1e3 * rod.allowance
-    pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=f"{rod.id}: {cut:.3f} mm")
-    words = [rod.id, f"cut {cut:.2f}", f"layer {rod.layer}" if rod.layer is not None else ""]
+    pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=f"{rod.id}: {mm(rod.cut_length)} mm")
+    words = [rod.id, f"cut {mm(rod.cut_length)}", f"layer {rod.layer}" if rod.layer is not None else ""]
     if start > 0:
-        words.append(f"with {start:.2f} at each end for the supports")
+        words.append(f"with {mm(rod.allowance)} at each end for the supports")
     pencil.write("   ".join(filter(None, words)), (0.0, y + 7.2 * text), 1.1 * text, "LABEL", bold=True)
     stops = [(0.0, "", ""), *((start + 1e3 * at, other, "joint") for other, at in rod.joints), (cut, "", "")]
     stops += [(start + 1e3 * at, "S", "splice") for at in rod.more.get("splices") or ()]
@@ -45,12 +46,12 @@ def _strip(pencil: Pencil, rod: RodRecord, y: float, text: float, layer: dict[st
     stops.sort(key=lambda stop: stop[0])
     places = spread([at for at, _, _ in stops], 1.15 * text)
     for (at, name, kind), x in zip(stops, places, strict=True):
-        _stop(pencil, rod, at, float(x), y, text, name, kind, layer)
+        _stop(pencil, rod, at, float(x), y, text, name, kind, layer, mm)
 
 
 def _stop(
     pencil: Pencil, rod: RodRecord, at: float, x: float, y: float, text: float, name: str, kind: str,
-    layer: dict[str, int | None],
+    layer: dict[str, int | None], mm: Show,
 ) -> None:  # fmt: skip
     """A mark at `at`, its texts at `x`."""
     shift = 0.35 * text
@@ -58,7 +59,7 @@ def _stop(
         if side > 0 or name:
             way = [(at, y + 0.4 * side * text), (at, y + 0.7 * side * text), (x, y + 0.85 * far * text)]
             pencil.line(way if abs(x - at) > 1e-6 else way[::2], "DIM")
-    pencil.write(f"{at:.2f}", (x + shift, y + 2.0 * text), text, "LABEL", angle=np.pi / 2)
+    pencil.write(mm(1e-3 * at), (x + shift, y + 2.0 * text), text, "LABEL", angle=np.pi / 2)
     if name:
         pencil.write(name, (x + shift, y - 1.6 * text), text, "LABEL", anchor="end", angle=np.pi / 2)
     if kind == "joint":

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rodshell.output.archive import Archive
 from rodshell.output.callouts import callouts, outward
-from rodshell.output.drawing import LAYERS, Drawing, Pen, Pencil
+from rodshell.output.drawing import LAYERS, SMALL, Drawing, Pen, Pencil
 from rodshell.output.drawings.final import axes, rod_curves, seen_from_above, thinned
 from rodshell.output.labels import Room, closed_segments
 from rodshell.output.plan import FlatPlan
@@ -44,7 +44,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     alone = ~np.isin(names, list(_sewn(archive)))
     for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
         pencil.line(ends[seam], "BOUNDARY-FINAL")
-    walks = list(_walks(outlines_of(drawn), ends, alone))
+    walks, left_out = list(_walks(outlines_of(drawn), ends, alone)), 0
     for walk in walks:
         if len(walk) > 1:
             pencil.line(ends[walk], "BOUNDARY-FINAL", closed=True)
@@ -52,9 +52,12 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     for walk in walks:
         away = outward(ends[walk])
         away = np.where(np.any(away, axis=1, keepdims=True), away, arrives[walk])
-        for callout in callouts([names[end] for end in walk], ends[walk], away, text, room, lines):
+        found = callouts([names[end] for end in walk], ends[walk], away, text, room, lines)
+        left_out += len(walk) - len(found)
+        for callout in found:
             pencil.texts.append(callout.written)
             pencil.line(callout.line, "DIM")
+    pencil.leave_out(left_out, int(alone.sum()), "names of rod ends (table Supports has their places)")
     _meetings(pencil, archive, text, room)
     axes(pencil, text)
     low, _ = pencil.done("", "", text).box()
@@ -102,7 +105,7 @@ def _segments(curve: Floats) -> Floats:
 
 def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None:
     """The numbers of the places on seams where rods meet, as in the table of the seams, where there is room."""
-    size = 0.7 * text
+    size, left_out = SMALL * text, 0
     for number, meeting in seam_meetings(archive.result):
         at = 1e3 * np.array(meeting["point"][:2])
         for corner in ((0.5, 0.4), (-0.5, 0.4), (0.5, -1.1), (-0.5, -1.1)):
@@ -111,3 +114,6 @@ def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None
             if room.claim(pencil.texts[-1].box()):
                 break
             pencil.texts.pop()
+        else:
+            left_out += 1
+    pencil.leave_out(left_out, sum(1 for _ in seam_meetings(archive.result)), "numbers of meetings (table Seams)")

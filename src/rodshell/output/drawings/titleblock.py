@@ -1,13 +1,23 @@
-"""The title block: what a drawing is, of which input, to which tolerance, and what it is not."""
+"""The title block: what a drawing is, of which rods, by whom, when, to which tolerance, and what it is not."""
 
-import hashlib
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from typing import Any
 
 import numpy as np
 
 from rodshell.output.archive import Archive, json_text, printable
 from rodshell.output.drawing import INK, PAPER, Drawing, Pen, Pencil
+from rodshell.output.inputs import input_hash
+from rodshell.output.pdf import text_width
 from rodshell.output.plan import NOTE, nice_step
+from rodshell.output.rounding import rounding_of
+from rodshell.output.wording import case_rows, rounded, stress
+
+NOT_GIVEN = "not given"
+COLUMNS = 4  # of entries, side by side
 
 
 @dataclass(frozen=True)
@@ -16,43 +26,74 @@ class TitleBlock:
 
     Parameters
     ----------
+    entries : what it is called and what it is: project, author, date, section, material, ...
     summary : the cut list in one line.
-    input_hash : of the resolved case; the same input gives the same, in whatever units it was written.
     """
 
     name: str
+    entries: tuple[tuple[str, str], ...]
     summary: str
-    project: str
-    revision: str
-    tolerance: str
-    input_hash: str
-    version: str
 
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """What it says, most important first."""
-        project = f"{self.project}. " if self.project else ""
-        return (
-            f"{project}Revision {self.revision}. Tolerance {self.tolerance}. Units mm.",
-            f"{self.summary}. {NOTE}.",
-            f"Input {self.input_hash}, rodshell {self.version}",
-        )
+    def notes(self, drawing: Drawing) -> list[str]:
+        """What stands below the entries of a drawing; what it leaves out is said last."""
+        left_out = f"Left out for want of room: {'; '.join(drawing.left_out)}." if drawing.left_out else ""
+        return [f"{self.summary}. {NOTE}.", *filter(None, [left_out])]
 
 
 def title_block(archive: Archive, summary: str) -> TitleBlock:
     """The title block of an archive."""
-    given = archive.result.get("drawings") or {}
-    source = archive.case_toml or json_text({key: archive.result.get(key) for key in ("rods", "boundary")})
+    result = archive.result
+    given: Mapping[str, Any] = result.get("drawings") or {}
+    rod = result.get("rod") or {}
+    source = archive.case_toml or json_text({key: result.get(key) for key in ("rods", "boundary")})
     tolerance = given.get("tolerance")
-    return TitleBlock(
-        archive.name,
-        summary,
-        printable(str(given.get("project") or "")),
-        printable(str(given.get("revision") or "-")),
-        "not given" if tolerance is None else f"{1e3 * tolerance:g} mm",
-        hashlib.sha256(source.encode()).hexdigest()[:12],
-        printable(str(archive.result.get("version_rodshell") or "unknown")),
+    entries = (
+        ("Project", given.get("project") or NOT_GIVEN),
+        ("Drawn by", given.get("author") or NOT_GIVEN),
+        ("Date", given.get("date") or today().isoformat()),
+        ("Revision", given.get("revision") or "-"),
+        ("Section", _section(rod.get("section")) or NOT_GIVEN),
+        ("Material", _material(rod.get("material")) or NOT_GIVEN),
+        ("Joints", _joint(result.get("joint"))),
+        ("Rods", f"{len(result.get('rods') or [])}"),
+        ("Units", f"mm, shown to {rounding_of(result).words}"),
+        ("Tolerance", NOT_GIVEN if tolerance is None else f"{1e3 * tolerance:g} mm"),
+        ("Input", input_hash(source, archive.inputs)),
+        ("Made by", f"rodshell {result.get('version_rodshell') or '(version unknown)'}"),
     )
+    name = printable(str(given.get("name") or archive.name))
+    return TitleBlock(name, tuple((label, printable(str(value))) for label, value in entries), summary)
+
+
+def today() -> date:
+    """The date of writing in UTC; that of SOURCE_DATE_EPOCH, seconds since 1970, where it is set."""
+    try:
+        return datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), UTC).date()
+    except (KeyError, ValueError, OverflowError, OSError):
+        return datetime.now(UTC).date()
+
+
+def _section(section: object) -> str:
+    """ "circle, radius 1 mm"."""
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in case_rows(section))
+
+
+def _material(material: object) -> str:
+    """ "larch, E 11 GPa, 470 kg/m3": its name where it has one."""
+    if not isinstance(material, dict):
+        return ""
+    words = [str(material[key]) for key in ("preset", "name") if material.get(key)][:1]
+    if (modulus := material.get("youngs_modulus")) is not None:
+        words.append(f"E {stress(modulus)}")
+    if (density := material.get("density")) is not None:
+        words.append(f"{rounded(density, 4)} kg/m\N{SUPERSCRIPT THREE}")
+    return ", ".join(words)
+
+
+def _joint(joint: object) -> str:
+    """ "pin, eccentricity 42 mm"; without a word about them, joints are balls, free to turn."""
+    rows = case_rows(joint)
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in rows) or "ball"
 
 
 def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
@@ -62,11 +103,36 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     y = bottom - 2.6 * size
     pencil.line([(left, y + 1.6 * size), (right, y + 1.6 * size)], "TITLE")
     pencil.write(f"{block.name}: {drawing.title.lower()}, 1:1", (left, y), 1.4 * size, "TITLE", bold=True)
-    for k, line in enumerate(block.lines, start=1):
+    rows = [block.entries[k : k + COLUMNS] for k in range(0, len(block.entries), COLUMNS)]
+    lines = ["   ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(drawing)
+    for k, line in enumerate(lines, start=1):
         pencil.write(line, (left, y - 1.5 * k * size), size, "TITLE")
-    longest = max(len(line) for line in block.lines)
-    scale_bar(pencil, left + max(right - left, 0.7 * size * longest), y - 6.5 * size, 0.25 * (right - left), size, 1.0)
+    end = left + max(right - left, 0.25 * (right - left) + 4 * size)
+    scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
     return drawing + pencil.done("", "", size)
+
+
+def write_entries(
+    pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
+) -> float:
+    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line."""
+    step = width / COLUMNS
+    for k, (label, value) in enumerate(block.entries):
+        x, down = left + step * (k % COLUMNS), y - line * (k // COLUMNS)
+        pencil.write(label, (x, down), size, "TITLE", colour="#6c757d")
+        start = 8.5 * 0.62 * size
+        pencil.write(shortened(value, step - start - 2.0, size), (x + start, down), size, "TITLE")
+    return y - line * len(range(0, len(block.entries), COLUMNS))
+
+
+def shortened(text: str, width: float, size: float, *, bold: bool = False) -> str:
+    """A text that takes at most a width [mm] in a size; what is cut off is shown by dots."""
+    size *= 1.08 if bold else 1.0  # bold letters are some 6 % wider
+    if text_width(text) * size <= width:
+        return text
+    while text and text_width(text + "\N{HORIZONTAL ELLIPSIS}") * size > width:
+        text = text[:-1]
+    return text.rstrip() + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:

@@ -47,9 +47,10 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
             result.Add(x, y, z)
         return result
 
+    mm = plan.rounding.mm
     for rod, cut in zip(plan.rods, plan.cuts, strict=True):
-        figures = {"length_mm": f"{1e3 * rod.length:.3f}", "cut_length_mm": f"{1e3 * rod.cut_length:.3f}"}
-        figures |= {"layer": str(rod.layer), "joints": " ".join(f"{other}:{1e3 * at:.3f}" for other, at in rod.joints)}
+        figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}
+        figures |= {"layer": str(rod.layer), "joints": " ".join(f"{other}:{mm(at)}" for other, at in rod.joints)}
         (x0, y0), (x1, y1) = cut.tolist()
         model.Objects.AddLine(r.Point3d(x0, y0, 0.0), r.Point3d(x1, y1, 0.0), about("CUT", rod.id, figures))
         if archive.final and len(rod.nodes) > 1:

@@ -1,0 +1,268 @@
+"""Contact: rods that touch or run into each other where they should not, and how near the others come.
+
+Each edge of a rod is a prism of the rod's section. Pairs of edges that can be near are found by a tree over the edges'
+middles. Two prisms are apart by the widest gap between them, seen along any of a few directions: from one axis to the
+other where these are nearest, along both axes and across both, and along the sides of both sections. A gap along any
+direction keeps them apart, so that no contact is missed; it is the distance of round rods that run side by side, and
+otherwise a lower bound of it.
+
+Rods whose lines cross in the flat grid meet there by design, at a joint, or over one another next to a rod's end.
+About such a place nothing is checked as far along both rods as two straight rods of their breadths overlap,
+(w_u + w_v) / (2 sin angle). A rod can touch itself only farther along its line than half around its section.
+Sections that are not round stand as the rods' material frames say, and without these upright on the shell.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
+from rodshell.geometry.frames import adapted
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.layout import FlatGrid, GridMesh
+from rodshell.layout.flatgrid import Crossings
+from rodshell.model import Shell
+from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+FLATTEST = 0.1  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
+SLACK = 0.05  # of the rods' breadth: crossing rods that bend together overlap for longer than straight ones
+ACROSS = 0.1  # cosine to a rod's axis up to which a direction is across it
+UP = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The nearest two rods of a shape, those apart that meet by design.
+
+    Parameters
+    ----------
+    clearance : between their surfaces [m]; negative: how deep they overlap; None where no two rods come nearer than
+        a rod's breadth, or the section's outline is not known.
+    pairs : number of pairs of rods that touch or overlap; a rod that touches itself counts as one.
+    rods : names of the nearest two; the same twice of a rod that touches itself.
+    where : place between them [m].
+    """
+
+    clearance: float | None = None
+    pairs: int = 0
+    rods: tuple[str, str] | None = None
+    where: tuple[float, float, float] | None = None
+
+
+def contact_of(shell: Shell, state: Floats, rod: Rod) -> Contact:
+    """Contact of a shell of equal rods in a `state` (N, 3)."""
+    frames = rod_frames(shell)
+    directors = None if frames is None else edge_directors(shell, frames, state)
+    return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
+
+
+def contact(mesh: GridMesh, places: Floats, rod: Rod, *, directors: Floats | None = None) -> Contact:
+    """Contact of the rods of `mesh`.
+
+    Parameters
+    ----------
+    places : (k, 3) of each entry of `rod_nodes` [m].
+    directors : (e, 3) first material director of each edge; without, the normal of the shell.
+    """
+    outline = _Outline.of(rod)
+    if outline is None:
+        return Contact()
+    edges = _Edges(mesh, places, outline, directors)
+    first, second, p, q, limit = edges.near()
+    gap = edges.gaps(first, second, q - p)
+    counted = gap <= limit
+    if not counted.any():
+        return Contact()
+    rods = np.sort(np.column_stack([mesh.edge_rods[first], mesh.edge_rods[second]]), axis=1)
+    worst = int(np.argmin(np.where(counted, gap, np.inf)))
+    a, b = (mesh.grid.rods[k].name for k in rods[worst])
+    x, y, z = (0.5 * (p + q)[worst]).tolist()
+    return Contact(float(gap[worst]), len(np.unique(rods[counted & (gap <= 0)], axis=0)), (a, b), (x, y, z))
+
+
+def joined_contact(parts: Mapping[str, Contact]) -> Contact:
+    """Of several shells, by their names, each checked by itself: the worst, with the names of rods among all."""
+    known = [(name, one) for name, one in parts.items() if one.clearance is not None]
+    if not known:
+        return Contact()
+    name, worst = min(known, key=lambda pair: pair[1].clearance or 0.0)
+    assert worst.rods is not None
+    rods = (f"{name}-{worst.rods[0]}", f"{name}-{worst.rods[1]}")
+    return replace(worst, rods=rods, pairs=sum(one.pairs for one in parts.values()))
+
+
+@dataclass(frozen=True)
+class _Outline:
+    """A section's outline: half its width along m1 and along m2 [m], and whether it is a box or an ellipse."""
+
+    x: float
+    y: float
+    box: bool
+
+    @staticmethod
+    def of(rod: Rod) -> "_Outline | None":
+        section = rod.section
+        if isinstance(section, Circle | Tube):
+            return _Outline(section.outer_radius, section.outer_radius, False)
+        if isinstance(section, Ellipse):
+            return _Outline(section.a, section.b, False)
+        if isinstance(section, RectangularSection):
+            return _Outline(0.5 * section.width, 0.5 * section.height, True)
+        known = section.fibre_distances if isinstance(section, GivenSection) else None
+        return None if known is None else _Outline(*known, True)
+
+    @property
+    def round(self) -> bool:
+        return not self.box and self.x == self.y
+
+    @property
+    def reach(self) -> float:
+        """Farthest point from the axis [m]."""
+        return float(np.hypot(self.x, self.y)) if self.box else max(self.x, self.y)
+
+    @property
+    def near(self) -> float:
+        """Clearance up to which rods are near to each other: a rod's breadth [m]."""
+        return 2 * self.reach
+
+    def half_width(self, along_m1: Floats, along_m2: Floats) -> Floats:
+        """Of the section, seen along directions with these components."""
+        parts = np.abs(self.x * along_m1), np.abs(self.y * along_m2)
+        return parts[0] + parts[1] if self.box else np.hypot(*parts)
+
+
+class _Edges:
+    """All edges of a shape as prisms."""
+
+    def __init__(self, mesh: GridMesh, places: Floats, outline: _Outline, directors: Floats | None) -> None:
+        self.mesh, self.outline = mesh, outline
+        begins = np.delete(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
+        self.start, self.stop = places[begins], places[begins + 1]
+        self.station = 0.5 * (mesh.stations[begins] + mesh.stations[begins + 1])  # of the middles
+        self.tangent = unit(self.stop - self.start)
+        self._directors, self._places, self._begins = directors, places, begins
+
+    @cached_property
+    def across(self) -> tuple[Floats, Floats]:
+        """(e, 3) directors m1 and m2 of each edge."""
+        m1 = self._directors
+        if m1 is None:
+            nodes = np.zeros((self.mesh.node_count, 3))
+            nodes[self.mesh.rod_nodes] = self._places
+            normals = shell_normals(self.mesh, nodes)
+            upright = np.broadcast_to(UP, self.start.shape)
+            m1 = adapted(upright if normals is None else normals[self._begins], self.tangent)
+        return m1, cross(self.tangent, m1)
+
+    def candidates(self) -> tuple[Ints, Ints, Floats]:
+        """Pairs of edges that may be near, but for those that meet by design: first, second, and the gap from which
+        they count as near [m]; crossing rods, and parts of one rod, only when they touch away from there."""
+        mesh, reach = self.mesh, self.outline.reach
+        radius = np.linalg.norm(self.stop - self.start, axis=1).max() + 2 * reach + self.outline.near
+        found = cKDTree(0.5 * (self.start + self.stop)).query_pairs(radius, output_type="ndarray")
+        first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
+        rods = mesh.edge_rods[first], mesh.edge_rods[second]
+        own = rods[0] == rods[1]
+        crossing = self._crossing_of(*rods)
+        cut = np.zeros(len(own), dtype=bool)
+        apart = np.abs(self.station[first] - self.station[second])[own]
+        between = 0.5 * (mesh.edge_lengths[first] + mesh.edge_lengths[second])[own]
+        cut[own] = apart - between <= np.pi * reach
+        crossed = np.flatnonzero(crossing >= 0)
+        which = crossing[crossed]
+        cut[crossed] = True
+        for side, edge in enumerate((first[crossed], second[crossed])):
+            away = np.abs(self.station[edge] - self.crossings.at[which, side]) - 0.5 * mesh.edge_lengths[edge]
+            cut[crossed] &= away <= self._overlaps[which]
+        kept = ~cut
+        limit = np.where(crossing >= 0, -2 * SLACK * reach, np.where(own, 0.0, self.outline.near))
+        return first[kept], second[kept], limit[kept]
+
+    def near(self) -> tuple[Ints, Ints, Floats, Floats, Floats]:
+        """Of the candidates those that are near by their axes: first, second, nearest points on each, and limit."""
+        first, second, limit = self.candidates()
+        p, q = nearest_points(self.start[first], self.stop[first], self.start[second], self.stop[second])
+        kept = np.linalg.norm(q - p, axis=1) <= 2 * self.outline.reach + limit
+        return first[kept], second[kept], p[kept], q[kept], limit[kept]
+
+    def gaps(self, first: Ints, second: Ints, between: Floats) -> Floats:
+        """(p,) widest gap between the prisms of each pair [m], negative where they overlap.
+
+        between : (p, 3) from the first axis to the second where they are nearest [m].
+        """
+        ta, tb = self.tangent[first], self.tangent[second]
+        directions = [between, ta, tb, cross(ta, tb)]
+        if not self.outline.round:
+            directions += [director[edges] for edges in (first, second) for director in self.across]
+        widest = np.full(len(first), -2 * self.outline.reach)  # where axes lie in each other
+        for number, direction in enumerate(directions):
+            size = np.linalg.norm(direction, axis=1)
+            seen = size > 1e-9 * self.outline.reach
+            n = direction[seen] / size[seen, None]
+            ends = [[dot(n, end[edges[seen]]) for end in (self.start, self.stop)] for edges in (first, second)]
+            (low_a, high_a), (low_b, high_b) = ((np.minimum(*pair), np.maximum(*pair)) for pair in ends)
+            apart = np.maximum(low_b - high_a, low_a - high_b)
+            apart -= self._half_width(first[seen], n) + self._half_width(second[seen], n)
+            # prisms that overlap are not pulled apart along their axes: rods go on past their edges
+            along = np.maximum(np.abs(dot(n, ta[seen])), np.abs(dot(n, tb[seen])))
+            counts = (apart > 0) | (along < ACROSS) | (number == 0)
+            widest[seen] = np.maximum(widest[seen], np.where(counts, apart, -np.inf))
+        return widest
+
+    def _half_width(self, edges: Ints, n: Floats) -> Floats:
+        if self.outline.round:
+            return self.outline.x * np.sqrt(np.maximum(1.0 - dot(n, self.tangent[edges]) ** 2, 0.0))
+        m1, m2 = self.across
+        return self.outline.half_width(dot(n, m1[edges]), dot(n, m2[edges]))
+
+    @cached_property
+    def crossings(self) -> Crossings:
+        """Where lines of rods cross in the flat grid, joined or not, or would if the rods were a little longer."""
+        return FlatGrid.of(self.mesh.grid.rods, margin=-4 * self.outline.reach / FLATTEST).crossings
+
+    @cached_property
+    def _overlaps(self) -> Floats:
+        """(c,) how far along the rods they overlap at each crossing, from it [m]."""
+        tangents = [self.tangent[self._edge_at(self.crossings.rods[:, k], self.crossings.at[:, k])] for k in (0, 1)]
+        sine = np.linalg.norm(cross(*tangents), axis=1)
+        return 2 * self.outline.reach / np.maximum(sine, FLATTEST)
+
+    def _edge_at(self, rods: Ints, at: Floats) -> Ints:
+        """Edge of each rod at a material coordinate."""
+        low, span = self.station.min(), np.ptp(self.mesh.stations) + 1.0
+        keys = self.mesh.edge_rods * span + (self.station - low)
+        after = np.searchsorted(keys, rods * span + (at - low))
+        first, last = self.mesh.rod_start - np.arange(len(self.mesh.rod_start)), self.mesh.rod_stop - 2
+        last = last - np.arange(len(last))
+        return np.clip(after, first[rods], last[rods])
+
+    def _crossing_of(self, low: Ints, high: Ints) -> Ints:
+        """Crossing of each pair of rods, or -1."""
+        count = len(self.mesh.grid.rods)
+        known = np.append(self.crossings.rods @ [count, 1], count * count)
+        order = np.argsort(known, kind="stable")
+        wanted = low * count + high
+        at = np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)
+        return np.where(known[order[at]] == wanted, order[at], -1)
+
+
+def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[Floats, Floats]:
+    """(p, 3) nearest points of segments a and b, pair by pair [Ericson, Real-Time Collision Detection, section 5.1.9].
+
+    Where segments are parallel over a stretch, one pair of points of that stretch.
+    """
+    u, v, w = a_end - a, b_end - b, a - b
+    uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)
+    skew = uu * vv - uv**2
+    parallel = skew <= 1e-14 * uu * vv
+    s = np.where(parallel, 0.0, np.clip((uv * vw - uw * vv) / np.where(parallel, 1.0, skew), 0.0, 1.0))
+    t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
+    s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
+    return a + s[:, None] * u, b + t[:, None] * v

@@ -1,0 +1,159 @@
+"""A rod that fits its target: the section whose bends on the target's net a material bears."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.errors import InputError, NetLimitError
+from rodshell.layout import GridLayout
+from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.rods.fibres import fibre_strain
+from rodshell.rods.materials import Material, PresetName
+from rodshell.rods.section import Circle, Rod, Section, Tube
+from rodshell.rods.stock import STOCK, depth, scaled
+from rodshell.targets import Target
+from rodshell.units import length_text, rounded_down
+
+Floats = NDArray[np.float64]
+
+WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
+SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
+HALF = 0.5  # of the strength: what bending may use, in the final shape
+OF_NET = 0.8 * HALF  # by the net's bends; pinned shells bend up to 1.15 times as sharply, and axial force adds
+ROOM = 1 / 6  # depth of a rod over the spacing: joints need room
+ANY = Material(1.0, 1.0)  # strains do not depend on it
+PLAN = 41  # points each way at which a target without a net is sampled
+
+
+class Bends(NamedTuple):
+    """Curvatures (k,) [1/m] of the rods of a net: out of the target, along its normal, and within it."""
+
+    normal: Floats
+    geodesic: Floats
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a rod that is not given has to fit.
+
+    Parameters
+    ----------
+    width : of the shell [m], by which the material is chosen.
+    slender : radius of a rod as slender as the paper's [m].
+    thickest : largest depth of a rod between its joints [m].
+    bends : called if they are needed.
+    """
+
+    width: float
+    slender: float
+    thickest: float
+    bends: Callable[[], Bends]
+
+    @classmethod
+    def on(cls, target: Target, layout: GridLayout, *, anchor: tuple[float, float] | None = None) -> Self:
+        """By the net of a layout on its target."""
+        slender = SLENDER * target.size
+        thickest = min(2 * slender, ROOM * min(layout.spacing))
+        return cls(2 * target.size, slender, thickest, lambda: bends_of(target, layout, anchor))
+
+    @classmethod
+    def between(cls, lengths: Floats, ends: Floats) -> Self:
+        """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m], as if each bent like a sine."""
+        chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        width = float(np.ptp(ends[:, :, :2], axis=(0, 1)).max())
+        rise = 2 * np.sqrt(np.clip(1 - chords / lengths, 0.0, 1.0))  # amplitude of the tangent's angle [rad]
+        slender = SLENDER * width / 2
+        return cls(width, slender, 2 * slender, lambda: Bends(np.pi * rise / lengths, np.zeros(len(lengths))))
+
+    @property
+    def preset(self) -> PresetName:
+        """The material where none is given: of those that shells of metres are built of the one that bears the sharpest
+        bends; below a metre the plastic of printers."""
+        return "gfrp" if self.width > WIDE else "petg"
+
+    def section(
+        self, material: Material, *, strength: float | None = None, shape: Circle | Tube | None = None
+    ) -> Section:
+        """The thickest section whose bends use at most half of the strength.
+
+        Of the sizes in which a preset material is sold; thinner than those, or of a material without a name, in steps
+        of 1, 1.5, 2, 3, 5, 7. Without a known strength the section is as slender as the paper's rods on its hemisphere,
+        and with one no thicker than that.
+
+        Parameters
+        ----------
+        strength : in place of the preset's [Pa].
+        shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
+
+        Raises
+        ------
+        InputError : the tube's wall is too thick for what the bends allow.
+        """
+        strength = strength or material.bending_strength
+        if strength is None:
+            return Tube(self.slender, shape.thickness) if isinstance(shape, Tube) else Circle(self.slender)
+        bends, allowed = self.bends(), OF_NET * strength / material.youngs_modulus
+        stock = () if shape is not None or material.name is None else STOCK[material.name]
+        fitting = [one for one in stock if depth(one) <= self.thickest and largest_strain(one, bends) <= allowed]
+        if fitting:
+            return fitting[-1]
+        like = shape or (stock[0] if stock else Circle(self.slender))
+        strain = largest_strain(like, bends)
+        most = self.thickest if strain == 0 else min(self.thickest, depth(like) * allowed / strain)
+        return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
+
+
+def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
+    """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature."""
+    try:
+        return net_bends(chebyshev_net(target, layout, anchor=anchor))
+    except NetLimitError:  # it is cut by seams, or another anchor is looked for
+        sharpest = np.atleast_1d(_sharpest_of(target))
+        return Bends(sharpest, sharpest)
+
+
+def net_bends(net: ChebyshevNet) -> Bends:
+    """Curvatures of both families at the nodes inside the target, by second differences."""
+    normal, geodesic = list[Floats](), list[Floats]()
+    points, inside = net.net.points, net.net.inside
+    for x, s, mask in ((points, net.net.u, inside), (points.transpose(1, 0, 2), net.net.v, inside.T)):
+        slope = np.diff(x, axis=0) / np.diff(s)[:, None, None]
+        bend = np.diff(slope, axis=0) / (0.5 * (s[2:] - s[:-2]))[:, None, None]
+        known = mask[1:-1] & np.isfinite(bend[:, :, 0])
+        at, bend = x[1:-1][known], bend[known]
+        along = np.einsum("ij,ij->i", bend, net.target.on_surface(at).normal)
+        normal.append(np.abs(along))
+        geodesic.append(np.sqrt(np.maximum(np.einsum("ij,ij->i", bend, bend) - along**2, 0.0)))
+    return Bends(np.concatenate(normal), np.concatenate(geodesic))
+
+
+def largest_strain(section: Section, bends: Bends) -> float:
+    """Largest bending strain of the section by such bends [-]."""
+    return float(np.max(fibre_strain(Rod(section, ANY), bends.normal, bends.geodesic), initial=0.0))
+
+
+def _of_depth(section: Section, deep: float, *, wall_stays: bool) -> Section:
+    """A section like this one of another depth [m]; the wall of a tube may have to stay as it is."""
+    if not (wall_stays and isinstance(section, Tube)):
+        return scaled(section, deep / depth(section))
+    if deep < 2 * section.thickness:
+        raise InputError(
+            f"a wall of {length_text(section.thickness)}: tubes that bear the bends of this target are at most "
+            f"{length_text(deep)} thick: give a thinner wall, or the radius too"
+        )
+    return Tube(deep / 2, section.thickness)
+
+
+def _sharpest_of(target: Target) -> float:
+    """The sharpest principal curvature [1/m] of a target, sampled over its plan."""
+    side = np.linspace(-2 * target.size, 2 * target.size, PLAN)
+    x, y = (target.summit[k] + plane.ravel() for k, plane in enumerate(np.meshgrid(side, side)))
+    plan = np.column_stack([x, y])
+    with np.errstate(all="ignore"):
+        points = np.column_stack([plan, target.height(plan)])
+    points = points[np.isfinite(points[:, 2])]
+    points = points[target.margin(points) > 0]
+    return float(np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(initial=0.0))

@@ -1,0 +1,94 @@
+"""The commands. Only click is imported here, so that --help and --version answer at once."""
+
+from difflib import get_close_matches
+from importlib import import_module
+
+import click
+
+from rodshell.cli.interruption import Interrupted
+from rodshell.errors import InputError, RodshellError
+
+COMMANDS = {
+    "form": "From a target to the flat grid that pops up into it.",
+    "popup": "Pop up a table of rods, or an earlier result, from flat.",
+    "export": "Write drawings, schedules, models or the report of an earlier result again.",
+    "warmup": "Compile all kernels ahead, once, so that no job waits for it.",
+    "paper": "Make a figure of the paper again, with its errors.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands live in the module of their name and are imported when they are called."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        """As click does, but an interrupt is left to `main`."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as stopped:
+            raise Interrupted(str(stopped)) from stopped
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command = import_module(f"rodshell.cli.{cmd_name}").command
+        assert isinstance(command, click.Command)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], COMMANDS, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"the commands are {', '.join(COMMANDS)}"
+            raise InputError(f"unknown command {args[0]}: {hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        click.echo(f"rodshell {version('rodshell')}")
+        ctx.exit()
+
+
+@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"max_content_width": 110})
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
+    help="Print the version and end.",
+)  # fmt: skip
+@click.pass_context
+def app(ctx: click.Context) -> None:
+    """Form finding of elastic gridshells: a target surface goes in, a flat grid of rods comes out.
+
+    Try: rodshell form hemisphere --out out/dome
+    """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+def failed(error: BaseException) -> int:
+    """Say what was wrong in one line; the exit code. Raises what is no user's error."""
+    if isinstance(error, RodshellError):
+        return _fail(str(error), error.exit_code)
+    if isinstance(error, click.NoSuchOption):
+        near = f": did you mean {error.possibilities[0]}?" if error.possibilities else ": see --help"
+        return _fail(f"unknown option {error.option_name}{near}", 2)
+    if isinstance(error, click.UsageError):
+        where = error.ctx.command_path if error.ctx else "rodshell"
+        return _fail(f"{error.format_message().rstrip('.')}: see {where} --help", 2)
+    if isinstance(error, click.ClickException):
+        return _fail(error.format_message(), 2)
+    raise error
+
+
+def _fail(message: str, code: int) -> int:
+    click.echo("rodshell: error: " + " ".join(message.split()), err=True)
+    return code

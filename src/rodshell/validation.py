@@ -1,0 +1,104 @@
+"""Arguments as callers give them: of the right kind, sign, shape and spelling, or one sentence that says what is wrong.
+
+Every function raises InputError, which calls the argument by its `name`.
+"""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from math import isfinite
+from numbers import Real
+from reprlib import repr as short
+from types import UnionType
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rodshell.errors import InputError
+from rodshell.units import shown
+
+Floats = NDArray[np.float64]
+Choice = TypeVar("Choice", bound=str)
+
+
+def instance(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:
+    """Refuse a `value` that is no `kind`; `wanted` says in words what it must be, by default a rodshell `kind`."""
+    if not isinstance(value, kind):
+        what = wanted or f"a rodshell {getattr(kind, '__name__', kind)}"
+        raise InputError(f"{name} must be {what}, not {_described(value)}")
+
+
+def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
+    """`value`, if it is one of the words in `choices`."""
+    for word in choices:
+        if value == word:
+            return word
+    near = get_close_matches(value, choices, n=1) if isinstance(value, str) else []
+    hint = f": did you mean {shown(near[0])}?" if near else ""
+    *rest, last = map(shown, choices)
+    raise InputError(f"{name} must be {', '.join(rest)} or {last}, not {_described(value)}{hint}")
+
+
+def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice, ...]:
+    """`value` as a tuple of different words out of `choices`; one word may come without a sequence around it."""
+    words = [value] if isinstance(value, str) else list(value) if isinstance(value, Sequence) else None
+    if not words:
+        raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {_described(value)}")
+    return tuple(dict.fromkeys(choice(name, word, choices) for word in words))
+
+
+def number(name: str, value: object, unit: str) -> None:
+    """Refuse what is not a finite number of this `unit`."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InputError(f"{name} must be a number in {unit}, not {_described(value)}")
+    if not isfinite(value):
+        raise InputError(f"{name} must be finite, not {value} {unit}")
+
+
+def positive(name: str, value: object, unit: str) -> None:
+    """Refuse what is not a finite number above 0, of this `unit`."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InputError(f"{name} must be a number in {unit}, not {_described(value)}")
+    if not (isfinite(value) and float(value) > 0):
+        raise InputError(f"{name} must be positive, not {value} {unit}")
+
+
+def point(name: str, value: object) -> None:
+    """Refuse what is not a pair of finite numbers [m]."""
+    pair = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else ()
+    if len(pair) != 2 or not all(isinstance(one, Real) and isfinite(one) for one in pair):
+        raise InputError(f"{name} must be two finite numbers x, y in m, not {value!r}")
+
+
+def finite(name: str, given: ArrayLike, *shape: int) -> Floats:
+    """`given` as an array of the `shape`, to which it may be broadcast."""
+    try:
+        array = np.broadcast_to(np.asarray(given, dtype=float), shape)
+    except (TypeError, ValueError):
+        wanted = "one number" if not shape else f"numbers of the shape {shape}"
+        raise InputError(f"{name} must be {wanted}, not {short(given)}") from None
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} must be finite, not {short(given)}")
+    return array
+
+
+def vector(name: str, given: ArrayLike) -> Floats:
+    """(3,) finite numbers."""
+    if np.shape(given) != (3,):
+        raise InputError(f"{name} must be three numbers (x, y, z), not {short(given)}")
+    return finite(name, given, 3)
+
+
+def direction(name: str, given: ArrayLike) -> Floats:
+    """(3,) unit vector along `given`."""
+    array = vector(name, given)
+    length = float(np.linalg.norm(array))
+    if length == 0:
+        raise InputError(f"{name} must not be zero: it has no direction")
+    return np.asarray(array / length)
+
+
+def _described(value: object) -> str:
+    """A plain value as it is, anything else by its kind."""
+    made = type(value).__name__
+    return shown(value) if isinstance(value, str | int | float) else f"a{'n' * (made[0] in 'AEIOU')} {made}"

@@ -1,0 +1,64 @@
+"""Own weight: what share of it a shell bears, against another code's figures and against code of the tests' own."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+import rodshell as rs
+from rodshell.checks import Reactions, SelfWeight, reactions, self_weight, settled_shell
+from tests.acceptance.cases import HEMISPHERE, ROD
+from tests.acceptance.rows import Row
+from tests.parity.loaded_twin import LoadedTwin
+
+STEEL = rs.Rod(rs.Circle(radius=5e-4), rs.Material(210e9, 7850, 0.3))
+TUBE = rs.Rod(rs.Tube(radius=0.0417 / 2, thickness=0.0035), rs.Material(25e9, 1900, 0.3))
+LARCH = rs.Rod(rs.RectangularSection(width=0.035, height=0.05), rs.Material(12e9, 590, shear=0.7e9))
+ROUND = {"rods": (17, 17), "spacing": 0.03, "edge": 0.015}
+FORMS: dict[str, tuple[rs.Target, dict[str, object], rs.Rod]] = {
+    "hemisphere, paper's rod": (HEMISPHERE, ROUND, ROD),
+    "hemisphere, 1 mm spring steel": (HEMISPHERE, ROUND, STEEL),
+    "GFRP tubes, cap of 10 m": (rs.Cap(radius=10.0, base=4.0), {"spacing": 1.0, "edge": 0.5}, TUBE),
+    "larch laths, paraboloid 16 m": (rs.Paraboloid(radius=8.0, height=4.0), {"spacing": 1.0, "edge": 0.5}, LARCH),
+    "oval turned by 0.4": (rs.Ellipsoid(a=0.2, b=0.15, c=0.12), {"spacing": 0.03, "edge": 0.015, "rotate": 0.4}, ROD),
+}
+BOUNDS = {"pinned": (0.02, 0.031), "clamped": (0.04, 0.062)}  # of the first, by another code
+HIGH = 1e4  # factor up to which springs are followed; result.json stops at 100
+FACTORISATIONS = 15
+
+
+def rows() -> Iterator[Row]:
+    for name, (target, layout, rod) in FORMS.items():
+        form = rs.find_form(target, rs.GridLayout.orthogonal(**layout), rod)
+        for ends, popped in form.popped.items():
+            shell, found = settled_shell(popped)
+            twin, held = LoadedTwin(popped, rod), reactions(shell, found)
+            yield from _unloaded(f"{name}, {ends}", twin, held, popped.report.negative_modes)
+            weighed = self_weight(shell, found, most=HIGH)
+            if rod is ROD and target is HEMISPHERE:
+                low, high = BOUNDS[ends]
+                yield Row(f"{name}, {ends}", "load factor on the own weight", weighed.at_least, high)
+                yield Row(f"{name}, {ends}", "the same, at least", -weighed.at_least, -low)
+            yield from _loaded(f"{name}, {ends}", twin, weighed)
+
+
+def _unloaded(case: str, twin: LoadedTwin, held: Reactions, negative_modes: int) -> Iterator[Row]:
+    largest = float(np.linalg.norm(held.forces, axis=1).max())
+    forces, _ = twin.reactions(twin.state)
+    residual = twin.residual(twin.state)[: len(twin.free) - len(twin.angles)]
+    yield Row(case, "other code: unbalanced over reaction", float(np.abs(residual).max()) / largest, 1e-6)
+    yield Row(case, "reactions apart, over the largest", float(np.abs(forces - held.forces).max()) / largest, 1e-6)
+    yield Row(case, "negative modes apart", abs(twin.factored(twin.state)[1] - negative_modes), 0)
+
+
+def _loaded(case: str, twin: LoadedTwin, weighed: SelfWeight) -> Iterator[Row]:
+    factor, at_one = twin.load_factor(accuracy=1e-3)
+    note = f"{weighed.at_least:.5g} and {factor:.5g}, {weighed.limit}"
+    yield Row(case, "load factors apart", abs(weighed.at_least / factor - 1), 0.01, note=note)
+    if at_one is not None:
+        assert weighed.deflection is not None
+        moved = (at_one - twin.state)[: 3 * twin.nodes].reshape(-1, 3)
+        sunk = float(np.linalg.norm(moved, axis=1).max())
+        yield Row(
+            case, "deflections at 1 g apart", abs(weighed.deflection / sunk - 1), 0.01, note=f"{1e3 * sunk:.4g} mm"
+        )
+    yield Row(case, "factorisations", weighed.factorizations, FACTORISATIONS)

@@ -1,0 +1,283 @@
+"""Contact: nearest rods against closed forms and a search over all pairs; what meets by design is no contact."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from shells import dome
+from test_bending import rods_of_length
+
+import rodshell as rs
+from rodshell.checks import Contact, check, contact, contact_of
+from rodshell.checks.contact import _Edges, _Outline, joined_contact, nearest_points
+from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+
+MATERIAL = rs.Material(youngs_modulus=1e9, density=1e3)
+
+
+def round_rod(radius: float) -> rs.Rod:
+    return rs.Rod(rs.Circle(radius), MATERIAL)
+
+
+def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
+    """Of the segments ab and cd: the least over both ends of each against the other, and over the lines' own."""
+
+    def to_segment(p: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
+        share = np.clip((p - x) @ (y - x) / ((y - x) @ (y - x)), 0, 1)
+        return float(np.linalg.norm(p - x - share * (y - x)))
+
+    found = [to_segment(p, c, d) for p in (a, b)] + [to_segment(p, a, b) for p in (c, d)]
+    u, v = b - a, d - c
+    shares, _, rank, _ = np.linalg.lstsq(np.column_stack([u, -v]), c - a, rcond=1e-9)
+    if rank == 2 and (shares >= 0).all() and (shares <= 1).all():
+        found.append(float(np.linalg.norm(a + shares[0] * u - c - shares[1] * v)))
+    return min(found)
+
+
+def test_nearest_points_of_segments_are_the_nearest() -> None:
+    """Random segments; and flat ones, parallel ones, with ends in common, crossing and in one line."""
+    draw = np.random.default_rng(1)
+    ends = draw.normal(size=(4, 400, 3))
+    ends[:, 100:200, 2] = 0.0  # many of these cross
+    ends[3, 200:300] = ends[2, 200:300] + draw.normal(size=(100, 1)) * (ends[1] - ends[0])[200:300]
+    ends[2, 300:350] = ends[1, 300:350]
+    ends[2:, 350:] = (ends[0] + draw.normal(size=(2, 400, 1)) * (ends[1] - ends[0]))[:, 350:]
+    p, q = nearest_points(*ends)
+    expected = [distance(*four) for four in ends.transpose(1, 0, 2)]
+    np.testing.assert_allclose(np.linalg.norm(p - q, axis=1), expected, atol=1e-12)
+    assert np.count_nonzero(np.array(expected[100:200]) < 1e-12) > 10
+    for point, a, b in ((p, *ends[:2]), (q, *ends[2:])):
+        np.testing.assert_allclose(
+            np.linalg.norm(point - a, axis=1) + np.linalg.norm(b - point, axis=1), np.linalg.norm(b - a, axis=1)
+        )
+
+
+def side_by_side(apart: tuple[float, float], *, angle: float = 0.0) -> tuple[GridMesh, np.ndarray, np.ndarray]:
+    """Two straight rods along x, the second moved by `apart` in y and z; and z turned about x as directors."""
+    mesh = rods_of_length(0.3, 0.3)
+    places = np.column_stack([mesh.stations, np.zeros((len(mesh.stations), 2))])
+    places[mesh.rod_slice(1), 1:] += apart
+    return mesh, places, np.tile([0.0, np.sin(angle), np.cos(angle)], (len(mesh.edges), 1))
+
+
+@pytest.mark.parametrize(("section", "apart", "angle", "clearance"), [
+    (rs.Circle(5e-3), (0.012, 0.0), 0.0, 0.002),
+    (rs.Tube(5e-3, 1e-3), (0.003, 0.004), 0.0, -0.005),
+    (rs.RectangularSection(5e-3, 5e-2), (0.06, 0.0), 0.0, 0.01),
+    (rs.RectangularSection(5e-3, 5e-2), (0.0, 0.012), 0.0, 0.007),
+    (rs.RectangularSection(5e-3, 5e-2), (0.045, 0.010), 0.0, 0.005),  # side by side, but one over the other
+    (rs.RectangularSection(5e-3, 5e-2), (0.04, 0.002), 0.0, -0.003),
+    (rs.RectangularSection(5e-3, 5e-2), (0.012, 0.0), np.pi / 2, 0.007),  # on edge
+    (rs.RectangularSection(1e-2, 1e-2), (0.02, 0.0), np.pi / 4, 0.02 - np.sqrt(2) * 1e-2),
+    (rs.Ellipse(4e-3, 2e-2), (0.05, 0.0), 0.0, 0.01),
+    (rs.Ellipse(4e-3, 2e-2), (0.0, 0.01), 0.0, 0.002),
+])  # fmt: skip
+def test_clearance_of_two_straight_rods_is_what_their_sections_leave(
+    section: rs.Circle, apart: tuple[float, float], angle: float, clearance: float
+) -> None:
+    mesh, places, directors = side_by_side(apart, angle=angle)
+    found = contact(mesh, places, rs.Rod(section, MATERIAL), directors=directors)
+    assert found.clearance == pytest.approx(clearance, abs=1e-12)
+    assert found.pairs == (clearance < 0)
+    assert found.rods == ("U01", "U02")
+    assert found.where is not None
+    np.testing.assert_allclose(found.where[1:], 0.5 * np.array(apart), atol=1e-12)
+
+
+def test_rods_that_are_not_near_have_no_clearance() -> None:
+    mesh, places, _ = side_by_side((0.05, 0.0))
+    assert contact(mesh, places, round_rod(5e-3)) == Contact()
+
+
+def test_ends_that_face_each_other_touch_only_when_they_meet() -> None:
+    """Rods have flat ends: two in one line are as far apart as the gap between them, not less by their radius."""
+    mesh, places, _ = side_by_side((0.0, 0.0))
+    places[mesh.rod_slice(1), 0] += 0.301
+    assert contact(mesh, places, round_rod(5e-3)).clearance == pytest.approx(1e-3)
+
+
+def test_two_rods_of_a_family_that_cross_are_found_where_they_do() -> None:
+    mesh, places, _ = side_by_side((0.0, 0.0))
+    second = mesh.rod_slice(1)
+    places[second, 1] = 0.5 * (places[second, 0] - 0.171)
+    found = contact(mesh, places, round_rod(1e-3))
+    assert found.pairs == 1
+    assert found.clearance == pytest.approx(-2e-3)
+    assert found.where == pytest.approx((0.171, 0.0, 0.0), abs=1e-9)
+
+
+def lattice(spacing: float = 0.1, edge: float = 0.02) -> GridMesh:
+    offsets = spacing * np.arange(-2, 3)
+    rods = [FlatRod.u(f"U{k + 1}", y, -0.24, 0.24) for k, y in enumerate(offsets)]
+    rods += [FlatRod.v(f"V{k + 1}", x, -0.23, 0.25) for k, x in enumerate(offsets)]
+    return mesh_grid(FlatGrid.of(rods), edge)
+
+
+@pytest.mark.parametrize("degrees", [20.0, 37.0, 60.0, 90.0])
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.99, 1.01])
+@pytest.mark.parametrize("edge", [0.1, 0.013])
+def test_a_sheared_lattice_touches_when_its_rods_are_wider_than_their_distance(
+    degrees: float, share: float, edge: float
+) -> None:
+    """Parallel rods are at the spacing by the sine of the angle; rods that cross, joined or not, are no contact."""
+    mesh, angle = lattice(edge=edge), np.radians(degrees)
+    flat = mesh.flat[mesh.rod_nodes]
+    places = np.outer(flat[:, 0], [1, 0, 0]) + np.outer(flat[:, 1], [np.cos(angle), np.sin(angle), 0])
+    apart = 0.1 * np.sin(angle)
+    found = contact(mesh, places, round_rod(0.5 * share * apart))
+    assert found.pairs == (8 if share > 1 else 0)
+    assert (None if found.clearance is None else pytest.approx(found.clearance)) == (
+        (1 - share) * apart if share > 0.5 else None
+    )
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.3])
+def test_rods_that_end_at_others_or_just_short_of_them_are_no_contact(tilt: float) -> None:
+    """Ends in T and L, and a crossing next to an end that is not made a joint; also when the grid is bent."""
+    rods = [
+        FlatRod.u("U1", 0.0, -0.3, 0.3), FlatRod.u("U2", 0.1, -0.3, 0.3),
+        FlatRod.v("V1", -0.3, 0.0, 0.4),  # L at the end of U1
+        FlatRod.v("V2", 0.1, 0.103, 0.4),  # ends 3 mm short of U2
+        FlatRod.v("V3", -0.1, -0.002, 0.4),  # crosses U1 by 2 mm: no joint
+    ]  # fmt: skip
+    mesh = mesh_grid(FlatGrid.of(rods, margin=0.015), 0.02)
+    flat = mesh.flat[mesh.rod_nodes]
+    places = np.column_stack([flat[:, :2], tilt * flat[:, 0] * flat[:, 1]])
+    assert contact(mesh, places, round_rod(5e-3)).pairs == 0
+
+
+def test_crossing_rods_that_come_together_again_touch() -> None:
+    """V crosses U, and bends round until it lies against it 0.2 m from their joint."""
+    rods = [FlatRod.u("U1", 0.0, -0.5, 0.5), FlatRod.v("V1", 0.0, -0.1, 0.4)]
+    mesh = mesh_grid(FlatGrid.of(rods), 0.01)
+    places = mesh.flat[mesh.rod_nodes].copy()
+    s = mesh.stations[mesh.rod_slice(1)]
+    bent = s > 0
+    angle = s[bent] / 0.1
+    places[mesh.rod_slice(1).start + np.flatnonzero(bent), :2] = 0.1 * np.column_stack(
+        [1 - np.cos(angle), np.sin(angle)]
+    )
+    found = contact(mesh, places, round_rod(4e-3))
+    assert found.pairs == 1
+    assert found.rods == ("U1", "V1")
+    assert found.where is not None
+    assert found.where[0] == pytest.approx(0.2, abs=0.01)
+
+
+@pytest.mark.parametrize(("rise", "touches"), [(7.9e-3, 1), (8.1e-3, 0)])
+def test_a_coil_touches_itself_when_its_rise_is_less_than_its_thickness(rise: float, touches: int) -> None:
+    mesh = rods_of_length(1.5, edge=0.005)
+    t = mesh.stations / np.hypot(0.05, rise / (2 * np.pi))
+    places = np.column_stack([0.05 * np.cos(t), 0.05 * np.sin(t), rise * t / (2 * np.pi)])
+    found = contact(mesh, places, round_rod(4e-3))
+    assert found.pairs == touches
+    if touches:
+        assert found.rods == ("U01", "U01")
+        # the pitch by the slope of the coil: 0.03 %; edges are chords
+        assert found.clearance == pytest.approx(rise - 8e-3, abs=1e-5)
+
+
+def test_a_sharp_bend_does_not_touch_itself() -> None:
+    """A hairpin about a pin of the rod's own thickness: as tight as it goes without touching."""
+    mesh = rods_of_length(0.3, edge=0.001)
+    radius, s = 8.1e-3, mesh.stations - 0.15
+    arc = np.clip(s / radius, -np.pi / 2, np.pi / 2)
+    straight = np.sign(s) * np.maximum(np.abs(s) - radius * np.pi / 2, 0)
+    places = np.column_stack([radius * np.cos(arc) - np.abs(straight), radius * np.sin(arc), 0 * s])
+    assert contact(mesh, places, round_rod(8e-3)).pairs == 0
+
+
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+def test_nearest_rods_of_a_shell_are_those_of_a_search_over_all_pairs(ends: str) -> None:
+    popped, mesh = dome().popped[ends], dome().footprint.mesh  # type: ignore[index]
+    x, edges = popped.positions, mesh.edges
+    radius, rods = 0.022, mesh.edge_rods
+    families = [rod.family for rod in mesh.grid.rods]
+    best, touching = np.inf, set()
+    for i, j in combinations(range(len(edges)), 2):
+        if rods[i] == rods[j] or families[rods[i]] != families[rods[j]]:
+            continue
+        gap = distance(*x[edges[i]], *x[edges[j]]) - 2 * radius
+        best = min(best, gap)
+        if gap <= 0:
+            touching.add((rods[i], rods[j]))
+    found = contact_of(popped.shell, popped.state, round_rod(radius))
+    assert found.clearance is not None
+    # nearest at their ends, which are flat: seen aslant they are farther apart than round ones would be
+    assert best - 1e-9 <= found.clearance <= best + 1e-3
+    assert found.pairs == len(touching) > 0
+
+
+def test_of_straight_rods_at_random_all_that_touch_are_found() -> None:
+    """Skew lines through a box, all nearest between their ends: distances of lines in closed form."""
+    draw, mesh = np.random.default_rng(3), rods_of_length(*[4.0] * 30, edge=0.1)
+    points, directions = draw.uniform(-0.2, 0.2, size=(30, 3)), draw.normal(size=(30, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    rods = np.repeat(np.arange(30), np.diff(np.append(mesh.rod_start, len(mesh.rod_nodes))))
+    places = points[rods] + (mesh.stations - 2.0)[:, None] * directions[rods]
+    apart = {}
+    for a, b in combinations(range(30), 2):
+        normal = np.cross(directions[a], directions[b])
+        apart[a, b] = abs((points[b] - points[a]) @ normal) / np.linalg.norm(normal)
+    for radius in (1e-3, 4e-3, 2e-2):
+        found = contact(mesh, places, round_rod(radius))
+        touching = [pair for pair, distance in apart.items() if distance <= 2 * radius]
+        nearest = min(apart, key=lambda pair: apart[pair])
+        assert found.pairs == len(touching)
+        assert found.clearance == pytest.approx(apart[nearest] - 2 * radius, abs=1e-9)
+        assert found.rods == tuple(f"U{k + 1:02}" for k in nearest)
+
+
+def test_the_work_grows_with_the_rods_not_with_their_square() -> None:
+    counts = []
+    for size in (10, 20, 40):
+        offsets = 0.1 * np.arange(size)
+        rods = [FlatRod.u(f"U{k}", y, 0.0, 0.1 * size) for k, y in enumerate(offsets)]
+        rods += [FlatRod.v(f"V{k}", x, 0.0, 0.1 * size) for k, x in enumerate(offsets)]
+        mesh = mesh_grid(FlatGrid.of(rods), 0.02)
+        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], _Outline(0.024, 0.024, False), None)
+        counts.append(len(edges.candidates()[0]) / len(mesh.edges))
+    assert counts[2] < 1.2 * counts[1] < 1.5 * counts[0]
+
+
+def test_every_shape_is_checked_and_the_nearest_rods_are_named() -> None:
+    """44 mm rods touch at the rim of the popped dome; 70 mm ones at 60 mm in the flat grid, too."""
+    checks = check(dome().popped, round_rod(0.022), stages=2)
+    assert set(checks.contact) == {"pinned", "clamped"}
+    assert len(checks.contact_on_the_way) == 3
+    assert checks.contact_on_the_way[0].pairs == 0
+    assert checks.contact_on_the_way[0].clearance == pytest.approx(0.06 - 0.044)
+    assert checks.contact_on_the_way[-1] == checks.contact["pinned"]
+    (words,) = checks.touching
+    worst = min(checks.contact.values(), key=lambda found: found.clearance or 0.0)
+    assert worst.rods is not None
+    assert words.startswith(f"rods {worst.rods[0]} and {worst.rods[1]} overlap by ")
+    assert f"of {worst.pairs} pairs" in words
+    assert words in checks.warnings
+    wider = check(dome().popped, round_rod(0.035), stages=2)
+    assert wider.contact_on_the_way[0].pairs == 12
+    assert wider.contact_on_the_way[0].clearance == pytest.approx(0.06 - 0.07)
+
+
+def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:
+    checks = check(dome().popped, round_rod(0.012), stages=0)
+    (words,) = checks.touching
+    assert "hardly any room for joints" in words
+    assert check(dome().popped, round_rod(0.005), stages=0).touching == ()
+
+
+def test_rods_of_patches_are_named_with_their_patch() -> None:
+    near, far = Contact(0.01, 0, ("U1", "U2"), (0.0, 0.0, 0.0)), Contact(-0.01, 2, ("V3", "V4"), (1.0, 0.0, 0.0))
+    joined = joined_contact({"A": near, "B": far, "C": Contact()})
+    assert joined == replace(far, rods=("B-V3", "B-V4"))
+    assert joined_contact({"A": Contact()}) == Contact()
+
+
+def test_a_section_without_an_outline_is_not_judged() -> None:
+    mesh, places, _ = side_by_side((0.001, 0.0))
+    given = {"EA": 1.0, "EI1": 1.0, "EI2": 1.0, "GJ": 1.0}
+    assert contact(mesh, places, rs.Rod(rs.GivenSection(**given))) == Contact()
+    boxed = rs.Rod(rs.GivenSection(**given, fibre_distances=(0.01, 0.02)))
+    found = contact(mesh, places, boxed, directors=np.tile([0.0, 0.0, 1.0], (len(mesh.edges), 1)))
+    assert found.clearance == pytest.approx(-0.02)  # the least way out is up

@@ -1,0 +1,167 @@
+"""A rod that is not given: its material by name, its section by the bends of the target's net."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.case import load_case
+from rodshell.checks.sizing import Fit, bends_of, net_bends
+from rodshell.cli import main
+from rodshell.errors import InputError, NetLimitError
+from rodshell.rods.stock import STOCK, depth
+
+
+def roof(**keys: Any) -> Any:
+    """A roof of 12 m as a formula."""
+    shape = {"target.formula": "3*cos(x/6)*cos(y/5)", "target.domain": "rectangle", "target.size": "12 m, 8 m"}
+    return load_case("heightfield", {**shape, **keys})
+
+
+def half_sphere(radius: float) -> tuple[rs.Target, rs.GridLayout]:
+    return rs.Hemisphere(radius), rs.GridLayout.orthogonal(spacing=radius / 6)
+
+
+def test_on_a_sphere_every_rod_bends_by_its_radius_along_the_normal() -> None:
+    bends = bends_of(*half_sphere(5.0))
+    np.testing.assert_allclose(bends.normal, 1 / 5.0, rtol=2e-3)  # second differences: (step / R)^2 / 12
+    assert 0.5 / 5.0 < bends.geodesic.max() < 2 / 5.0
+
+
+def test_on_a_cylinder_a_rod_bends_by_its_heading() -> None:
+    """Euler: cos(heading)^2 / R; its rods are geodesics."""
+    target = rs.HeightField(formula="sqrt(25 - x^2) - 4", domain=rs.Rectangle((6.0, 6.0)))
+    net = rs.chebyshev_net(target, rs.GridLayout.orthogonal(spacing=0.5, rotate=np.pi / 6), anchor=(0.0, 0.0))
+    bends = net_bends(net)
+    expected = np.array([np.cos(np.pi / 6) ** 2 / 5, np.sin(np.pi / 6) ** 2 / 5])
+    off = np.abs(bends.normal[:, None] - expected).min(axis=1)
+    assert off.max() < 1e-3 / 5
+    assert bends.geodesic.max() < 1e-3 / 5
+
+
+@pytest.mark.parametrize("name", ["larch", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel"])
+@pytest.mark.parametrize("radius", [0.1, 5.0])
+def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_use_more(
+    name: Any, radius: float
+) -> None:
+    """Or would be thicker than rods of this target are, or is not thinner than the thinnest in stock."""
+    target, layout = half_sphere(radius)
+    material = rs.Material.preset(name)
+    section = Fit.on(target, layout).section(material)
+    bends = bends_of(target, layout)
+
+    def used(section: Any) -> float:
+        """Share of the strength by the corner, or the fibre farthest away, of a section that bends both ways."""
+        strain = depth_strain(section, bends.normal, bends.geodesic)
+        return strain * material.youngs_modulus / (material.bending_strength or np.nan)
+
+    assert used(section) <= 0.5
+    if section in STOCK[material.name]:  # type: ignore[index]
+        at = STOCK[material.name].index(section)  # type: ignore[index, arg-type]
+        for thicker in STOCK[material.name][at + 1 : at + 2]:  # type: ignore[index]
+            room = min(target.size / 100, min(layout.spacing) / 6)
+            assert used(thicker) > 0.4 or depth(thicker) > room
+
+
+def depth_strain(section: Any, normal: Any, geodesic: Any) -> float:
+    """Worked out anew: half the side times the curvature, added at a corner, by Pythagoras round a circle."""
+    if isinstance(section, rs.RectangularSection):
+        return float((section.width / 2 * normal + section.height / 2 * geodesic).max())
+    return float((section.radius * np.sqrt(normal**2 + geodesic**2)).max())
+
+
+def test_a_wide_target_without_a_rod_is_of_gfrp_and_a_model_of_petg() -> None:
+    assert roof().build().rod.material == rs.Material.preset("gfrp")
+    small = load_case("heightfield", {"target.formula": "0.1*cos(6*x)"})
+    assert small.build().rod.material == rs.Material.preset("petg")
+
+
+def test_the_built_in_cases_of_the_paper_keep_its_rod() -> None:
+    for name in ("hemisphere", "paraboloid", "ellipsoid", "cap"):
+        rod = load_case(name).build().rod
+        assert rod == rs.Rod(rs.Circle(0.001), rs.Material(1e6, 1e3, 0.5))
+        assert load_case(name).rod.left_open == ()
+
+
+def test_what_is_given_is_kept_and_only_the_rest_is_chosen() -> None:
+    timber = roof(**{"rod.material.preset": "spruce"})
+    assert timber.rod.left_open == ("section",)
+    assert timber.build().rod.section in STOCK["spruce"]
+    rod = roof(**{"rod.section.radius": "20 mm"})
+    assert rod.rod.left_open == ("material",)
+    assert rod.build().rod == rs.Rod(rs.Circle(0.02), rs.Material.preset("gfrp"))
+    wall = roof(**{"rod.section.kind": "tube", "rod.section.thickness": "2 mm"}).build().rod.section
+    assert isinstance(wall, rs.Tube)
+    assert wall.thickness == 0.002
+    with pytest.raises(
+        InputError, match=r"a wall of 50 mm: tubes that bear .* at most 50 mm thick: give a thinner wall"
+    ):
+        roof(**{"rod.section.kind": "tube", "rod.section.thickness": "50 mm"}).build()
+
+
+def test_a_given_strength_decides_in_place_of_the_presets() -> None:
+    strong, weak = (roof(**{"checks.strength": s, "rod.material.preset": "larch"}).build().rod for s in (60e6, 10e6))
+    assert depth(strong.section) > depth(weak.section)
+
+
+def test_rods_leave_room_between_them_and_are_no_thicker_than_the_papers() -> None:
+    flat = {"target.formula": "0.1*x*y/36", "target.radius": "6 m"}
+    assert depth(load_case("heightfield", flat).build().rod.section) <= 6.0 / 100
+    dense = load_case("heightfield", {**flat, "layout.spacing": "100 mm"}).build()
+    assert depth(dense.rod.section) <= 0.1 / 6
+
+
+def test_a_target_that_no_net_covers_is_sized_by_its_own_curvature() -> None:
+    """A cap of more than the half sphere, which seams cut."""
+    target = rs.Cap(radius=5.0, base=-3.5)
+    layout = rs.GridLayout.orthogonal(spacing=0.8)
+    with pytest.raises(NetLimitError):
+        rs.chebyshev_net(target, layout)
+    np.testing.assert_allclose(bends_of(target, layout).normal, 1 / 5.0, rtol=1e-6)
+
+
+def test_the_rod_that_was_chosen_is_announced_said_in_the_summary_and_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--formula", "2*cos(x/6)*cos(y/5)", "--target.radius", "6 m", "--spacing", "1.5 m", "--pop_up.ends"]
+    out = str(tmp_path / "roof")
+    assert main(["form", "heightfield", *options, "clamped", "--only", "csv", "--out", out]) == 0
+    said = capsys.readouterr()
+    because = (
+        "material and section were not given: chosen to fit, for bends that use at most half of the bending strength"
+    )
+    (announced,) = [line for line in said.err.splitlines() if line.startswith("rodshell: rod: ")]
+    assert "gfrp, E = 23 GPa" in announced
+    assert because in announced
+    assert because in said.out
+    assert "bending strength 240 MPa, characteristic, short-term: reduce for duration" in said.out
+    assert "of gfrp's bending strength" in said.out
+    saved = rs.read(out)
+    assert saved.result["rod"]["chosen"] == {"material": True, "section": True}
+    assert saved.result["bending"]["strength_of"] == "gfrp"
+    assert saved.result["bending"]["clamped"]["utilisation"] <= 0.5
+    again = load_case(Path(out) / "case.toml")
+    assert again.rod.left_open == ()
+    assert again.build().rod.parameters() == {key: saved.result["rod"][key] for key in ("section", "material")}
+
+
+def test_a_given_strength_wins_over_the_presets(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target, layout = half_sphere(5.0)
+    rod = rs.Rod(rs.Circle(0.005), rs.Material.preset("gfrp"))
+    form = rs.find_form(target, layout, rod, ends=("clamped",))
+    bending = form.archive(takeaway=rs.Takeaway(strength=100e6, stages=0)).result["bending"]
+    assert (bending["strength"], bending["strength_of"]) == (100e6, None)
+    bending = form.archive(takeaway=rs.Takeaway(stages=0)).result["bending"]
+    assert (bending["strength"], bending["strength_of"]) == (240e6, "gfrp")
+    assert bending["clamped"]["utilisation"] == bending["clamped"]["max_stress"] / 240e6
+
+
+def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
+    """A rod whose tangent turns by 0.3 cos(pi s / L) is bent by 0.3 pi / L at its middle; its chord is the integral."""
+    s = (np.arange(1000) + 0.5) / 1000
+    chord = 2.0 * float(np.mean(np.cos(0.3 * np.cos(np.pi * s))))
+    fit = Fit.between(np.array([2.0]), np.array([[[0.0, 0.0, 0.0], [chord, 0.0, 0.0]]]))
+    np.testing.assert_allclose(fit.bends().normal, 0.3 * np.pi / 2.0, rtol=0.01)  # theta^2 / 32 of it
+    assert fit.preset == "gfrp"

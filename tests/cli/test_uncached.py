@@ -1,0 +1,51 @@
+"""A read-only installation without a writable home: kernels are compiled in each run, and that is said."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rodshell import uncached
+from rodshell.cli import main
+
+DECLARED = """
+import numba.core.caching as caching
+
+def no_locator(self, py_func):
+    raise RuntimeError(f"cannot cache function {py_func.__name__!r}: no locator available")
+
+caching.CacheImpl.__init__ = no_locator  # as where neither the package nor a home can be written
+import os
+os.access = lambda path, mode: not mode & os.W_OK
+import rodshell.geometry.curves
+from rodshell.cli.progress import announce_compilation
+announce_compilation()
+"""
+
+
+def test_kernels_that_cannot_be_kept_are_declared_and_that_is_one_sentence(tmp_path: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", DECLARED], capture_output=True, text=True, env={**os.environ})
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stderr.startswith("rodshell: compiling kernels anew")
+    assert ended.stderr.count("\n") == 1
+
+
+def test_a_folder_counts_that_can_be_written_or_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(uncached, "__file__", "/proc/rodshell/uncached.py")
+    monkeypatch.setenv("HOME", "/proc/nobody")
+    monkeypatch.setattr(os, "access", lambda path, mode: str(path).startswith(str(tmp_path)))
+    assert not uncached.kernels_are_kept()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "made/later"))
+    assert uncached.kernels_are_kept()
+
+
+def test_warming_up_what_would_be_lost_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("rodshell.cli.warmup.kernels_are_kept", lambda: False)
+    assert main(["warmup"]) == 2
+    assert "would be lost: no folder" in capsys.readouterr().err
