@@ -64,7 +64,8 @@ def drape_table(draped: Draped) -> dict[str, Any]:
     if draped.rest is not None:
         drape["fall"] = asdict(draped.rest)
     if draped.own_ends is not None:
-        drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
+        off = np.abs(draped.own_ends)
+        drape["own_ends"] = {"max": float(off.max()), "median": float(np.median(off))}
     return drape
 
 
