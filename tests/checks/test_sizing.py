@@ -62,7 +62,7 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
         at = STOCK[material.name].index(section)  # type: ignore[index, arg-type]
         for thicker in STOCK[material.name][at + 1 : at + 2]:  # type: ignore[index]
             room = min(target.size / 100, min(layout.spacing) / 6)
-            assert used(thicker) > 0.4 or depth(thicker) > room
+            assert used(thicker) > 1 / 3 or depth(thicker) > room
 
 
 def depth_strain(section: Any, normal: Any, geodesic: Any) -> float:

@@ -98,8 +98,8 @@ def announce_rod(case: "Case", rod: "Rod", *, quiet: bool) -> None:
         from rodshell.output.result import rod_table
         from rodshell.output.summary import chosen, rod_text
 
-        table = rod_table(rod)
-        click.echo(f"rodshell: rod: {rod_text(table)}; {chosen(case.rod.left_open, table)}", err=True)
+        strength = case.checks.strength or (rod.material.bending_strength if rod.material else None)
+        click.echo(f"rodshell: rod: {rod_text(rod_table(rod))}; {chosen(case.rod.left_open, strength)}", err=True)
 
 
 def deliver(
