@@ -213,7 +213,7 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
 
 
 def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
-    """Distance [m] along each rod between its end and where this state crosses the target's end."""
+    """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
     windows, places = list[NDArray[np.intp]](), list[Floats]()
     for k, pieces in enumerate(cuts):
         s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
@@ -228,7 +228,8 @@ def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positio
     bend = np.zeros_like(slope)
     bent = x[2] > x[1]
     bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
-    return np.abs((f[0] - x[0] * slope + x[0] * x[1] * bend) / (slope - (x[0] + x[1]) * bend))
+    ahead = (f[0] - x[0] * slope + x[0] * x[1] * bend) / ((x[0] + x[1]) * bend - slope)
+    return ahead.reshape(-1, 2) * [-1.0, 1.0]
 
 
 def shape_of_net(net: ChebyshevNet) -> dict[str, object]:

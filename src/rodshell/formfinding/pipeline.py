@@ -12,6 +12,7 @@ from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import Method, drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.flatness import flat_warning
 from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.roll import roll
@@ -80,7 +81,8 @@ class FoundForm:
         wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
         off = _springs_off(self.agreement, advise=not (stretched or wide))
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
-        return (*self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
+        flat = flat_warning(self.trimmed.positions, self.rod)
+        return (*flat, *self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
 
 
 @dataclass(frozen=True)
