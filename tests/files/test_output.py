@@ -161,7 +161,7 @@ def test_opening_angle_of_skew_rods_is_that_of_their_directions(table_out: Path)
     for row in rows(table_out, "joints.csv"):
         a, b = (np.diff(lines[row[f"rod_{side}"]], axis=0)[0] for side in "ab")
         expected = np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b)))
-        assert float(row["flat_deg"]) == pytest.approx(expected, abs=1e-3)
+        assert float(row["flat_deg"]) == pytest.approx(expected, abs=6e-3)  # shown to 0.01 degrees
         assert row["final_state"] == "popped_pinned"
 
 
@@ -318,7 +318,7 @@ def test_report_gives_the_verdict_first(out: Path) -> None:
     assert "kind = &#34;hemisphere&#34;" in page
 
 
-def test_report_puts_failure_and_warnings_before_all(archive: Archive, tmp_path: Path) -> None:
+def test_report_puts_failure_and_then_warnings_once_before_all_else(archive: Archive, tmp_path: Path) -> None:
     shells = {
         "pinned": {"status": "stalled", "stable": False},
         "clamped": {"status": "converged", "stable": False, "negative_modes": 1},
@@ -327,7 +327,8 @@ def test_report_puts_failure_and_warnings_before_all(archive: Archive, tmp_path:
     result = {**archive.result, "status": "stalled", "pop_up": shells, **words}
     page = (write(replace(archive, result=result), tmp_path / "bad") / "report.html").read_text()
     assert "Converged and stable" not in page
-    assert page.index("&lt;script&gt;alert(1)") < page.index("Not converged: do not build") < page.index("<h2>")
+    assert page.index("Not converged: do not build") < page.index("&lt;script&gt;alert(1)") < page.index("<h2>")
+    assert page.count("&lt;script&gt;alert(1)") == 1
     assert "<script>alert" not in page
     assert "With clamped ends the shell would snap away from this unstable equilibrium (1 buckling mode)." in page
     assert "With pinned ends the shell stays" not in page  # a shell that did not converge has no gap
@@ -358,15 +359,15 @@ def test_least_result_is_written(tmp_path: Path) -> None:
     assert rows(out, "joints.csv")[0]["final_deg"] == ""
 
 
-def test_pictures_share_the_view_and_have_their_own_scale(archive: Archive) -> None:
-    """Ticks up to the next round number over the picture's own largest gap, of 0, 1.2 and 0.12 mm."""
+def test_pictures_share_the_view_and_the_scale(archive: Archive) -> None:
+    """Ticks up to the next round number over the largest gap of all, of 0, 1.2 and 0.12 mm; each says its own."""
     pictures = {state: picture_svg(archive, state) for state in ("draped", "popped_pinned", "popped_clamped")}
     boxes = {re.search(r'viewBox="[^"]+"', svg)[0] for svg in pictures.values()}
     assert len(boxes) == 1
-    for state, tick in (("draped", "0.001"), ("popped_pinned", "1"), ("popped_clamped", "0.1")):
+    for state in pictures:
         texts = [text.text for text in ET.fromstring(pictures[state]).iter(f"{SVG}text")]
         assert "gap to target in mm, + outside" in texts
-        assert {f"\N{MINUS SIGN}{tick}", "0", tick} <= set(texts[-6:])
+        assert {"\N{MINUS SIGN}1", "0", "1"} <= set(texts[-6:])
         assert ("\N{MINUS SIGN}1.2 mm" in texts) == (state == "popped_pinned")
     with pytest.raises(OutputError, match="popped_clamped"):
         picture_svg(archive, "popped")
