@@ -1,6 +1,5 @@
 """Processes that are killed: what they leave in a result folder that a user keeps files in, too."""
 
-import json
 import os
 import signal
 import subprocess
@@ -57,7 +56,7 @@ class Faults:
 def start(*arguments: str, folder: Path, token: str) -> "subprocess.Popen[str]":
     """A process of the command line that obeys Ctrl-C, as one in a terminal does."""
     return subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, *arguments, "--out", str(folder), "--quiet"],
+        [sys.executable, "-c", PROGRAM, *arguments, "--out", str(folder)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -66,32 +65,42 @@ def start(*arguments: str, folder: Path, token: str) -> "subprocess.Popen[str]":
     )
 
 
-def run(job: Job, options: tuple[str, ...], folder: Path) -> float:
-    """The job, whole; its seconds."""
-    begun = time.monotonic()
-    process = start(*job.arguments, *options, folder=folder, token="")
-    said = process.communicate()[1]
-    if process.returncode not in FOUND:
-        raise RuntimeError(f"{job.name} ended with {process.returncode}: {said}")
-    return time.monotonic() - begun
+def run(job: Job, options: tuple[str, ...], folder: Path) -> dict[str, float]:
+    """The job, whole; the seconds of each of its stages, of which "" is the start."""
+    process, lasted, stage, begun = start(*job.arguments, *options, folder=folder, token=""), {}, "", time.monotonic()
+    assert process.stderr is not None
+    for line in process.stderr:
+        lasted[stage] = time.monotonic() - begun
+        stage, begun = line.removeprefix("rodshell:").strip(), time.monotonic()
+    lasted[stage] = time.monotonic() - begun
+    if process.wait() not in FOUND:
+        raise RuntimeError(f"{job.name} ended with {process.returncode}: {stage}")
+    return {stage: seconds for stage, seconds in lasted.items() if not stage.startswith("NOT")}
 
 
-def kill(job: Job, folder: Path, how: signal.Signals, after: float, faults: Faults) -> str:
-    """Start the new job in the old one's folder and kill it; which result is there then."""
+def kill(job: Job, folder: Path, how: signal.Signals, stage: str, after: float, faults: Faults) -> str | None:
+    """Start the new job in the old one's folder and kill it so long after a stage began; which result is there then.
+
+    None where the job was over before.
+    """
     before, token = snapshot(folder), uuid.uuid4().hex
     process = start(*job.arguments, *job.new, folder=folder, token=token)
+    assert process.stderr is not None
+    for line in process.stderr if stage else ():
+        if line == f"rodshell: {stage}\n":
+            break
     time.sleep(after)
     process.send_signal(how)
     said = process.communicate(timeout=60)[1]
     seen = project(folder)
-    code, where = process.returncode, f"{job.name}, {how.name} after {after:.3f} s"
-    done = code in FOUND and seen == NEW
-    if not done and code != CODES[how]:
+    code, where = process.returncode, f"{job.name}, {how.name} {after:.3f} s into {stage or 'the start'}"
+    if code in FOUND and seen == NEW:
+        return None
+    words = said.splitlines()
+    spoken = words[-1:] == ["rodshell: interrupted"] and all(word.startswith("rodshell: ") for word in words)
+    if code != CODES[how] or not (spoken or how is signal.SIGKILL):
         faults.ends += 1
-        faults.notes.append(f"{where}: exit code {code}: {said}")
-    elif how is not signal.SIGKILL and not done and (said.count("\n") != 1 or "interrupted" not in said):
-        faults.ends += 1
-        faults.notes.append(f"{where}: said {said!r}")
+        faults.notes.append(f"{where}: exit code {code}, said {said!r}")
     if seen not in (OLD, NEW):
         faults.torn += 1
         faults.notes.append(f"{where}: {seen}")
@@ -157,9 +166,3 @@ def orphans(token: str) -> int:
         except OSError:
             continue
     return count
-
-
-def manifest_is_whole(folder: Path) -> bool:
-    """Whether every listed file is there as it was written."""
-    listed = json.loads((folder / "manifest.json").read_text())["files"]
-    return all(mark(folder, name) == entry for name, entry in listed.items())

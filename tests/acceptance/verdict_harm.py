@@ -29,8 +29,7 @@ from tests.acceptance.kills import (
 )  # fmt: skip
 from tests.acceptance.rows import Row
 
-KILLS = 20  # of each method; half of them spread over its time, half over that in which it writes
-WRITING = 0.45  # share of a small form's time from which it writes files
+KILLS = 20  # of each method
 SEED = 20261122
 
 
@@ -78,35 +77,35 @@ def foreign_rows(folder: Path) -> Iterator[Row]:
 
 
 def kill_rows(name: str, folder: Path) -> Iterator[Row]:
-    """KILL, TERM and INT in turn; after each the next run."""
+    """KILL, TERM and INT in turn, every other one while files are written; after each the next run."""
     job, faults, chance = JOBS[name], Faults(), random.Random(f"{SEED} {name}")
-    dome, pristine = folder / "dome", folder / "pristine"
+    dome, pristine = folder / "dome", folder / "kept/pristine"
     run(job, job.old, pristine)
     lay_foreign_files(pristine)
-    lasts = run(job, job.new, folder / "timed")
-    shutil.rmtree(folder / "timed")
-    (folder / "kept").mkdir()
-    pristine = pristine.rename(folder / "kept/pristine")
-    seen = {OLD: 0, NEW: 0}
-    for k in range(KILLS):
+    lasts = run(job, job.new, folder / "kept/timed")
+    seen, tries = {OLD: 0, NEW: 0}, 0
+    while sum(seen.values()) < KILLS and tries < 3 * KILLS:
         shutil.rmtree(dome, ignore_errors=True)
         shutil.copytree(pristine, dome)
-        how = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)[k % 3]
-        share = chance.uniform(0.02, 0.98) if k % 2 else chance.uniform(WRITING, 1.0)
-        found = kill(job, dome, how, share * lasts, faults)
+        how = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)[sum(seen.values()) % 3]
+        stage = "files" if tries % 2 else chance.choice(list(lasts))
+        tries += 1
+        found = kill(job, dome, how, stage, chance.random() * lasts[stage], faults)
+        if found is None:
+            continue
         seen[found] = seen.get(found, 0) + 1
         if ended("export", str(dome), "--only", "csv", "--quiet").returncode != 0 or project(dome) != found:
             faults.torn += 1
-            faults.notes.append(f"{how.name}: the next run does not find the same result")
+            faults.notes.append(f"{how.name} in {stage}: the next run does not find the same result")
         if left := left_over(dome):
             faults.left += 1
-            faults.notes.append(f"{how.name}: {left[:3]} left")
+            faults.notes.append(f"{how.name} in {stage}: {left[:3]} left")
         faults.foreign += foreign_touched(dome)
-    note = f"{seen[OLD]} old, {seen[NEW]} new"
     for word in faults.notes:
-        print("  ", word)
-    case = f"{KILLS} kills, {name}"
-    yield Row(case, "files of others touched", faults.foreign, 0, note=note)
+        print("  ", word, flush=True)
+    case, note = f"{KILLS} kills, {name}", f"{seen[OLD]} old, {seen[NEW]} new; {tries - KILLS} were over before"
+    yield Row(case, "kills that did not come in time", KILLS - sum(seen.values()), 0, note=note)
+    yield Row(case, "files of others touched", faults.foreign, 0)
     yield Row(case, "torn", faults.torn, 0)
     yield Row(case, "left over after the next run", faults.left, 0)
     yield Row(case, "wrong exit code, or not one line", faults.ends, 0)
