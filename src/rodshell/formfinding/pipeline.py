@@ -74,8 +74,9 @@ class FoundForm:
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
         stretched = _stretched(self.draped)
-        wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
-        off = _springs_off(self.agreement, advise=not (stretched or wide))
+        strong = self.draped.strong_bending
+        buckling = strong is not None and bool(strong.warnings)
+        off = _springs_off(self.agreement, advise=not (stretched or buckling))
         built = (*_crowded(self.draped), *(_long_tails(self.trimmed) if self.draped.converged else ()))
         return (*self.draped.warnings, *stretched, *built, *_popped_warnings(self.popped), *off)
 

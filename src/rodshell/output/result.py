@@ -57,8 +57,8 @@ def drape_table(draped: Draped) -> dict[str, Any]:
         drape["fall"] = asdict(draped.rest)
     if draped.eccentricity:
         drape["eccentricity"] = draped.eccentricity
-    if draped.sideways is not None:
-        drape["sideways"] = asdict(draped.sideways)
+    if draped.strong_bending is not None:
+        drape["strong_bending"] = asdict(draped.strong_bending)
     if draped.own_ends is not None:
         drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
     return drape
