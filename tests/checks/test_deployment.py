@@ -89,7 +89,7 @@ def test_a_pattern_serves_only_the_shell_that_it_is_of() -> None:
 
 def test_every_stage_of_laths_is_in_equilibrium_by_its_own_frames() -> None:
     """The gradient of the energy vanishes on all that is free, twist angles of the rods included."""
-    lath = rs.Rod(rs.RectangularSection(width=4e-3, height=1e-3), ROD.material)
+    lath = rs.Rod(rs.RectangularSection(width=2e-3, height=1e-3), ROD.material)
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.09, edge=0.03)
     form = rs.find_form(rs.Hemisphere(0.2), layout, lath, joint=rs.Pin(), ends=("pinned",))
     way = deployed(form)
@@ -98,7 +98,7 @@ def test_every_stage_of_laths_is_in_equilibrium_by_its_own_frames() -> None:
         gradient = np.zeros_like(state)
         energy = sum(one.evaluate(state, gradient) for one in (*shell.elements, shell.stretch))
         unbalanced = np.abs(shell.held_ends().reduce(gradient)).max() / (energy / 0.2)
-        assert unbalanced < 1e-8  # 7e-11 measured; 0.02 to 0.7 by the frames of the final shell
+        assert unbalanced < 1e-8  # 4e-10 measured; 0.002 to 1.5 by the frames of the final shell
 
 
 def energy_of(shell: Shell, state: np.ndarray) -> float:

@@ -8,7 +8,7 @@ from numpy.linalg import norm
 
 import rodshell as rs
 from rodshell.checks.bending import bending_of
-from rodshell.formfinding.thickness import sideways
+from rodshell.formfinding.thickness import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.vectors import unit
 from rodshell.nets.sphere import crossing_angle
@@ -179,7 +179,7 @@ def test_sideways_bending_of_a_lath_is_the_geodesic_curvature_of_the_spheres_net
     target, flat = TARGETS["hemisphere"], lath(4e-3)
     cut = rs.trim(rs.drape(rs.GridLayout.orthogonal(spacing=0.03, edge=0.0025), flat, target, joint=rs.Pin()))
     inner = np.abs(cut.mesh.stations[1:-1]).max() > 0  # all bends
-    bent = sideways(target, cut.mesh, cut.positions, np.full(len(cut.mesh.bends), inner), flat)
+    bent = strong_bending(target, cut.mesh, cut.positions, np.full(len(cut.mesh.bends), inner), flat)
     exact = max(abs(rod.offset / R**2 * crossing_angle(rod.offset * rod.end / R**2)[1]) for rod in cut.mesh.grid.rods)
     assert bent.curvature == pytest.approx(exact, rel=0.1)  # rods straighten at their ends
     ratio, spacing = bent.ratio, 0.03
@@ -195,7 +195,7 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
     target = rs.Cap(radius=2.0, base=1.0)
     rod = lath(height)
     draped = rs.drape(layout(0.3), rod, target, joint=rs.Pin())
-    assert (draped.sideways.moment > 1) == buckles
+    assert (draped.strong_bending.moment > 1) == buckles
     assert bool(draped.warnings) == buckles
     cut = rs.trim(draped)
     released = rs.Shell.of(cut.mesh, rod, joint=rs.Pin())
@@ -203,6 +203,17 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
     problem = Problem(released.elements, released.stretch, Supports(released.held_ends()), 2.0, places=released.places)
     counted = find_equilibrium(problem, state, np.zeros(len(cut.mesh.edges)), most_modes=0)
     assert (counted.report.status is Status.BUCKLED) == buckles
+
+
+def test_laths_on_edge_buckle_by_the_curvature_of_the_surface():
+    """The moment EI1/R about their strong axis, on the sphere."""
+    draped = rs.drape(layout(0.06), lath(1e-3, width=2e-3), TARGETS["hemisphere"], joint=rs.Pin())
+    bent, (strong, weak) = draped.strong_bending, lath(1e-3, width=2e-3).bend_stiffnesses
+    assert not bent.flat
+    assert bent.ratio == pytest.approx(4.0)
+    assert bent.curvature == pytest.approx(1 / R, rel=1e-2)  # chords of three nodes
+    critical = np.pi / 0.06 * np.sqrt(weak * lath(1e-3, width=2e-3).twist_stiffness)
+    assert bent.moment == pytest.approx(strong * bent.curvature / critical)
 
 
 def test_laths_that_buckle_everywhere_are_given_up_at_once_with_the_cause():

@@ -18,7 +18,6 @@ from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
@@ -29,7 +28,6 @@ from rodshell.solve.problem import Problem
 from rodshell.units import length_text, stress_text
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
-THIN = 0.05  # strain of the outermost fibre up to which rods are thin: radii of ten depths
 
 
 @dataclass(frozen=True)
@@ -62,81 +60,42 @@ class Checks:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
         late = (self.out_of_time,) if self.out_of_time else ()
-        way = (*late, *way, *unknown_weights(self.self_weight), *self.touching)
-        bends = [
-            float(bent.bending_strain.max())
-            for bent in (*self.bending.values(), *self.on_the_way)
-            if bent.bending_strain is not None
-        ]
-        if max(bends, default=0.0) <= THIN:
-            return way
-        return (
-            *way,
-            f"bending strains the rods by {100 * max(bends):.2g} %: they are too thick for their bends, the theory of "
-            f"thin rods holds up to {100 * THIN:.0f} % or so; use thinner rods or a larger target",
-        )
+        return (*late, *way, *unknown_weights(self.self_weight), *self.tight)
+
+    @property
+    def before_the_end(self) -> tuple[tuple[float, Bending], ...]:
+        """Stages of the deployment below the final shape, with their shares."""
+        shares = () if self.deployment is None else self.deployment.share.tolist()
+        return tuple((share, bent) for share, bent in zip(shares, self.on_the_way, strict=True) if share < 1)
 
     @property
     def nearest_on_the_way(self) -> tuple[float, Contact] | None:
-        """The stage of the deployment in which rods are nearest, by its share; None where nothing was checked."""
+        """The stage below the final shape in which rods are nearest, by its share; None where nothing was checked."""
         if self.deployment is None or not self.contact_on_the_way:
             return None
-        pairs = zip(self.deployment.share.tolist(), self.contact_on_the_way, strict=True)
+        pairs = zip(self.deployment.share.tolist()[:-1], self.contact_on_the_way[:-1], strict=True)
         return min(pairs, key=lambda pair: inf if pair[1].clearance is None else pair[1].clearance)
 
     @property
-    def touching(self) -> tuple[str, ...]:
-        """A sentence where rods touch, or come so near to each other that there is no room for joints."""
+    def tight(self) -> tuple[str, ...]:
+        """A sentence where rods that do not touch come so near to each other that there is no room for joints."""
         shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
-        if (nearest := self.nearest_on_the_way) is not None and nearest[0] < 1:
+        if (nearest := self.nearest_on_the_way) is not None:
             share, found = nearest
             shapes.append((found, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid"))
         near = [(found, where) for found, where in shapes if found.clearance is not None]
-        if not near:
+        if not near or any(found.pairs for found, _ in near):
             return ()
         worst, where = min(near, key=lambda pair: pair[0].clearance or 0.0)
         assert worst.clearance is not None
         assert worst.rods is not None
         assert worst.where is not None
-        place = "({:.4g}, {:.4g}, {:.4g}) m".format(*worst.where)
         who = f"rods {worst.rods[0]} and {worst.rods[1]}" if worst.rods[0] != worst.rods[1] else f"rod {worst.rods[0]}"
-        remedy = "use thinner rods (rod.section) or a larger spacing"
-        if not worst.pairs:
-            return (
-                f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near {place}: that "
-                f"leaves hardly any room for joints; {remedy}",
-            )
-        does = "overlap" if who.startswith("rods") else "runs into itself"
-        count = f" (the worst of {worst.pairs} pairs that touch)" if worst.pairs > 1 else ""
         return (
-            f"{who} {does} by {length_text(-worst.clearance)} {where}, near {place}{count}: rods cannot run through "
-            f"each other; {remedy}",
+            f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near "
+            f"({worst.where[0]:.4g}, {worst.where[1]:.4g}, {worst.where[2]:.4g}) m: that leaves hardly any room for "
+            "joints; use thinner rods (rod.section) or a larger spacing",
         )
-
-    def overstress(self, strength: float | None, mesh: GridMesh) -> tuple[str, ...]:
-        """A sentence where the rods would break, in a final shape or on the way up, with the place and with torsion.
-
-        strength : of the rods' material [Pa], or None.
-        """
-        if strength is None:
-            return ()
-        shares = () if self.deployment is None else self.deployment.share
-        final = [(_worst(bent) / strength, f"with {ends} ends", bent) for ends, bent in self.bending.items()]
-        way = [
-            (_worst(bent) / strength, f"on the way up (stage at {100 * share:.0f} %)", bent)
-            for share, bent in zip(shares, self.on_the_way, strict=True)
-            if share < 1
-        ]
-        worst = [max(each, key=lambda one: one[0]) for each in (final, way) if each]
-        broken = sorted((one for one in worst if one[0] > 1), key=lambda one: -one[0])
-        if not broken:
-            return ()
-        found = ", ".join(
-            f"{max(101, round(100 * used))} % of the strength {where} in {_most_stressed(bent, mesh)}"
-            for used, where, bent in broken
-        )
-        only = "" if any(one[0] > 1 for one in final) else ", or close the joints near that place last"
-        return (f"the rods would break: {found}; use thinner, softer or stronger rods, or a flatter target{only}",)
 
     def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
         """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
@@ -231,23 +190,6 @@ def _deployed(last: Popped, found: Equilibrium, stages: int, progress: Progress)
         last.shell, last.state, last.forces, stages=stages, pattern=found.pattern,
         told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
     )  # fmt: skip
-
-
-def _worst(bent: Bending) -> float:
-    return 0.0 if bent.stress is None else float(bent.stress.max())
-
-
-def _most_stressed(bent: Bending, mesh: GridMesh) -> str:
-    """The rod, how far along it, and how much of it is torsion."""
-    assert bent.stress is not None
-    assert bent.torsion_stress is not None
-    at = int(np.argmax(bent.stress))
-    rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
-    sheared = float(bent.torsion_stress[at])
-    torsion = (
-        f" (with a shear stress of {stress_text(sheared)} of torsion)" if sheared > WORTH * bent.stress[at] else ""
-    )
-    return f"{rod.name}, {length_text(float(mesh.stations[at]) - rod.start)} from its start{torsion}"
 
 
 def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:

@@ -26,9 +26,9 @@ class JoinedChecks(Checks):
             f"patch {name}: {word}"
             for name, one in self.named.items()
             for word in one.warnings
-            if word not in one.touching
+            if word not in one.tight
         ]
-        return (*words, *self.touching)
+        return (*words, *self.tight)
 
 
 def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> JoinedChecks:

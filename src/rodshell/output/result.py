@@ -65,8 +65,8 @@ def drape_table(draped: Draped) -> dict[str, Any]:
         drape["fall"] = asdict(draped.rest)
     if draped.eccentricity:
         drape["eccentricity"] = draped.eccentricity
-    if draped.sideways is not None:
-        drape["sideways"] = asdict(draped.sideways)
+    if draped.strong_bending is not None:
+        drape["strong_bending"] = asdict(draped.strong_bending)
     if draped.own_ends is not None:
         off = np.abs(draped.own_ends)
         drape["own_ends"] = {"max": float(off.max()), "median": float(np.median(off))}
