@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import rodshell as rs
+from rodshell.checks import self_weight, settled_shell
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.families import LEAVE_OUT, choose_families
-from rodshell.checks import self_weight, settled_shell
 from rodshell.formfinding.patches import carried_heading, patches_of
 from rodshell.formfinding.seams import End, in_a_row
 from rodshell.layout.side_by_side import side_by_side
