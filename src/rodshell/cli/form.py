@@ -10,7 +10,6 @@ from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
 from rodshell.cli.outcome import Kept, deliver, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
-from rodshell.output.inputs import read_inputs
 from rodshell.units import length_text
 
 if TYPE_CHECKING:
@@ -49,6 +48,8 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
     folder = output_folder(out, name)
     if case.seams.lines:
         return _sew(case, folder, only=only, as_json=as_json, quiet=quiet)
+    from rodshell.output.inputs import read_inputs
+
     target, layout, rod, options = case.build()
     asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
@@ -74,6 +75,8 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, as_json: bo
 
 def _sew(case: Case, folder: Path, *, only: str | None, as_json: bool, quiet: bool) -> int:
     """Find the form of a case with seams and write it; the exit code."""
+    from rodshell.output.inputs import read_inputs
+
     target, layout, rod, options = case.build_sewn()
     asked, case, inputs = case, case.sized(target), read_inputs(case.to_toml())
     takeaway, kinds = case.takeaway(), wanted_kinds(only)
