@@ -42,6 +42,7 @@ def summary_text(result: dict[str, Any]) -> str:
             line += f"rms {_mm(gap['rms'])} ({percent(gap['rms_relative'])})"
         lines.append(line)
     lines += _checked(result)
+    lines += _paths(result)
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
     if len(result["dropped"]) > 6:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
@@ -99,6 +100,27 @@ def _checked(result: dict[str, Any]) -> list[str]:
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
         lines.append(f"  reactions {ends:<8}largest {rounded(held['largest_force'])} N; sums of {sums}")
     return lines
+
+
+def _paths(result: dict[str, Any]) -> Iterator[str]:
+    """Whether the shell is reached from flat, and what other shapes it has."""
+    way = result.get("deployment") or {}
+    if "reached_from_flat" in way:
+        snaps = f", snapping at {', '.join(stage(low) for low, _ in way['snaps'])}" if way["snaps"] else ""
+        words = {True: f"reached{snaps}", False: "ends in another shape", None: "not known whether it is reached"}
+        yield f"  from flat {way['ends']:<8}{words[way['reached_from_flat']]}"
+    for ends, searched in (result.get("other_shapes") or {}).items():
+        others = [one for one in searched["found"] if not one["mirror"]]
+        found = ["its mirror image"] if len(others) < len(searched["found"]) else []
+        if others:
+            near = min(others, key=lambda one: float(one["distance"]))
+            found.append(
+                f"{len(others)} other stable shape{'s' if len(others) > 1 else ''}, the nearest "
+                f"{percent(near['distance'])} of half its width away at {rounded(near['energy'])} times the energy"
+            )
+        elif searched["tried"]:
+            found.append("no other stable shape found")
+        yield f"  shapes    {ends:<8}{'; '.join([*found, searched['searched']])}"
 
 
 def _mm(metres: float) -> str:

@@ -150,7 +150,9 @@ def _figures(shape: Elsewhere | OtherShape) -> dict[str, Any]:
 
 
 def _other_shapes(searched: OtherShapes) -> dict[str, Any]:
-    return {"tried": searched.tried, "searched": searched.searched, "found": [_figures(one) for one in searched.found]}
+    found = [_figures(one) for one in searched.found]
+    looked = {"popped_through": searched.popped_through, "largest_kick": searched.largest_kick}
+    return {"tried": searched.tried, "searched": searched.searched, **looked, "found": found}
 
 
 def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) -> dict[str, Any]:
