@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rodshell.checks.bending import Bending, bending, bending_of
+from rodshell.checks.clamping import reached_by_turning
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
@@ -33,6 +34,8 @@ class Checks:
     bending, reactions, joints : by end condition.
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
     other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
+    clamped_from_flat : whether the pinned shell, reached from flat, comes to the clamped shape when its ends are
+        turned into their clamps; None where that is not known.
     """
 
     bending: dict[Ends, Bending]
@@ -41,11 +44,17 @@ class Checks:
     deployment: Deployment | None
     on_the_way: tuple[Bending, ...]
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
+    clamped_from_flat: bool | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
+        if self.clamped_from_flat is False:
+            way = (
+                *way,
+                "turned into their clamps after deployment, the ends lead to another than the clamped shape",
+            )
         bends = [
             float((bent.strain - np.abs(bent.axial_strain)).max())
             for bent in (*self.bending.values(), *self.on_the_way)
@@ -104,7 +113,10 @@ def check(popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, progress:
     )  # fmt: skip
     flat = bending(last.footprint.mesh, deployment.positions[0], rod)
     on_the_way = (flat, *(bending_of(shell, state, rod) for shell, state in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, _others(popped, settled, deployment))
+    others, turned = _others(popped, settled, deployment), None
+    if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
+        turned = reached_by_turning(last, done["clamped"])
+    return Checks(bent, held, carried, deployment, on_the_way, others, turned)
 
 
 def _others(

@@ -37,20 +37,19 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     others = {end: _searched([part.other_shapes[end] for part in parts if end in part.other_shapes]) for end in ends}
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), others, named)
+        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), others, None, named)
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(
         _stacked([part.on_the_way[row[k]] for part, row in zip(parts, rows, strict=True)]) for k in range(len(shared))
     )
-    way = _joined_ways(ways, rows)
-    return JoinedChecks(each("bending"), each("reactions"), each("joints"), way, bent, others, named)
+    way, turned = _joined_ways(ways, rows), _all([part.clamped_from_flat for part in parts])
+    return JoinedChecks(each("bending"), each("reactions"), each("joints"), way, bent, others, turned, named)
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
     """The ways up of several shells at the shares that all reached, their `rows`."""
     lost = [one.lost_at for one in ways if one.lost_at is not None]
-    reached = [one.reached_from_flat for one in ways]
     elsewhere = [one.elsewhere for one in ways if one.elsewhere is not None]
     return Deployment(
         ways[0].share[rows[0]],
@@ -58,11 +57,16 @@ def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deplo
         (),
         tuple(sorted({snap for one in ways for snap in one.snaps}, key=lambda snap: snap.start)),
         max(lost, default=None),
-        False if False in reached else None if None in reached else True,
+        _all([one.reached_from_flat for one in ways]),
         max(elsewhere, key=lambda one: one.distance, default=None),
         max((one.guided for one in ways if one.guided is not None), default=None),
         sum(one.factorizations for one in ways),
     )
+
+
+def _all(answers: Sequence[bool | None]) -> bool | None:
+    """Whether all are true; None where that is not known."""
+    return False if False in answers else None if None in answers else True
 
 
 def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:

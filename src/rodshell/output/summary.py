@@ -109,6 +109,8 @@ def _paths(result: dict[str, Any]) -> Iterator[str]:
         snaps = f", snapping at {', '.join(stage(low) for low, _ in way['snaps'])}" if way["snaps"] else ""
         words = {True: f"reached{snaps}", False: "ends in another shape", None: "not known whether it is reached"}
         yield f"  from flat {way['ends']:<8}{words[way['reached_from_flat']]}"
+        if way.get("clamped", {}).get("reached_from_flat"):
+            yield "  from flat clamped reached: the ends are turned into their clamps after the deployment"
     for ends, searched in (result.get("other_shapes") or {}).items():
         others = [one for one in searched["found"] if not one["mirror"]]
         found = ["its mirror image"] if len(others) < len(searched["found"]) else []

@@ -141,6 +141,7 @@ def _deployment(checks: Checks) -> dict[str, Any]:
         "reached_from_flat": way.reached_from_flat,
         "elsewhere": None if way.elsewhere is None else _figures(way.elsewhere),
         "guided": None if way.guided is None else list(way.guided),
+        "clamped": {"reached_from_flat": checks.clamped_from_flat},
     }
 
 
