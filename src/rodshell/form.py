@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.case.of import case_text
-from rodshell.checks import Checks, check
+from rodshell.checks import Checks, Contact, check
+from rodshell.checks.contact import contact_of_patches
 from rodshell.checks.joined import joined_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import fabricate
@@ -160,11 +161,17 @@ class Sewn(_Judged, SewnForm):
                     stages=takeaway.stages, shear_weight=weight, progress=progress,
                 )
                 for name, one in self.found.items()
-            }
+            },
+            {ends: self._contact(ends) for ends in self.popped},
         )  # fmt: skip
         result = with_seam_forces(self.result(), self, checks)
         shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
         return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway, inputs)
+
+    def _contact(self, ends: Ends) -> Contact:
+        """Of all patches."""
+        popped = [one.popped[ends] for one in self.found.values()]
+        return contact_of_patches(self.flat.mesh, [(one.shell, one.state) for one in popped], self.rod)
 
     def save(
         self,

@@ -8,6 +8,7 @@ import rodshell as rs
 from rodshell.checks import Reactions, SelfWeight, reactions, self_weight, settled_shell
 from tests.acceptance.cases import HEMISPHERE, ROD
 from tests.acceptance.rows import Row
+from tests.acceptance.targets_random import random_case
 from tests.parity.loaded_twin import LoadedTwin
 
 STEEL = rs.Rod(rs.Circle(radius=5e-4), rs.Material(210e9, 7850, 0.3))
@@ -22,6 +23,7 @@ FORMS: dict[str, tuple[rs.Target, dict[str, object], rs.Rod]] = {
     "oval turned by 0.4": (rs.Ellipsoid(a=0.2, b=0.15, c=0.12), {"spacing": 0.03, "edge": 0.015, "rotate": 0.4}, ROD),
 }
 BOUNDS = {"pinned": (0.02, 0.031), "clamped": (0.04, 0.062)}  # of the first, by another code
+RANDOM = ((1, "pinned"), (9, "clamped"), (23, "pinned"))  # targets whose shells snap from one stable state to the next
 HIGH = 1e4  # factor up to which springs are followed; result.json stops at 100
 FACTORISATIONS = 15
 
@@ -39,6 +41,11 @@ def rows() -> Iterator[Row]:
                 yield Row(f"{name}, {ends}", "load factor on the own weight", weighed.at_least, high)
                 yield Row(f"{name}, {ends}", "the same, at least", -weighed.at_least, -low)
             yield from _loaded(f"{name}, {ends}", twin, weighed)
+            yield Row(f"{name}, {ends}", "factorisations", weighed.factorizations, FACTORISATIONS)
+    for seed, held_by in RANDOM:
+        _, target, layout, anchor = random_case(seed)
+        popped = rs.find_form(target, layout, ROD, anchor=anchor).popped[held_by]  # type: ignore[index]
+        yield from _loaded(f"random {seed}, {held_by}", LoadedTwin(popped, ROD), self_weight(*settled_shell(popped)))
 
 
 def _unloaded(case: str, twin: LoadedTwin, held: Reactions, negative_modes: int) -> Iterator[Row]:
@@ -61,4 +68,3 @@ def _loaded(case: str, twin: LoadedTwin, weighed: SelfWeight) -> Iterator[Row]:
         yield Row(
             case, "deflections at 1 g apart", abs(weighed.deflection / sunk - 1), 0.01, note=f"{1e3 * sunk:.4g} mm"
         )
-    yield Row(case, "factorisations", weighed.factorizations, FACTORISATIONS)

@@ -44,9 +44,7 @@ def test_joint_spacing_is_equal_along_the_rods_of_both_layers(name):
     for points, axis, s in ((below, 0, net.net.u), (above, 1, net.net.v)):
         chords = np.linalg.norm(np.diff(points, axis=axis), axis=2)
         steps = np.diff(s)[:, None] if axis == 0 else np.diff(s)
-        assert (
-            np.nanmax(np.abs(chords / steps - 1)) < 1e-10
-        )  # the chords of the target itself are off by up to 0.3 to 3 %
+        assert np.nanmax(np.abs(chords / steps - 1)) < 1e-10  # those of the target are off by up to 0.3 to 3 %
     apart = np.linalg.norm(above - below, axis=2)
     assert np.nanmax(np.abs(apart - 4e-3)) < 1e-12
 

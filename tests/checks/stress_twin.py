@@ -9,6 +9,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
 import rodshell as rs
+from rodshell.joints import Joint
 from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist
 
@@ -97,3 +98,39 @@ def _bend(te: Floats, tf: Floats, me: Floats, mf: Floats) -> tuple[Floats, float
     m1 = Rotation.from_rotvec(0.5 * twist * middle).apply(Rotation.from_rotvec(turn.as_rotvec() / 2).apply(me))
     towards = 2 * np.tan(phi / 2) * np.cross(axis / max(sine, 1e-300), middle)
     return np.array([towards @ m1, towards @ np.cross(middle, m1)]), twist
+
+
+def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
+    """Of the segments ab and cd: the least over both ends of each against the other, and over the lines' own."""
+
+    def to_segment(p: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
+        share = np.clip((p - x) @ (y - x) / ((y - x) @ (y - x)), 0, 1)
+        return float(np.linalg.norm(p - x - share * (y - x)))
+
+    found = [to_segment(p, c, d) for p in (a, b)] + [to_segment(p, a, b) for p in (c, d)]
+    u, v = b - a, d - c
+    shares, _, rank, _ = np.linalg.lstsq(np.column_stack([u, -v]), c - a, rcond=1e-9)
+    if rank == 2 and (shares >= 0).all() and (shares <= 1).all():
+        found.append(float(np.linalg.norm(a + shares[0] * u - c - shares[1] * v)))
+    return min(found)
+
+
+@cache
+def twisted_shells() -> dict[str, tuple[rs.Rod, rs.Form]]:
+    """Coarse shells whose rods are twisted, by joints or by their two stiffnesses."""
+    timber = rs.Material(youngs_modulus=1.1e10, density=450, shear=6.9e8)
+    glass = rs.Material(youngs_modulus=2.5e10, density=1900, poisson_ratio=0.3)
+    saddle = rs.HeightField(formula="(x^2 - y^2)/0.8", domain=rs.Disc(0.2))
+    ellipsoid = rs.Ellipsoid(a=0.2, b=0.15, c=0.12)
+    cases: dict[str, tuple[rs.Target, rs.Rod, Joint]] = {
+        "laths with pins": (rs.Hemisphere(0.2), rs.Rod(rs.RectangularSection(1e-3, 2e-3), timber), rs.Pin()),
+        "laths with balls": (ellipsoid, rs.Rod(rs.RectangularSection(1e-3, 2e-3), timber), rs.Ball()),
+        "tubes with pins": (ellipsoid, rs.Rod(rs.Tube(1e-3, 3e-4), glass), rs.Pin()),
+        "ellipses with pins": (saddle, rs.Rod(rs.Ellipse(5e-4, 1e-3), glass), rs.Pin()),
+        "square battens with pins": (ellipsoid, rs.Rod(rs.RectangularSection(1e-3, 1e-3), timber), rs.Pin()),
+    }
+    layout = rs.GridLayout.orthogonal(spacing=0.06, edge=0.012)
+    return {
+        name: (rod, rs.find_form(target, layout, rod, joint=joint, ends=("pinned",)))
+        for name, (target, rod, joint) in cases.items()
+    }

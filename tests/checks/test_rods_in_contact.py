@@ -6,33 +6,28 @@ from itertools import combinations
 import numpy as np
 import pytest
 from shells import dome
+from stress_twin import distance
 from test_bending import rods_of_length
 
 import rodshell as rs
-from rodshell.checks import Contact, check, contact, contact_of
-from rodshell.checks.contact import _Edges, _Outline, joined_contact, nearest_points
+from rodshell.checks import Contact, check, contact_of
+from rodshell.checks.contact import (
+    _crossing_lines,
+    _Edges,
+    _Outline,
+    contact,
+    contact_of_patches,
+    joined_contact,
+    nearest_points,
+)
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
+from rodshell.layout.side_by_side import side_by_side as side_by_side_meshes
 
 MATERIAL = rs.Material(youngs_modulus=1e9, density=1e3)
 
 
 def round_rod(radius: float) -> rs.Rod:
     return rs.Rod(rs.Circle(radius), MATERIAL)
-
-
-def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
-    """Of the segments ab and cd: the least over both ends of each against the other, and over the lines' own."""
-
-    def to_segment(p: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
-        share = np.clip((p - x) @ (y - x) / ((y - x) @ (y - x)), 0, 1)
-        return float(np.linalg.norm(p - x - share * (y - x)))
-
-    found = [to_segment(p, c, d) for p in (a, b)] + [to_segment(p, a, b) for p in (c, d)]
-    u, v = b - a, d - c
-    shares, _, rank, _ = np.linalg.lstsq(np.column_stack([u, -v]), c - a, rcond=1e-9)
-    if rank == 2 and (shares >= 0).all() and (shares <= 1).all():
-        found.append(float(np.linalg.norm(a + shares[0] * u - c - shares[1] * v)))
-    return min(found)
 
 
 def test_nearest_points_of_segments_are_the_nearest() -> None:
@@ -236,7 +231,8 @@ def test_the_work_grows_with_the_rods_not_with_their_square() -> None:
         rods = [FlatRod.u(f"U{k}", y, 0.0, 0.1 * size) for k, y in enumerate(offsets)]
         rods += [FlatRod.v(f"V{k}", x, 0.0, 0.1 * size) for k, x in enumerate(offsets)]
         mesh = mesh_grid(FlatGrid.of(rods), 0.02)
-        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], _Outline(0.024, 0.024, False), None)
+        outline = _Outline(0.024, 0.024, False)
+        edges = _Edges(mesh, mesh.flat[mesh.rod_nodes], outline, None, _crossing_lines(rods, outline))
         counts.append(len(edges.candidates()[0]) / len(mesh.edges))
     assert counts[2] < 1.2 * counts[1] < 1.5 * counts[0]
 
@@ -253,7 +249,7 @@ def test_every_shape_is_checked_and_the_nearest_rods_are_named() -> None:
     worst = min(checks.contact.values(), key=lambda found: found.clearance or 0.0)
     assert worst.rods is not None
     assert words.startswith(f"rods {worst.rods[0]} and {worst.rods[1]} overlap by ")
-    assert f"of {worst.pairs} pairs" in words
+    assert f"the worst of {worst.pairs} pairs" in words
     assert words in checks.warnings
     wider = check(dome().popped, round_rod(0.035), stages=2)
     assert wider.contact_on_the_way[0].pairs == 12
@@ -281,3 +277,53 @@ def test_a_section_without_an_outline_is_not_judged() -> None:
     boxed = rs.Rod(rs.GivenSection(**given, fibre_distances=(0.01, 0.02)))
     found = contact(mesh, places, boxed, directors=np.tile([0.0, 0.0, 1.0], (len(mesh.edges), 1)))
     assert found.clearance == pytest.approx(-0.02)  # the least way out is up
+
+
+def test_rods_of_two_patches_that_meet_at_a_seam_are_no_contact_and_others_are() -> None:
+    """Two strips side by side whose U rods end together on the seam at y = 0.3, at angles; then one moved over."""
+    rods = [FlatRod.v(f"V{k}", 0.1 * k, 0.0, 0.3) for k in range(4)]
+    meshes = {"A": mesh_grid(FlatGrid.of(rods), 0.02), "B": mesh_grid(FlatGrid.of(rods), 0.02)}
+    joined = side_by_side_meshes(meshes, 0.2).mesh
+    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
+    flat = [mesh.flat.copy() for mesh in meshes.values()]
+    there = flat[1] + [0.0, 0.3, 0.0]
+    there[:, 2] = 0.4 * flat[1][:, 1]  # a ridge at the seam
+    met = contact_of_patches(joined, list(zip(shells, (flat[0], there), strict=True)), round_rod(5e-3))
+    assert met == Contact()
+    moved = there + [0.03, -0.05, 0.0]  # past the seam, between the others
+    beside = contact_of_patches(joined, list(zip(shells, (flat[0], moved), strict=True)), round_rod(1.4e-2))
+    assert beside.clearance == pytest.approx(0.03 - 0.028, abs=1e-3)
+    assert beside.rods is not None
+    assert {name[0] for name in beside.rods} == {"A", "B"}
+    through = there + [0.0, -0.05, -0.02]
+    crossing = contact_of_patches(joined, list(zip(shells, (flat[0], through), strict=True)), round_rod(5e-3))
+    assert crossing.pairs == 4
+    assert crossing.clearance == pytest.approx(-0.01)
+
+
+def test_rods_that_meet_at_both_their_ends_are_no_contact() -> None:
+    """Of two patches each has one arch; they stand on the same points and lean apart."""
+    rods = [FlatRod.u("U1", 0.0, 0.0, 0.5)]
+    meshes = {"A": mesh_grid(FlatGrid.of(rods), 0.01), "B": mesh_grid(FlatGrid.of(rods), 0.01)}
+    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
+    arch = meshes["A"].flat.copy()
+    height = 0.6 * arch[:, 0] * (0.5 - arch[:, 0]) / 0.5
+    arch[:, 1:] = height[:, None] * [-1.0, 1.0]
+    other = arch * [1.0, -1.0, 1.0]
+    joined = side_by_side_meshes(meshes, 0.2).mesh
+    assert contact_of_patches(joined, list(zip(shells, (arch, other), strict=True)), round_rod(5e-3)) == Contact()
+
+
+def test_fine_meshes_of_thick_rods_find_what_coarse_ones_do() -> None:
+    """Edges a twentieth of the thickness are taken together: fewer pairs, and the same clearance to its sag."""
+    found, sizes, outline = [], [], _Outline(0.02, 0.02, False)
+    for edge in (0.02, 0.002):
+        mesh = rods_of_length(0.5, 0.5, edge=edge)
+        t = mesh.stations / 0.4
+        places = np.column_stack([0.4 * np.sin(t), 0 * t, 0.4 * np.cos(t)])
+        places[mesh.rod_slice(1), 1] = 0.05 + 0.1 * (t[mesh.rod_slice(1)] - 0.6) ** 2
+        found.append(contact(mesh, places, round_rod(0.02)))
+        sizes.append(len(_Edges(mesh, places, outline, None, _crossing_lines(mesh.grid.rods, outline)).rods))
+    assert sizes[1] < 3 * sizes[0]
+    assert found[0].clearance == pytest.approx(0.01, abs=2e-4)
+    assert found[1].clearance == pytest.approx(0.01, abs=2e-4)

@@ -1,10 +1,8 @@
 """Stress with torsion, against closed forms, tables and the section twin; curvature in parts, against helices."""
 
-from functools import cache
-
 import numpy as np
 import pytest
-from stress_twin import largest, shear_field, stresses
+from stress_twin import largest, shear_field, stresses, twisted_shells
 from test_bending import ROD, laid, rods_of_length
 
 import rodshell as rs
@@ -155,7 +153,7 @@ def test_a_lath_laid_on_a_cylinder_at_45_degrees_bends_and_twists_by_half_the_cy
 
 def test_the_torsion_of_round_rods_is_constant_from_joint_to_joint() -> None:
     """Straight rods that bend alike all ways take no torque between their joints: the twist moment cannot change."""
-    rod, form = shells()["tubes with pins"]
+    rod, form = twisted_shells()["tubes with pins"]
     popped, mesh = form.popped["pinned"], form.footprint.mesh
     bent = bending_of(popped.shell, popped.state, rod)
     joints = np.isin(mesh.rod_nodes, mesh.joint_nodes)
@@ -183,30 +181,9 @@ def test_ball_joints_twist_no_round_rods() -> None:
     np.testing.assert_allclose(np.median(np.abs(bent.normal_curvature)), 5.0, rtol=2e-2)
 
 
-@cache
-def shells() -> dict[str, tuple[rs.Rod, rs.Form]]:
-    """Coarse shells whose rods are twisted, by joints or by their two stiffnesses."""
-    timber = rs.Material(youngs_modulus=1.1e10, density=450, shear=6.9e8)
-    glass = rs.Material(youngs_modulus=2.5e10, density=1900, poisson_ratio=0.3)
-    saddle = rs.HeightField(formula="(x^2 - y^2)/0.8", domain=rs.Disc(0.2))
-    ellipsoid = rs.Ellipsoid(a=0.2, b=0.15, c=0.12)
-    cases: dict[str, tuple[rs.Target, rs.Rod, Joint]] = {
-        "laths with pins": (rs.Hemisphere(0.2), rs.Rod(rs.RectangularSection(1e-3, 2e-3), timber), rs.Pin()),
-        "laths with balls": (ellipsoid, rs.Rod(rs.RectangularSection(1e-3, 2e-3), timber), rs.Ball()),
-        "tubes with pins": (ellipsoid, rs.Rod(rs.Tube(1e-3, 3e-4), glass), rs.Pin()),
-        "ellipses with pins": (saddle, rs.Rod(rs.Ellipse(5e-4, 1e-3), glass), rs.Pin()),
-        "square battens with pins": (ellipsoid, rs.Rod(rs.RectangularSection(1e-3, 1e-3), timber), rs.Pin()),
-    }
-    layout = rs.GridLayout.orthogonal(spacing=0.06, edge=0.012)
-    return {
-        name: (rod, rs.find_form(target, layout, rod, joint=joint, ends=("pinned",)))
-        for name, (target, rod, joint) in cases.items()
-    }
-
-
-@pytest.mark.parametrize("name", ["laths with pins", "square battens with pins"])
+@pytest.mark.parametrize("name", ["laths with pins", "tubes with pins", "square battens with pins"])
 def test_stress_of_a_shell_is_that_of_the_twin(name: str) -> None:
-    rod, form = shells()[name]
+    rod, form = twisted_shells()[name]
     popped = form.popped["pinned"]
     assert popped.report.converged
     bent = bending_of(popped.shell, popped.state, rod)
@@ -215,6 +192,18 @@ def test_stress_of_a_shell_is_that_of_the_twin(name: str) -> None:
     assert bent.torsion_stress is not None
     assert bent.torsion_stress.max() > 0.01 * bent.stress.max()
     np.testing.assert_allclose(bent.stress, expected, atol=5e-3 * expected.max())
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 2e-3])
+def test_rods_a_distance_apart_are_bent_along_their_own_lines(eccentricity: float) -> None:
+    """On a sphere rods of two layers have its curvature, by their distance from its middle; not a zigzag at joints."""
+    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.015)
+    form = rs.find_form(rs.Hemisphere(0.2), layout, ROD, ends=())
+    mesh, x = form.footprint.mesh, form.trimmed.positions
+    shell = rs.Shell.of(mesh, ROD, joint=rs.Pin(eccentricity=eccentricity))
+    bent = bending_of(shell, shell.state(x, None, x / 0.2), ROD)
+    straight = bending_of(rs.Shell.of(mesh, ROD), x, ROD)
+    np.testing.assert_allclose(bent.curvature, straight.curvature, atol=0.01 * 5 + 0.02 * 5 * (eccentricity > 0))
 
 
 GIVEN = {"EA": 1e5, "EI1": 1.0, "EI2": 1.0, "GJ": 0.7}

@@ -24,7 +24,7 @@ from rodshell.output import Archive
 from rodshell.output.archive import export
 from rodshell.output.drawing import LAYERS, Drawing, Pencil, Text
 from rodshell.output.drawing import Path as Line
-from rodshell.output.drawings import drawing_set, sheet_set
+from rodshell.output.drawings import FINER, drawing_set, sheet_set
 from rodshell.output.drawings.bracing import bracing_drawing
 from rodshell.output.drawings.final import elevations_drawing
 from rodshell.output.drawings.flat import diagonals, flat_drawing
@@ -33,6 +33,7 @@ from rodshell.output.dxf import drawing_dxf
 from rodshell.output.labels import boxes_meet, lines_meet, spread
 from rodshell.output.plan import flat_plan
 from rodshell.output.rods import joint_places, rods_of
+from rodshell.output.rounding import rounding_of
 from rodshell.output.schedules import rods_table
 from rodshell.output.takeaway import DrawingStyle, Takeaway
 
@@ -114,7 +115,7 @@ def test_pdf_is_true_to_scale(tmp_path: Path) -> None:
     assert page.startswith("2.834646 0 0 2.834646 0 0 cm")  # so that what follows is in mm
     lines = re.findall(r"^([\d.]+) ([\d.]+) m ([\d.]+) ([\d.]+) l S$", page, re.MULTILINE)
     lengths = [float(x1) - float(x0) for x0, y0, x1, y1 in lines if y0 == y1]
-    for rod in flat_plan(dome).rods[:8]:
+    for rod in flat_plan(dome).rods[:4]:
         assert np.abs(np.array(lengths) - 1e3 * rod.cut_length / scale).min() < 2e-3  # mm of paper
 
 
@@ -124,7 +125,8 @@ def test_pdf_opens_in_another_reader(tmp_path: Path) -> None:
     reader = pypdf.PdfReader(tmp_path / "drawings/drawings.pdf", strict=True)
     assert reader.metadata.title == "hemisphere"
     text = reader.pages[0].extract_text()
-    assert "Pavilion. Revision B. Tolerance 0.5 mm. Units mm." in text
+    for words in ("Pavilion", "0.5 mm", "circle, radius 1 mm", "ball"):
+        assert words in text
     assert "Design aid, not code compliance" in text
     assert reader.outline[0].title == "Flat plan"
 
@@ -158,7 +160,7 @@ def test_sheets_of_the_plan_meet_at_their_match_lines() -> None:
     for rod in plan.rods:
         assert drawn[rod.id] == pytest.approx(1e3 * rod.length, abs=1e-6)
     words = {text.text for sheet in sheets for text in sheet.content.texts if "match line" in text.text}
-    assert words == {f"match line to part {row}{column}" for row in "ABC" for column in "12"}
+    assert words == {f"match line to part {row}{column}" for row in "ABCD" for column in "12"}
 
 
 def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
@@ -167,7 +169,7 @@ def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
     sheets = {
         sheet.title.split(" part ")[1][:2]: sheet for sheet in tiled(lambda text: flat_drawing(plan, text), PAPER)
     }
-    assert list(sheets) == ["A1", "A2", "B1", "B2", "C1", "C2"]
+    assert list(sheets) == [row + column for row in "ABCD" for column in "12"]
     rods = {part: {path.name for path in sheet.content.paths if path.name} for part, sheet in sheets.items()}
     top = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "u" else -1.0).id
     right = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "v" else -1.0).id
@@ -239,8 +241,8 @@ def test_each_grid_is_set_out_by_two_diagonals_with_their_lengths(name: str) -> 
             }  # a joint in each quarter around it
     written = [text.text for text in flat_drawing(plan, plan.text).texts]
     for a, b in found:
-        words = f"{np.linalg.norm(b - a):.1f}"
-        assert written.count(words) == sum(f"{np.linalg.norm(d - c):.1f}" == words for c, d in found)
+        words, *others = (plan.rounding.mm(1e-3 * np.linalg.norm(d - c)) for c, d in [(a, b), *found])
+        assert written.count(words) == others.count(words)
 
 
 def apart(point: np.ndarray, lines: np.ndarray) -> np.ndarray:
@@ -254,7 +256,7 @@ def apart(point: np.ndarray, lines: np.ndarray) -> np.ndarray:
 def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -> None:
     """Nearly all of them find room, where cells are not too thin; between joints, rods are taken to be straight."""
     made = formed(name)
-    drawing = bracing_drawing(made, flat_plan(made).text)
+    drawing = bracing_drawing(made, FINER["bracing"] * flat_plan(made).text)
     braces = np.array([path.points for path in drawing.paths if "to" in path.note])
     numbers = [text for text in drawing.texts if text.layer == "LABEL"]
     assert len(numbers) >= share * len(braces)
@@ -266,14 +268,14 @@ def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -
         rods += [(a[:2], b[:2]) for a, b in pairwise(places)]
     lines = np.concatenate([1e3 * np.array(rods), braces])
     assert [text.text for text in numbers if lines_meet(text.box(), lines)] == []
-    lengths = [f"{1e3 * one['final']:.1f}" for one in made.result["fabrication"]["bracing"]]
+    lengths = [rounding_of(made.result).mm(one["final"]) for one in made.result["fabrication"]["bracing"]]
     for number in numbers:  # of the brace that it lies along: nearest to both ends of its text
         ends = 0.5 * (number.box()[[0, 1]] + number.box()[[3, 2]])
         off = np.max([apart(end, braces) for end in ends], axis=0)
         assert lengths[int(np.argmin(off))] == number.text
 
 
-@pytest.mark.parametrize(("name", "spans"), [("roof", ("12000", "8000")), ("dome", ("400.0", "400.0"))])
+@pytest.mark.parametrize(("name", "spans"), [("roof", ("12000", "8000")), ("dome", ("400.00", "400.00"))])
 def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[str, str]) -> None:
     """Rod ends are some hundredths of a millimetre off the edge: to a ten-thousandth a roof of 12 by 8 m is that."""
     made = formed(name)
@@ -289,20 +291,20 @@ def test_strips_show_the_schedule(tmp_path: Path) -> None:
     """Marks of the strips lie at the distances of the schedule, plus the allowance; splices have theirs."""
     export(wished(), tmp_path, ["dxf"])
     entities = read_dxf(tmp_path / "drawings/strips.dxf")
-    columns, rows = rods_table(wished())
+    (columns, rows), half = rods_table(wished()), 0.501 * rounding_of(wished().result).step
     lines = sorted((one.points for one in entities if one.layer == "LASER"), key=lambda points: -points[0, 1])
     marks = np.array([one.points[0] for one in entities if one.kind == "CIRCLE" and one.layer == "MARK"])
     assert len(lines) == len(rows)
     for row, line in zip(rows, lines, strict=True):
         cells = dict(zip(columns, row, strict=True))
-        assert line[1, 0] - line[0, 0] == pytest.approx(float(cells["cut_length_mm"]), abs=1e-3)
+        assert line[1, 0] - line[0, 0] == pytest.approx(float(cells["cut_length_mm"]), abs=half)
         at = sorted(float(word.split()[-1]) for word in cells["joints_at_mm"].split("; "))
         mine = np.sort(marks[np.abs(marks[:, 1] - line[0, 1]) < 1e-6, 0])
-        np.testing.assert_allclose(mine, np.array(at) + 12.0, atol=1e-3)
+        np.testing.assert_allclose(mine, np.array(at) + 12.0, atol=half)
         ticks = [one.points for one in entities if one.kind == "LINE" and one.layer == "MARK"]
         splices = [tick[0, 0] for tick in ticks if abs(tick.mean(axis=0)[1] - line[0, 1]) < 1e-6]
         wanted = [float(word) for word in cells["splices_at_mm"].split("; ") if word]
-        np.testing.assert_allclose(sorted(splices), np.array(wanted) + 12.0, atol=1e-3)
+        np.testing.assert_allclose(sorted(splices), np.array(wanted) + 12.0, atol=half)
 
 
 def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> None:

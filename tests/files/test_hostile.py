@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import re
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,34 +13,18 @@ import pytest
 from hostile import LAYERS, NAMES, hostile_archive
 from hypothesis import given
 from hypothesis import strategies as st
+from live_cells import live_cells
 
 from rodshell.output.archive import export, write
 from rodshell.output.csvtext import csv_text
 from rodshell.output.dxf import layer_names
 from rodshell.output.files import KINDS
 
-LIVE = re.compile(r"[=+\-@\uff1d\uff0b\uff0d\uff20]")
-
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("hostile")
     return {name: folder / name for name in export(hostile_archive(), folder, KINDS)}
-
-
-def live_cells(text: str) -> list[str]:
-    """Cells that a spreadsheet would run; where semicolons part cells, what begins with a signed number is none."""
-    cells = [cell.strip() for row in csv.reader(io.StringIO(text)) for cell in row]
-    parted = [cell.strip() for row in csv.reader(io.StringIO(text), delimiter=";") for cell in row]
-    live = [cell for cell in cells if LIVE.match(cell) and not _is_number(cell)]
-    return live + [cell for cell in parted if LIVE.match(cell) and not re.match(r"[-+][0-9.]", cell)]
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return bool(float(cell) or True)
-    except ValueError:
-        return False
 
 
 def test_no_schedule_holds_a_live_formula(written: dict[str, Path]) -> None:

@@ -15,6 +15,7 @@ BALANCED = 1e-6  # of the largest reaction: 6e-9 measured
 COARSE = 4e-3  # of the factor: how finely the twin looks for the end of the stable path
 ENDS = ("pinned", "clamped")
 
+STIFFER = rs.Rod(ROD.section, rs.Material(50e6, 1e3))
 STEEL = rs.Rod(rs.Circle(radius=1e-3), rs.Material(210e9, 7850, 0.3))
 TUBE = rs.Rod(rs.Tube(radius=0.0417 / 2, thickness=0.0035), rs.Material(25e9, 1900, 0.3))
 LARCH = rs.Rod(rs.RectangularSection(width=0.035, height=0.05), rs.Material(12e9, 590, shear=0.7e9))
@@ -26,7 +27,7 @@ def grid(spacing: float, edge: float, **more) -> rs.GridLayout:
 
 @cache
 def shell(name: str) -> rs.Form:
-    """Domes and roofs of few nodes; the "oval" has no symmetry to its rods."""
+    """Domes and roofs of few nodes; the "oval" has no symmetry."""
     if name == "dome":
         return dome()
     if name == "steel":
@@ -35,7 +36,9 @@ def shell(name: str) -> rs.Form:
         return rs.find_form(rs.Cap(radius=10.0, base=4.0), grid(3.0, 1.5), TUBE)
     if name == "laths":
         return rs.find_form(rs.Paraboloid(radius=8.0, height=4.0), grid(3.0, 1.5), LARCH)
-    return rs.find_form(rs.Ellipsoid(a=0.2, b=0.15, c=0.12), grid(0.05, 0.025, rotate=0.4), ROD)
+    return rs.find_form(
+        rs.Ellipsoid(a=0.2, b=0.15, c=0.12), grid(0.05, 0.025, rotate=0.4, offset=(0.01, 0.02)), STIFFER
+    )
 
 
 SHELLS = ("dome", "steel", "tubes", "laths", "oval")

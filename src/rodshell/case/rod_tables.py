@@ -18,6 +18,7 @@ from rodshell.case.values import (
     Length,
     LengthOrAuto,
     Lengths,
+    Mass,
     MassPerLength,
     PoissonRatio,
     SectionModulus,
@@ -195,6 +196,8 @@ class RodTable(Table):
 
 class JointTable(Table):
     """Keys of every joint; `build` takes the kind from the table's own."""
+
+    mass: Mass = Field(default=0.0, description="mass of one joint: its bolt, coupler or clamp")
 
     def build(self) -> "Joint":
         from rodshell import joints

@@ -200,6 +200,7 @@ AngleOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(quantity("angle"))
 PointOrAuto = Annotated[tuple[float, float] | Auto, BeforeValidator(or_auto(pair(quantity("length"))))]
 Force = Annotated[float, BeforeValidator(positive("force"))]
 BendingStiffness = Annotated[float, BeforeValidator(positive("bending stiffness"))]
+Mass = Annotated[float, BeforeValidator(not_negative("mass"))]
 MassPerLength = Annotated[float, BeforeValidator(not_negative("mass per length"))]
 InertiaPerLength = Annotated[float, BeforeValidator(not_negative("inertia per length"))]
 SectionModulus = Annotated[float, BeforeValidator(positive("section modulus"))]

@@ -2,7 +2,7 @@
 
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check, settled_shell
-from rodshell.checks.contact import Contact, contact, contact_of
+from rodshell.checks.contact import Contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.reactions import Reactions, reactions
@@ -19,7 +19,6 @@ __all__ = [
     "bending",
     "bending_of",
     "check",
-    "contact",
     "contact_of",
     "curvatures",
     "deploy",

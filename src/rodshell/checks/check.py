@@ -98,7 +98,7 @@ class Checks:
                 f"leaves hardly any room for joints; {remedy}",
             )
         does = "overlap" if who.startswith("rods") else "runs into itself"
-        count = f" (of {worst.pairs} pairs that touch)" if worst.pairs > 1 else ""
+        count = f" (the worst of {worst.pairs} pairs that touch)" if worst.pairs > 1 else ""
         return (
             f"{who} {does} by {length_text(-worst.clearance)} {where}, near {place}{count}: rods cannot run through "
             f"each other; {remedy}",

@@ -1,20 +1,23 @@
 """Contact: rods that touch or run into each other where they should not, and how near the others come.
 
-Each edge of a rod is a prism of the rod's section. Pairs of edges that can be near are found by a tree over the edges'
-middles. Two prisms are apart by the widest gap between them, seen along any of a few directions: from one axis to the
-other where these are nearest, along both axes and across both, and along the sides of both sections. A gap along any
-direction keeps them apart, so that no contact is missed; it is the distance of round rods that run side by side, and
-otherwise a lower bound of it.
+Each edge of a rod is a prism of the rod's section; edges much shorter than the rod is thick are taken together. Pairs
+of edges that can be near are found by a tree over their middles. Two prisms are apart by the widest gap between them,
+seen along any of a few directions: from one axis to the other where these are nearest, along both axes and across both,
+and along the sides of both sections. A gap along any direction keeps them apart, so that no contact is missed; it is
+the distance of round rods that run side by side, and otherwise a lower bound of it.
 
 Rods whose lines cross in the flat grid meet there by design, at a joint, or over one another next to a rod's end.
 About such a place nothing is checked as far along both rods as two straight rods of their breadths overlap,
-(w_u + w_v) / (2 sin angle). A rod can touch itself only farther along its line than half around its section.
-Sections that are not round stand as the rods' material frames say, and without these upright on the shell.
+(w_u + w_v) / (2 sin angle), by the smaller of the angles there and between the two edges, a breadth being that of the
+section at its widest. The same holds where rods of two patches end together, no farther apart than a breadth. A rod can
+touch itself only farther along its line than half around its section. Sections that are not round stand as the rods'
+material frames say, and without these upright on the shell.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +27,15 @@ from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
 from rodshell.geometry.frames import adapted
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import FlatGrid, GridMesh
-from rodshell.layout.flatgrid import Crossings
+from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-FLATTEST = 0.1  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
+FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
+SHORT = 0.5  # of a section's reach: edges are taken together up to this length, which leaves 0.2 % of it as sag
 SLACK = 0.05  # of the rods' breadth: crossing rods that bend together overlap for longer than straight ones
 ACROSS = 0.1  # cosine to a rod's axis up to which a direction is across it
 UP = (0.0, 0.0, 1.0)
@@ -63,24 +67,55 @@ def contact_of(shell: Shell, state: Floats, rod: Rod) -> Contact:
     return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
 
 
-def contact(mesh: GridMesh, places: Floats, rod: Rod, *, directors: Floats | None = None) -> Contact:
+def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], rod: Rod) -> Contact:
+    """Contact of shells of equal rods, each in its state, among each other too.
+
+    Parameters
+    ----------
+    mesh : all their meshes as one, in the order of the patches.
+    """
+    outline = _Outline.of(rod)
+    if outline is None:
+        return Contact()
+    sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
+    parts = [_crossing_lines(mesh.grid.rods[a:b], outline) for a, b in pairwise(sizes)]
+    places = np.concatenate([state[shell.node_blocks] for shell, state in patches])
+    ends = places[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
+    together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
+    patch = np.repeat(np.arange(len(patches)), 2 * np.diff(sizes))
+    together = together[patch[together[:, 0]] != patch[together[:, 1]]]
+    stations = np.array([(one.start, one.end) for one in mesh.grid.rods]).ravel()
+    crossings = Crossings(
+        np.concatenate([*(one.rods + by for one, by in zip(parts, sizes, strict=False)), together // 2]),
+        np.concatenate([*(one.at for one in parts), stations[together]]),
+    )
+    frames = [(shell, rod_frames(shell), state) for shell, state in patches]
+    turned = [edge_directors(shell, one, state) for shell, one, state in frames if one is not None]
+    directors = np.concatenate(turned) if len(turned) == len(patches) else None
+    return contact(mesh, places, rod, directors=directors, crossings=crossings)
+
+
+def contact(
+    mesh: GridMesh, places: Floats, rod: Rod, *, directors: Floats | None = None, crossings: Crossings | None = None
+) -> Contact:
     """Contact of the rods of `mesh`.
 
     Parameters
     ----------
     places : (k, 3) of each entry of `rod_nodes` [m].
     directors : (e, 3) first material director of each edge; without, the normal of the shell.
+    crossings : where rods meet by design; without, wherever their lines cross in the flat grid.
     """
     outline = _Outline.of(rod)
     if outline is None:
         return Contact()
-    edges = _Edges(mesh, places, outline, directors)
+    edges = _Edges(mesh, places, outline, directors, crossings or _crossing_lines(mesh.grid.rods, outline))
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
     counted = gap <= limit
     if not counted.any():
         return Contact()
-    rods = np.sort(np.column_stack([mesh.edge_rods[first], mesh.edge_rods[second]]), axis=1)
+    rods = np.sort(np.column_stack([edges.rods[first], edges.rods[second]]), axis=1)
     worst = int(np.argmin(np.where(counted, gap, np.inf)))
     a, b = (mesh.grid.rods[k].name for k in rods[worst])
     x, y, z = (0.5 * (p + q)[worst]).tolist()
@@ -138,22 +173,41 @@ class _Outline:
         return parts[0] + parts[1] if self.box else np.hypot(*parts)
 
 
+def _crossing_lines(rods: Sequence[FlatRod], outline: _Outline) -> Crossings:
+    """Where lines of rods cross in the flat grid, joined or not, or would if the rods were a little longer."""
+    return FlatGrid.of(rods, margin=-4 * outline.reach / FLATTEST).crossings
+
+
 class _Edges:
     """All edges of a shape as prisms."""
 
-    def __init__(self, mesh: GridMesh, places: Floats, outline: _Outline, directors: Floats | None) -> None:
+    def __init__(
+        self, mesh: GridMesh, places: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings
+    ) -> None:
         self.mesh, self.outline = mesh, outline
-        begins = np.delete(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
-        self.start, self.stop = places[begins], places[begins + 1]
-        self.station = 0.5 * (mesh.stations[begins] + mesh.stations[begins + 1])  # of the middles
+        rods = np.sort(crossings.rods, axis=1)
+        swapped = (rods != crossings.rods)[:, :1]
+        self.crossings = Crossings(rods, np.where(swapped, crossings.at[:, ::-1], crossings.at))
+        rod_of = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+        together = max(1, int(SHORT * outline.reach / mesh.edge_lengths.max()))
+        kept = (np.arange(len(rod_of)) - mesh.rod_start[rod_of]) % together == 0
+        kept[mesh.rod_stop - 1] = True
+        entries = np.flatnonzero(kept)
+        own = rod_of[entries[1:]] == rod_of[entries[:-1]]
+        begins, ends = entries[:-1][own], entries[1:][own]
+        self.rods, self.start, self.stop = rod_of[begins], places[begins], places[ends]
+        self.station = 0.5 * (mesh.stations[begins] + mesh.stations[ends])  # of the middles
+        self.lengths = mesh.stations[ends] - mesh.stations[begins]
         self.tangent = unit(self.stop - self.start)
-        self._directors, self._places, self._begins = directors, places, begins
+        self._directors = None if directors is None else directors[begins - self.rods]
+        self._places, self._begins = places, begins
 
     @cached_property
     def across(self) -> tuple[Floats, Floats]:
         """(e, 3) directors m1 and m2 of each edge."""
-        m1 = self._directors
-        if m1 is None:
+        if self._directors is not None:
+            m1 = adapted(self._directors, self.tangent)
+        else:
             nodes = np.zeros((self.mesh.node_count, 3))
             nodes[self.mesh.rod_nodes] = self._places
             normals = shell_normals(self.mesh, nodes)
@@ -164,26 +218,43 @@ class _Edges:
     def candidates(self) -> tuple[Ints, Ints, Floats]:
         """Pairs of edges that may be near, but for those that meet by design: first, second, and the gap from which
         they count as near [m]; crossing rods, and parts of one rod, only when they touch away from there."""
-        mesh, reach = self.mesh, self.outline.reach
+        reach = self.outline.reach
         radius = np.linalg.norm(self.stop - self.start, axis=1).max() + 2 * reach + self.outline.near
         found = cKDTree(0.5 * (self.start + self.stop)).query_pairs(radius, output_type="ndarray")
         first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
-        rods = mesh.edge_rods[first], mesh.edge_rods[second]
+        rods = self.rods[first], self.rods[second]
         own = rods[0] == rods[1]
-        crossing = self._crossing_of(*rods)
         cut = np.zeros(len(own), dtype=bool)
         apart = np.abs(self.station[first] - self.station[second])[own]
-        between = 0.5 * (mesh.edge_lengths[first] + mesh.edge_lengths[second])[own]
+        between = 0.5 * (self.lengths[first] + self.lengths[second])[own]
         cut[own] = apart - between <= np.pi * reach
-        crossed = np.flatnonzero(crossing >= 0)
-        which = crossing[crossed]
-        cut[crossed] = True
-        for side, edge in enumerate((first[crossed], second[crossed])):
-            away = np.abs(self.station[edge] - self.crossings.at[which, side]) - 0.5 * mesh.edge_lengths[edge]
-            cut[crossed] &= away <= self._overlaps[which]
+        meeting = np.zeros(len(own), dtype=bool)
+        for pairs, crossings in self._met(*rods):
+            meeting[pairs] = True
+            cut[pairs] |= self._overlap(first[pairs], second[pairs], crossings)
         kept = ~cut
-        limit = np.where(crossing >= 0, -2 * SLACK * reach, np.where(own, 0.0, self.outline.near))
+        limit = np.where(meeting, -2 * SLACK * reach, np.where(own, 0.0, self.outline.near))
         return first[kept], second[kept], limit[kept]
+
+    def _met(self, low: Ints, high: Ints) -> Iterator[tuple[Ints, Ints]]:
+        """Which pairs of rods meet at which crossings, over and over: patches' rods may meet at both their ends."""
+        count = len(self.mesh.grid.rods)
+        known = self.crossings.rods @ [count, 1]
+        order, wanted = np.argsort(known, kind="stable"), low * count + high
+        first, last = (np.searchsorted(known[order], wanted, side=side) for side in ("left", "right"))
+        while (here := np.flatnonzero(first < last)).size:
+            yield here, order[first[here]]
+            first += 1
+
+    def _overlap(self, first: Ints, second: Ints, crossings: Ints) -> NDArray[np.bool_]:
+        """Whether both edges lie so near to the crossing of their rods that they overlap there by design."""
+        tangents = self.tangent[first], self.tangent[second]
+        sine = np.minimum(np.linalg.norm(cross(*tangents), axis=1), self._sines[crossings])
+        result = np.ones(len(first), dtype=bool)
+        for side, edge in enumerate((first, second)):
+            away = np.abs(self.station[edge] - self.crossings.at[crossings, side]) - 0.5 * self.lengths[edge]
+            result &= away <= 2 * self.outline.reach / np.maximum(sine, FLATTEST)
+        return result
 
     def near(self) -> tuple[Ints, Ints, Floats, Floats, Floats]:
         """Of the candidates those that are near by their axes: first, second, nearest points on each, and limit."""
@@ -223,34 +294,18 @@ class _Edges:
         return self.outline.half_width(dot(n, m1[edges]), dot(n, m2[edges]))
 
     @cached_property
-    def crossings(self) -> Crossings:
-        """Where lines of rods cross in the flat grid, joined or not, or would if the rods were a little longer."""
-        return FlatGrid.of(self.mesh.grid.rods, margin=-4 * self.outline.reach / FLATTEST).crossings
-
-    @cached_property
-    def _overlaps(self) -> Floats:
-        """(c,) how far along the rods they overlap at each crossing, from it [m]."""
+    def _sines(self) -> Floats:
+        """(c,) sine of the angle between the rods at each crossing."""
         tangents = [self.tangent[self._edge_at(self.crossings.rods[:, k], self.crossings.at[:, k])] for k in (0, 1)]
-        sine = np.linalg.norm(cross(*tangents), axis=1)
-        return 2 * self.outline.reach / np.maximum(sine, FLATTEST)
+        return np.linalg.norm(cross(*tangents), axis=1)
 
     def _edge_at(self, rods: Ints, at: Floats) -> Ints:
         """Edge of each rod at a material coordinate."""
         low, span = self.station.min(), np.ptp(self.mesh.stations) + 1.0
-        keys = self.mesh.edge_rods * span + (self.station - low)
+        keys = self.rods * span + (self.station + 0.5 * self.lengths - low)
         after = np.searchsorted(keys, rods * span + (at - low))
-        first, last = self.mesh.rod_start - np.arange(len(self.mesh.rod_start)), self.mesh.rod_stop - 2
-        last = last - np.arange(len(last))
-        return np.clip(after, first[rods], last[rods])
-
-    def _crossing_of(self, low: Ints, high: Ints) -> Ints:
-        """Crossing of each pair of rods, or -1."""
-        count = len(self.mesh.grid.rods)
-        known = np.append(self.crossings.rods @ [count, 1], count * count)
-        order = np.argsort(known, kind="stable")
-        wanted = low * count + high
-        at = np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)
-        return np.where(known[order[at]] == wanted, order[at], -1)
+        first, stop = (np.searchsorted(self.rods, rods, side=side) for side in ("left", "right"))
+        return np.clip(after, first, stop - 1)
 
 
 def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[Floats, Floats]:

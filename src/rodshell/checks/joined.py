@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.checks.check import Checks
-from rodshell.checks.contact import joined_contact
+from rodshell.checks.contact import Contact, joined_contact
 from rodshell.checks.deployment import Deployment
 from rodshell.checks.self_weight import weakest
 from rodshell.formfinding.popup import Ends
@@ -21,14 +21,22 @@ class JoinedChecks(Checks):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return tuple(f"patch {name}: {word}" for name, one in self.named.items() for word in one.warnings)
+        words = [
+            f"patch {name}: {word}"
+            for name, one in self.named.items()
+            for word in one.warnings
+            if word not in one.touching
+        ]
+        return (*words, *self.touching)
 
 
-def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
+def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> JoinedChecks:
     """Of shells that share nothing: what all were checked for, one after the other.
 
-    The way up has the stages that all were followed through. Each shell bears its own weight by itself, what they
+    The deployment has the stages that all were followed through. Each shell bears its own weight by itself, what they
     share being held as supports are: of all the smallest factor counts.
+
+    contacts : of all final shapes together, by end condition; in a deployment each shell is looked at by itself.
     """
     parts = list(named.values())
     ends = [one for one in parts[0].bending if all(one in part.bending for part in parts)]
@@ -37,12 +45,10 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
         return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
 
     weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in ends}
-    contacts = {end: joined_contact({name: part.contact[end] for name, part in named.items()}) for end in ends}
+    contact = {end: contacts[end] for end in ends}
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(
-            each("bending"), each("reactions"), each("joints"), None, (), weighed, contacts, named=named
-        )
+        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), weighed, contact, named=named)
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(
@@ -54,7 +60,7 @@ def joined_checks(named: Mapping[str, Checks]) -> JoinedChecks:
     }
     met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
     return JoinedChecks(
-        each("bending"), each("reactions"), each("joints"), way, bent, weighed, contacts, met, named=named
+        each("bending"), each("reactions"), each("joints"), way, bent, weighed, contact, met, named=named
     )
 
 

@@ -10,7 +10,6 @@ from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
 from rodshell.cli.outcome import Kept, announce_rod, deliver, force_option, output_folder, wanted_kinds
 from rodshell.cli.progress import Progress, announce_compilation
-from rodshell.output.inputs import kept_case, read_inputs
 from rodshell.units import length_text
 
 if TYPE_CHECKING:
@@ -54,6 +53,7 @@ def run(case: Case, name: str, *, out: str | None, only: str | None, force: bool
     """Find the form of a case and write it; the exit code."""
     from rodshell.output.archive import ARCHIVE
     from rodshell.output.files import reserved
+    from rodshell.output.inputs import kept_case, read_inputs
 
     kinds = wanted_kinds(only)
     inputs = read_inputs(case.to_toml())

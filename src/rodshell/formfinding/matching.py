@@ -85,9 +85,11 @@ class _Line:
     points: list[int]
 
 
-def match_net(target: Target, layout: GridLayout, anchor: Point, wanted: Wanted) -> Matched:
+def match_net(
+    target: Target, layout: GridLayout, anchor: Point, wanted: Wanted, *, eccentricity: float = 0.0
+) -> Matched:
     """Choose the lines of a layout such that its rods end at the points wanted, one at each; some may stay alone."""
-    net = chebyshev_net(target, layout, anchor=anchor)
+    net = chebyshev_net(target, layout, anchor=anchor, eccentricity=eccentricity)
     place, inside = _coordinates(net, wanted.points), inside_nodes(target, net.net)
     family = np.full(len(place), -1)
     for row in wanted.rows:
@@ -102,7 +104,7 @@ def match_net(target: Target, layout: GridLayout, anchor: Point, wanted: Wanted)
             x, y, _ = interpolated(net.net, shift[:1], shift[1:])[0, 0].tolist()
             anchor = (x, y)
         laid = replace(layout, lines=(_filled(lines, 0, layout.spacing), _filled(lines, 1, layout.spacing)))
-        net = chebyshev_net(target, laid, anchor=anchor, near=net)
+        net = chebyshev_net(target, laid, anchor=anchor, near=net, eccentricity=eccentricity)
         met, moved = _corrected(net, lines, wanted.points)
         if moved < SETTLED * target.size:
             break

@@ -76,11 +76,14 @@ def lay_patches(
     layouts: Mapping[str, GridLayout],
     anchors: Mapping[str, Point | None],
     *,
+    eccentricity: float = 0.0,
     progress: Progress = silent,
 ) -> tuple[dict[str, Laid], tuple[Meeting, ...]]:
     """The rods of each patch, in turn: each takes up the rods of those before it.
 
     Rods that no other meets at a seam are left out, and so are those that would swing without these.
+
+    eccentricity : see `chebyshev_net`; at a seam it is the points between the layers that meet.
     """
     laid, waiting, meetings = dict[str, Laid](), list[_Open](), list[Meeting]()
     for name, patch in patches.items():
@@ -90,13 +93,14 @@ def lay_patches(
         try:
             if mine:
                 wanted = _wanted(patch, mine, [one.patch for one in laid.values()])
-                found = match_net(patch, layout, anchor, wanted)
+                found = match_net(patch, layout, anchor, wanted, eccentricity=eccentricity)
                 laid[name] = Laid(patch, found.layout, found.anchor, found.net)
                 for met in found.met:
                     other = mine[met.point]
                     meetings.append(Meeting(other.seam, other.point, (other.end, End(name, met.rod, met.side))))
             else:
-                laid[name] = Laid(patch, layout, anchor, chebyshev_net(patch, layout, anchor=anchor))
+                net = chebyshev_net(patch, layout, anchor=anchor, eccentricity=eccentricity)
+                laid[name] = Laid(patch, layout, anchor, net)
         except RodshellError as reason:
             raise type(reason)(f"patch {name}: {reason}") from None
         done = {end for meeting in meetings for end in meeting.ends}

@@ -178,8 +178,9 @@ def find_sewn_stages(
     require_joint(joint)
     own, joint = dict(own or {}), joint or Ball()
     if search:
-        layout = replace(layout, rotate=best_heading(target, seams, layout, own, progress=progress))
-    laid, meetings = _lay(target, seams, layout, own, progress)
+        rotate = best_heading(target, seams, layout, own, eccentricity=joint.eccentricity, progress=progress)
+        layout = replace(layout, rotate=rotate)
+    laid, meetings = _lay(target, seams, layout, own, joint.eccentricity, progress)
     found, moved = dict[str, FoundForm](), dict[str, float]()
     for name, one in laid.items():
         places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
@@ -201,6 +202,7 @@ def best_heading(
     layout: GridLayout,
     own: Mapping[str, PatchLayout],
     *,
+    eccentricity: float = 0.0,
     progress: Progress = silent,
 ) -> float:
     """The heading at the target's summit [rad] that leaves out the smallest share of the rods, of a few tried.
@@ -213,7 +215,7 @@ def best_heading(
     for heading in HEADINGS:
         progress("seams", f"trying {degrees(heading):.0f} deg", 0.0)
         try:
-            laid, _ = _lay(target, seams, replace(layout, rotate=heading), own, silent)
+            laid, _ = _lay(target, seams, replace(layout, rotate=heading), own, eccentricity, silent)
             shares[heading] = left_out(laid)
         except RodshellError as reason:
             reasons.append(reason)
@@ -229,7 +231,12 @@ def left_out(laid: Mapping[str, Laid]) -> float:
 
 
 def _lay(
-    target: Target, seams: Sequence[Seam], layout: GridLayout, own: Mapping[str, PatchLayout], progress: Progress
+    target: Target,
+    seams: Sequence[Seam],
+    layout: GridLayout,
+    own: Mapping[str, PatchLayout],
+    eccentricity: float,
+    progress: Progress,
 ) -> tuple[dict[str, Laid], tuple[Meeting, ...]]:
     if layout.rods != "auto" or layout.length != "auto":
         raise InputError('a target cut by seams counts its rods itself: leave layout rods and length at "auto"')
@@ -240,7 +247,7 @@ def _lay(
             raise InputError(f"there is no patch {shown(name)}: the seams make the patches {', '.join(patches)}")
     layouts = {name: _own_layout(patch, layout, own.get(name, PatchLayout())) for name, patch in patches.items()}
     anchors = {name: own[name].anchor if name in own else None for name in patches}
-    return lay_patches(patches, layouts, anchors, progress=progress)
+    return lay_patches(patches, layouts, anchors, eccentricity=eccentricity, progress=progress)
 
 
 def _own_layout(patch: Patch, layout: GridLayout, own: PatchLayout) -> GridLayout:
@@ -251,13 +258,16 @@ def _own_layout(patch: Patch, layout: GridLayout, own: PatchLayout) -> GridLayou
 
 
 def cut_with_ends(draped: Draped, places: Mapping[tuple[str, int], Floats]) -> Trimmed:
-    """The trimmed shell, some rod ends, by rod and side, put where their seams have them."""
+    """The trimmed shell, some rod ends, by rod and side, put where their seams have them; ends of rods in layers over
+    or under these points."""
     trimmed = trim(draped, fewest=FEWEST)
     mesh, positions = trimmed.mesh, trimmed.positions.copy()
     for k, rod in enumerate(mesh.grid.rods):
         for side in (0, 1):
             if (rod.name, side) in places:
-                positions[mesh.ends[k, side]] = places[rod.name, side]
+                node, place = mesh.ends[k, side], places[rod.name, side]
+                lift = mesh.heights[node] * draped.target.on_surface(place[None]).normal[0] if mesh.layered else 0.0
+                positions[node] = place + lift
     boundary = replace(trimmed.boundary, points=positions[mesh.ends.ravel()], draped=positions)
     return replace(trimmed, positions=positions, boundary=boundary)
 

@@ -22,12 +22,15 @@ class Joint(Protocol):
     ----------
     name : the kind, as in a case file.
     eccentricity : distance of the two centre lines along the normal [m]; 0 where they meet.
+    mass : of its bolt, coupler or clamp [kg], at the node.
     """
 
     @property
     def name(self) -> str: ...
     @property
     def eccentricity(self) -> float: ...
+    @property
+    def mass(self) -> float: ...
     @property
     def turns_frames(self) -> bool:
         """Whether it carries moments between the frames of its rods, so that their twist matters."""
@@ -46,10 +49,14 @@ class Ball:
     It has no eccentricity: rods a distance apart would roll over each other.
     """
 
+    mass: float = 0.0
     name = "ball"
     shear = out_of_plane = twist = eccentricity = 0.0
     rest_angle = None
     turns_frames = holds_normals = False
+
+    def __post_init__(self) -> None:
+        _check_mass(self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +64,7 @@ class Pin:
     """An axis along the normal of both rods: they scissor freely, and share their normal [Panetta et al. 2019]."""
 
     eccentricity: float = 0.0
+    mass: float = 0.0
     name = "pin"
     shear, out_of_plane, twist = 0.0, inf, inf
     rest_angle = None
@@ -64,6 +72,7 @@ class Pin:
 
     def __post_init__(self) -> None:
         _check_eccentricity(self.eccentricity)
+        _check_mass(self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +84,7 @@ class Rigid:
 
     rest_angle: float | None = None
     eccentricity: float = 0.0
+    mass: float = 0.0
     name = "rigid"
     shear = out_of_plane = twist = inf
     turns_frames = holds_normals = True
@@ -82,6 +92,7 @@ class Rigid:
     def __post_init__(self) -> None:
         _check_rest_angle(self.rest_angle)
         _check_eccentricity(self.eccentricity)
+        _check_mass(self.mass)
 
 
 @dataclass(frozen=True)
@@ -104,6 +115,7 @@ class Spring:
     twist: float = 0.0
     rest_angle: float | None = None
     eccentricity: float = 0.0
+    mass: float = 0.0
     name = "spring"
 
     def __post_init__(self) -> None:
@@ -119,6 +131,7 @@ class Spring:
                 "rods that lie one above the other roll over each other where a spring resists neither: give an "
                 'eccentric spring an out-of-plane and a twist stiffness, or use kind = "pin", which is rigid in both'
             )
+        _check_mass(self.mass)
 
     @property
     def turns_frames(self) -> bool:
@@ -145,11 +158,13 @@ class Linker:
 
     rod: Rod | None = None
     corners: Literal[2, 4] = 2
+    mass: float = 0.0
     name = "linker"
     eccentricity = 0.0
     turns_frames = holds_normals = True
 
     def __post_init__(self) -> None:
+        _check_mass(self.mass)
         if self.corners not in (2, 4):
             raise InputError(f"a joint has linkers in 2 or 4 of its corners, not in {self.corners}")
 
@@ -178,6 +193,11 @@ Elastic = Ball | Pin | Rigid | Spring
 def _check_eccentricity(value: float) -> None:
     if not (isfinite(value) and value >= 0):
         raise InputError(f"the joint's eccentricity must not be negative, not {value} m")
+
+
+def _check_mass(value: float) -> None:
+    if not (isfinite(value) and value >= 0):
+        raise InputError(f"the joint's mass must not be negative, not {value} kg")
 
 
 def _check_rest_angle(value: float | None) -> None:

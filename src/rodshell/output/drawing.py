@@ -183,8 +183,9 @@ class Drawing:
     def __add__(self, other: "Drawing") -> "Drawing":
         """This one with the other's content on top."""
         return replace(
-            self, paths=self.paths + other.paths, marks=self.marks + other.marks, texts=self.texts + other.texts
-        )
+            self, paths=self.paths + other.paths, marks=self.marks + other.marks, texts=self.texts + other.texts,
+            left_out=self.left_out + other.left_out,
+        )  # fmt: skip
 
 
 @dataclass

@@ -5,6 +5,7 @@ from typing import Any
 
 from rodshell.output import wording
 from rodshell.output.plan import FlatPlan
+from rodshell.output.rounding import Rounding, rounding_of
 from rodshell.output.verdict import ENDS, entries, unknown_below
 
 Row = tuple[str, str]
@@ -77,28 +78,37 @@ _OWN_ENDS: tuple[Entry, ...] = (
 )
 
 
+def _shown(show: Callable[[Any], str], value: Any, rounding: Rounding) -> str:
+    """A value in words; a length no finer than the result's rounding."""
+    if value is None:
+        return wording.UNKNOWN
+    if show is wording.millimetres:
+        return wording.millimetres(value, rounding=rounding)
+    return wording.place(value, rounding) if show is wording.place else show(value)
+
+
 def supports_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     """Both kinds of ends side by side: `ends` and `rows` of (title, a value for each of the ends)."""
     tables = {name: entries(result, name) for name in ("agreement", "pop_up")}
     ends = [end for end in ENDS if any(end in table for table in tables.values())]
-    rows = []
+    rows, rounding = list[tuple[str, list[str]]](), rounding_of(result)
     for name, listed in (("agreement", _AGREEMENT), ("pop_up", _POP_UP)):
         for title, key, show in listed:
             values = [tables[name].get(end, {}).get(key) for end in ends]
             if any(value is not None for value in values):
-                rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
+                rows.append((title, [_shown(show, value, rounding) for value in values]))
         if name == "agreement":
-            rows += _weight_rows(result, ends)
+            rows += _weight_rows(result, ends, rounding)
     return {"ends": ends, "rows": rows} if rows else None
 
 
-def _weight_rows(result: Mapping[str, Any], ends: Sequence[str]) -> list[tuple[str, list[str]]]:
+def _weight_rows(result: Mapping[str, Any], ends: Sequence[str], rounding: Rounding) -> list[tuple[str, list[str]]]:
     """How much of its own weight the shell bears with each kind of ends."""
     found = [entries(result, "self_weight").get(end) for end in ends]
     if not any(found):
         return []
     shares = [wording.share_of_weight(one) if one else wording.UNKNOWN for one in found]
-    sunk = [wording.millimetres(one.get("deflection") if one else None) for one in found]
+    sunk = [_shown(wording.millimetres, one.get("deflection") if one else None, rounding) for one in found]
     rows = [("Own weight that it bears", shares)]
     return rows if set(sunk) == {wording.UNKNOWN} else [*rows, ("Largest deflection under its own weight", sunk)]
 
@@ -108,17 +118,21 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     bent, held = result.get("bending") or {}, result.get("reactions") or {}
     unknown = unknown_below(result)
     columns = [key for key in (*ENDS, "pop_up") if key in bent and (key in ENDS or unknown < 1)]
-    rows = []
-    of = bent.get("strength_of")
+    rows, rounding, of = list[tuple[str, list[str]]](), rounding_of(result), bent.get("strength_of")
     for title, key, show in _BENDING:
         values = [bent[column].get(key) for column in columns]
         if any(value is not None for value in values):
             title = f"Utilisation of {of}'s bending strength" if of and key == "utilisation" else title
-            rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
+            rows.append((title, [_shown(show, value, rounding) for value in values]))
+    met = result.get("contact") or {}
+    near = [(met.get("deployment" if column == "pop_up" else column) or {}).get("clearance") for column in columns]
+    if any(clear is not None for clear in near):
+        shown = [_shown(wording.millimetres, clear, rounding) for clear in near]
+        rows.append(("Clearance of the nearest rods", shown))
     for title, key, show in _REACTIONS:
         values = [(held.get(column) or {}).get(key) for column in columns]
         if any(value is not None for value in values):
-            rows.append((title, [wording.UNKNOWN if value is None else show(value) for value in values]))
+            rows.append((title, [_shown(show, value, rounding) for value in values]))
     way = f"on the way up above {wording.stage(unknown)}" if unknown else "on the way up"
     heads = [way if column == "pop_up" else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None
@@ -128,13 +142,18 @@ def key_figures(result: Mapping[str, Any], plan: FlatPlan) -> list[tuple[str, li
     """Groups of key figures; what is not known is left out."""
     drape, rod = result.get("drape") or {}, result.get("rod") or {}
     parts = [rod.get("section"), rod.get("material"), rod]
+    made = [row for part in parts for row in wording.case_rows(part)]
     groups = [
         ("Target", wording.case_rows(result.get("target"))),
         ("Layout", wording.case_rows(result.get("layout"))),
         ("Cut list", _cut_list(plan)),
-        ("Rod", [row for part in parts for row in wording.case_rows(part)] + _listed(rod.get("preset") or {}, _PRESET)),
-        ("Net", _listed(result.get("net") or {}, _NET)),
-        ("Drape", _listed(_with_depth(drape), _DRAPE) + _listed(drape.get("own_ends") or {}, _OWN_ENDS)),
+        ("Rod", made + _listed(rod.get("preset") or {}, _PRESET, plan.rounding)),
+        ("Net", _listed(result.get("net") or {}, _NET, plan.rounding)),
+        (
+            "Drape",
+            _listed(_with_depth(drape), _DRAPE, plan.rounding)
+            + _listed(drape.get("own_ends") or {}, _OWN_ENDS, plan.rounding),
+        ),
     ]
     return [(title, rows) for title, rows in groups if rows]
 
@@ -147,8 +166,8 @@ def levels_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     return {"columns": [column.replace("_", " ") for column in columns], "rows": rows} if levels else None
 
 
-def _listed(table: Mapping[str, Any], listed: tuple[Entry, ...]) -> list[Row]:
-    return [(title, show(table[key])) for title, key, show in listed if table.get(key) is not None]
+def _listed(table: Mapping[str, Any], listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:
+    return [(title, _shown(show, table[key], rounding)) for title, key, show in listed if table.get(key) is not None]
 
 
 def _with_depth(drape: Mapping[str, Any]) -> dict[str, Any]:
@@ -164,7 +183,7 @@ def _cut_list(plan: FlatPlan) -> list[Row]:
     return [
         ("rods", str(len(plan.rods))),
         ("joints", str(len(plan.joints))),
-        (f"all rods together{bare}", f"{sum(lengths):.2f} m"),
-        (f"longest rod{bare}", wording.millimetres(max(lengths, default=None), 5)),
-        (f"shortest rod{bare}", wording.millimetres(min(lengths, default=None), 5)),
+        (f"all rods together{bare}", f"{sum(lengths):.1f} m"),
+        (f"longest rod{bare}", f"{plan.rounding.mm(max(lengths, default=None)) or wording.UNKNOWN} mm"),
+        (f"shortest rod{bare}", f"{plan.rounding.mm(min(lengths, default=None)) or wording.UNKNOWN} mm"),
     ]

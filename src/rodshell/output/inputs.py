@@ -53,9 +53,10 @@ def opened_case(case_toml: str, where: Callable[[str], Path]) -> tuple[str, dict
 
 
 def input_hash(case_toml: str, inputs: Mapping[str, bytes]) -> str:
-    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are."""
-    digest = hashlib.sha256(_renamed(case_toml, {name: Path(name).name for name in _names(case_toml)}).encode())
-    for name in _names(case_toml):
+    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called."""
+    names = list(dict.fromkeys(_names(case_toml)))
+    digest = hashlib.sha256(_renamed(case_toml, {name: str(k) for k, name in enumerate(names)}).encode())
+    for name in names:
         digest.update(inputs.get(name, b""))
     return digest.hexdigest()[:12]
 

@@ -110,13 +110,13 @@ def _text(text: Text) -> str:
     (x, y), angle, size = text.at.tolist(), text.angle, text.size
     c, s = (cos(angle), sin(angle)) if angle else (1.0, 0.0)
     if text.anchor != "start":
-        back = (0.5 if text.anchor == "middle" else 1.0) * text_width(text.text) * size
+        back = (0.5 if text.anchor == "middle" else 1.0) * _width(text.text) * size
         x, y = x - back * c, y - back * s
     turn = f"{c:.5f} {s:.5f} {-s:.5f} {c:.5f}"
     return f"BT /F{int(text.bold)} {size:.3f} Tf {turn} {x:.3f} {y:.3f} Tm ({_escaped(text.text)}) Tj ET"
 
 
-def text_width(text: str) -> float:
+def _width(text: str) -> float:
     """Width of a line of Helvetica over its size."""
     return sum([WIDTHS.get(ord(letter), OTHER) for letter in text]) / 1000
 

@@ -50,8 +50,7 @@ class Pieces:
 def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
     """A picture of "flat", "draped", "popped_pinned", "popped_clamped" or "stage_1", ... as a complete SVG.
 
-    All shapes in space share one view; each has a colour scale of its own, but for the stages of the way up, which are
-    compared.
+    All final shapes share one view, as the stages of the deployment do, and all shapes one colour scale.
 
     Raises
     ------

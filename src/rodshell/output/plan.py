@@ -59,7 +59,7 @@ class FlatPlan:
     def text(self) -> float:
         """Size of the rods' labels at 1:1 [mm]: joint ids find room between the rods."""
         longest = max((len(joint.id) for joint in self.joints), default=1)
-        return min(self.spacing / (SMALL * LETTER * longest + 0.7), 0.25 * self.spacing, 0.015 * self.extent)
+        return min(self.spacing / (SMALL * LETTER * longest + 0.95), 0.25 * self.spacing, 0.015 * self.extent)
 
     @cached_property
     def summary(self) -> str:

@@ -9,7 +9,7 @@ from rodshell.output.drawing import Drawing
 from rodshell.output.figures import checks_table, key_figures, levels_table, supports_table
 from rodshell.output.pictures import picture_svg
 from rodshell.output.plan import NOTE, FlatPlan
-from rodshell.output.schedules import Table, rods_table, seams_table, stock_table
+from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
 from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
 from rodshell.output.shapes import CAPTIONS
@@ -43,7 +43,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    result = archive.result
+    result, tables = archive.result, _tables(archive)
     states = [state for state in CAPTIONS if state in archive.states and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,
@@ -61,7 +61,9 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         levels=levels_table(result),
         plan=shown(drawing_svg(drawings["plan"])),
         drawings=[(drawings[name].title, shown(drawing_svg(drawings[name]))) for name in IN_PAGE if name in drawings],
-        tables=_tables(archive),
+        tables=[
+            (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
+        ],
         case=archive.case_toml,
         version=str(result.get("version_rodshell") or "unknown"),
         versions=", ".join(f"{name} {number}" for name, number in (result.get("versions") or {}).items()),

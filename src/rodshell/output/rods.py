@@ -98,20 +98,22 @@ def joints_of(rods: list[RodRecord]) -> list[JointRecord]:
 
 
 def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
-    """Place (3,) [m] in a shape (n, 3) of each joint that has a node there, by its id."""
-    return {name: positions[node] for name, node in _joint_nodes(archive).items()}
+    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods."""
+    return {name: positions[nodes].mean(axis=0) for name, nodes in _joint_nodes(archive).items()}
 
 
 @made_once
-def _joint_nodes(archive: Archive) -> dict[str, int]:
-    """The node of each joint that has one, by its id."""
+def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
+    """The nodes of each joint that has some, on both of its rods, by its id: one node twice, or one in either layer."""
     rods, flat = rods_of(archive), archive.states.get("flat")
-    nodes = dict[str, int]()
+    nodes = dict[str, list[int]]()
+    if flat is None:
+        return nodes
+    stations = [np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[:1]], axis=1) for rod in rods]
     for joint in joints_of(rods):
-        rod, at = rods[joint.rods[0]], joint.at[0]
-        if flat is not None and len(rod.nodes):
-            stations = np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[0]], axis=1)
-            nodes[joint.id] = int(rod.nodes[int(np.abs(stations - at).argmin())])
+        if all(len(rods[k].nodes) for k in joint.rods):
+            places = zip(joint.rods, joint.at, strict=True)
+            nodes[joint.id] = [int(rods[k].nodes[np.abs(stations[k] - at).argmin()]) for k, at in places]
     return nodes
 
 

@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.output.archive import Archive
+from rodshell.output.archive import SHELLS, Archive, made_once
 from rodshell.output.colours import HEIGHT, SIGNED, STRESS, hex_colours
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.plan import nice_step, nice_ticks
-from rodshell.output.shapes import STAGE, Shape
+from rodshell.output.shapes import Shape, shape_of
 from rodshell.output.svg import number
 from rodshell.output.wording import MINUS
 from rodshell.units import PRESSURES
@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 Colour = Literal["gap", "stress"]
 
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
+STRESSES = ("stress_pinned", "stress_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
 
@@ -51,12 +52,12 @@ class Scale:
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
-    """The scale of a shape, by its own largest value; None where nothing is known to colour it by."""
+    """The scale of a shape, one for all shapes of the archive, which are compared; None where nothing colours it."""
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
         return None if shape.stress is None else _stress_scale(archive, shape)
     if shape.gap is not None:
-        largest = abs(largest_gap(archive, shape)[0])
+        largest = _largest_of_all_gaps(archive)
         factor, unit = length_unit(largest)
         limit = _rounded_up(max(largest, FINEST) / factor)
         caption = f"gap to target in {unit}, + outside"
@@ -85,16 +86,24 @@ def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
     return float(np.copysign(1e3 * found["max"], gaps[nearest])), place
 
 
+@made_once
+def _largest_of_all_gaps(archive: Archive) -> float:
+    """The largest gap [mm], without its sign, of all shapes that have one."""
+    shapes = [shape_of(archive, name) for name in SHELLS if name in archive.states]
+    return max((abs(largest_gap(archive, shape)[0]) for shape in shapes if shape.gap is not None), default=0.0)
+
+
 def length_unit(largest: float) -> tuple[float, str]:
     """The unit that fits a length [mm]: how many mm it is, and its name."""
     return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
 
 
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
-    """Utilisation where the strength is known, else the stress in a unit of its size; one for all stages."""
+    """Utilisation where the strength is known, else the stress in a unit of its size."""
     assert shape.stress is not None
     strength = (archive.result.get("bending") or {}).get("strength")
-    top = float(np.max(archive.states["history_stress"] if shape.name.startswith(STAGE) else shape.stress))
+    known = [values for name, values in archive.states.items() if name == "history_stress" or name in STRESSES]
+    top = max(float(np.max(values)) for values in known)
     if strength:
         unit, caption = strength / 100, "utilisation in %"
     else:

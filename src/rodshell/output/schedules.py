@@ -27,6 +27,12 @@ def head(column: str) -> tuple[str, str]:
     return (f"angle {name}" if unit == "deg" else name), UNITS.get(unit, "")
 
 
+def heading(column: str) -> str:
+    """The same in one line: "cut length [mm]"."""
+    name, unit = head(column)
+    return f"{name} [{unit}]" if unit else name
+
+
 def rods_table(archive: Archive, *, brief: bool = False) -> Table:
     """One row a rod; `joints_at_mm` lists every joint at its distance from the rod's start (ends: 0, 1).
 
@@ -44,13 +50,13 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
         ("cut_length_mm", True, lambda rod: mm(rod.cut_length)),
         ("mass_kg", True, lambda rod: _significant(rod.more.get("mass"))),
         ("joints", True, lambda rod: str(len(rod.joints))),
-        ("min_radius_mm", True, lambda rod: mm(rod.more.get("min_radius"))),
-        ("max_normal_curvature_per_m", False, lambda rod: _figure(rod.more.get("normal_curvature"))),
-        ("max_geodesic_curvature_per_m", False, lambda rod: _figure(rod.more.get("geodesic_curvature"))),
-        ("max_twist_deg_per_m", False, lambda rod: _figure(rod.more.get("twist_rate"), 180 / pi)),
+        ("min_radius_mm", True, lambda rod: _significant(rod.more.get("min_radius"), 1e3)),
+        ("max_normal_curvature_per_m", False, lambda rod: _significant(rod.more.get("normal_curvature"))),
+        ("max_geodesic_curvature_per_m", False, lambda rod: _significant(rod.more.get("geodesic_curvature"))),
+        ("max_twist_deg_per_m", False, lambda rod: _significant(rod.more.get("twist_rate"), 180 / pi)),
         ("max_strain", True, lambda rod: _number(rod.more.get("max_strain"), 6)),
         ("max_stress_MPa", True, lambda rod: _mpa(rod.more.get("max_stress"))),
-        ("max_torsion_stress_MPa", False, lambda rod: _figure(rod.more.get("torsion_stress"), 1e-6)),
+        ("max_torsion_stress_MPa", False, lambda rod: _mpa(rod.more.get("torsion_stress"))),
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
         ("utilisation_pop_up", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
         ("splices_at_mm", True, lambda rod: "; ".join(mm(at) for at in rod.more.get("splices") or ())),
@@ -245,16 +251,12 @@ def _degrees(a: Floats, b: Floats) -> float:
 
 
 def _mpa(value: float | None) -> str:
-    return "" if value is None else f"{1e-6 * value:.5g}"
+    return _significant(value, 1e-6)
 
 
-def _significant(value: float | None) -> str:
-    """Four figures, as a balance has them."""
-    return "" if value is None else f"{float(f'{value:.4g}'):.10f}".rstrip("0").rstrip(".")
-
-
-def _figure(value: float | None, factor: float = 1.0) -> str:
-    return "" if value is None else f"{round(factor * value, 9):.5g}"
+def _significant(value: float | None, unit: float = 1.0) -> str:
+    """What is weighed or computed, over a unit: four figures, never as 2.55e+04."""
+    return "" if value is None else f"{float(f'{unit * value:.4g}'):.10f}".rstrip("0").rstrip(".")
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -1,11 +1,12 @@
 """One screen of text about a result."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import degrees
 from typing import Any
 
+from rodshell.output.rounding import rounding_of
 from rodshell.output.verdict import unknown_below, verdict_of
-from rodshell.output.wording import NAMES, case_rows, percent, rounded, share_of_weight, stage, stress
+from rodshell.output.wording import NAMES, case_rows, millimetres, percent, rounded, share_of_weight, stage, stress
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
 
@@ -15,7 +16,7 @@ STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
 def summary_text(result: dict[str, Any]) -> str:
     """What was found, how good it is, and what to read first."""
     rods = result["rods"]
-    joints = sum(len(rod["joints"]) for rod in rods) // 2
+    joints, mm = sum(len(rod["joints"]) for rod in rods) // 2, _lengths(result)
     verdict = verdict_of(result)
     lines = [f"{result['name']}: {verdict.headline}"]
     lines += [f"            {reason}" for reason in verdict.reasons[1:]]
@@ -24,7 +25,7 @@ def summary_text(result: dict[str, Any]) -> str:
     lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
-            f"  footprint known within {_mm(net['error_estimate'])} before extrapolation; "
+            f"  footprint known within {mm(net['error_estimate'])} before extrapolation; "
             f"smallest angle {net['min_angle_deg']:.1f} deg"
         )
     if drape := result.get("drape"):
@@ -32,16 +33,16 @@ def summary_text(result: dict[str, Any]) -> str:
         line = f"  drape     {drape['method']}: {drape['dofs']} unknowns, {work} factorisations, "
         line += f"{drape['seconds']:.2f} s, "
         gap = "gap" if drape["method"] == "bound" else "deepest node inside by"
-        line += f"{gap} {_mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
+        line += f"{gap} {mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
         lines.append(line + f"negative modes {drape['negative_modes']}")
         if own := drape.get("own_ends"):
-            lines.append(f"            its own rod ends within {_mm(own['max'])}, median {_mm(own['median'])}")
+            lines.append(f"            its own rod ends within {mm(own['max'])}, median {mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
         state = "stable, unloaded" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
         if gap := result.get("agreement", {}).get(ends):
-            line += f"; gap max {_mm(gap['max'])} ({percent(gap['max_relative'])}), "
-            line += f"rms {_mm(gap['rms'])} ({percent(gap['rms_relative'])})"
+            line += f"; gap max {mm(gap['max'])} ({percent(gap['max_relative'])}), "
+            line += f"rms {mm(gap['rms'])} ({percent(gap['rms_relative'])})"
         lines.append(line)
     lines += _checked(result)
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
@@ -98,6 +99,7 @@ def rod_text(rod: Mapping[str, Any]) -> str:
 
 def _sewn(result: dict[str, Any]) -> Iterator[str]:
     """Each patch and each seam in a line of the summary."""
+    mm = _lengths(result)
     for patch in result.get("patches") or []:
         line = f"  patch {patch['id']:<4}{patch['rods']} rods, heading {degrees(patch['rotate']):.1f} deg; "
         line += f"smallest angle {patch['net']['min_angle_deg']:.1f} deg"
@@ -106,7 +108,7 @@ def _sewn(result: dict[str, Any]) -> Iterator[str]:
         yield line
     moved = max((patch["ends_moved"] for patch in result.get("patches") or []), default=0.0)
     for number, seam in enumerate(result.get("seams") or [], start=1):
-        line = f"  seam {number:<5}{len(seam['meetings'])} rods of either side meet, ends moved by {_mm(moved)} at most"
+        line = f"  seam {number:<5}{len(seam['meetings'])} rods of either side meet, ends moved by {mm(moved)} at most"
         for ends, force in (seam.get("forces") or {}).items():
             line += f"; {ends} it carries {rounded(force['largest'])} N at most"
         yield line
@@ -114,7 +116,7 @@ def _sewn(result: dict[str, Any]) -> Iterator[str]:
 
 def _checked(result: dict[str, Any]) -> list[str]:
     """Bending, own weight and reactions, in a line each."""
-    lines, unknown = [], unknown_below(result)
+    lines, unknown, mm = [], unknown_below(result), _lengths(result)
     of = (result.get("bending") or {}).get("strength_of")
     strength = f"{of}'s bending strength" if of else "the strength"
     for place, bent in result.get("bending", {}).items():
@@ -122,7 +124,7 @@ def _checked(result: dict[str, Any]) -> list[str]:
             continue
         if isinstance(bent, dict) and bent.get("min_radius") is not None:
             name = "way up" if place == "pop_up" else place
-            line = f"  bending   {name:<8}smallest radius {_mm(bent['min_radius'])}{_curved(bent)}"
+            line = f"  bending   {name:<8}smallest radius {mm(bent['min_radius'])}{_curved(bent, mm)}"
             if bent.get("max_stress") is not None:
                 line += f", largest stress {stress(bent['max_stress'])}"
             if bent.get("torsion_stress"):
@@ -135,7 +137,7 @@ def _checked(result: dict[str, Any]) -> list[str]:
     for ends, weighed in result.get("self_weight", {}).items():
         line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}"
         if weighed.get("deflection") is not None:
-            line += f"; sinks by {_mm(weighed['deflection'])} under it"
+            line += f"; sinks by {mm(weighed['deflection'])} under it"
         lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
@@ -143,16 +145,22 @@ def _checked(result: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _curved(bent: dict[str, Any]) -> str:
+def _curved(bent: dict[str, Any], mm: Callable[[float], str]) -> str:
     """How the rods are curved out of the shell and within it, by radii, and twisted."""
     parts = [("normal_curvature", "out of the shell"), ("geodesic_curvature", "within it")]
-    words = [f"{where} {_mm(1 / bent[key])}" for key, where in parts if (bent.get(key) or 0.0) > STRAIGHT]
+    words = [f"{where} {mm(1 / bent[key])}" for key, where in parts if (bent.get(key) or 0.0) > STRAIGHT]
     if (bent.get("twist_rate") or 0.0) > STRAIGHT:
         words.append(f"twist {rounded(degrees(bent['twist_rate']))} deg/m")
     return f" ({', '.join(words)})" if words else ""
 
 
-def _mm(metres: float) -> str:
-    if abs(metres) >= 1.0:
-        return f"{rounded(metres)} m"
-    return f"{1e3 * metres:.3g} mm" if abs(metres) >= 1e-9 else "0 mm"
+def _lengths(result: dict[str, Any]) -> Callable[[float], str]:
+    """How lengths [m] are shown: to three figures, no finer than on the drawings."""
+    rounding = rounding_of(result)
+
+    def shown(metres: float) -> str:
+        if abs(metres) >= 1.0:
+            return f"{rounded(metres)} m"
+        return millimetres(metres, rounding=rounding) if abs(metres) >= 1e-9 else "0 mm"
+
+    return shown

@@ -4,8 +4,10 @@ from collections.abc import Mapping, Sequence
 from math import isfinite, pi
 from typing import Any
 
+from rodshell.output.rounding import FINEST, Rounding
 from rodshell.units import stress_text
 
+EXACT = Rounding(FINEST)
 UNKNOWN = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
@@ -17,7 +19,9 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     **dict.fromkeys(("EI", "EI1", "EI2", "GJ"), (1.0, "N m\N{SUPERSCRIPT TWO}")),
     **dict.fromkeys(("mass", "mass_per_length"), (1.0, "kg/m")),
     "EA": (1.0, "N"),
-    **dict.fromkeys(("youngs_modulus", "shear"), (1e-6, "MPa")),
+    **dict.fromkeys(("youngs_modulus", "shear", "fibre_modulus"), (1e-6, "MPa")),
+    "fibre_distances": (1e3, "mm"),
+    "torsion_modulus": (1e6, "cm\N{SUPERSCRIPT THREE}"),
     "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
     "rotate": (180 / pi, "\N{DEGREE SIGN}"),
 }
@@ -35,15 +39,15 @@ def rounded(value: float, digits: int = 3) -> str:
     return f"{float(text):.0f}" if abs(float(text)) >= 10**digits else text
 
 
-def millimetres(metres: float | None, digits: int = 3) -> str:
-    """A length [m] in mm with about `digits` significant digits, 0.001 mm at the finest."""
+def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXACT) -> str:
+    """A length [m] in mm with about `digits` significant digits, no finer than its rounding."""
     if metres is None or not isfinite(metres):
         return UNKNOWN
     value = 1e3 * metres
-    if value and abs(value) < 1e-3:
-        return "under 0.001 mm"
+    if value and abs(value) < rounding.step:
+        return f"under {rounding.words}"
     whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
-    return f"{value:.{min(max(digits - whole, 0), 3)}f} mm"
+    return f"{value:.{min(max(digits - whole, 0), rounding.digits)}f} mm"
 
 
 def percent(share: float | None) -> str:
@@ -62,7 +66,7 @@ def share_of_weight(found: Mapping[str, Any]) -> str:
         return "unknown: no mass was given"
     if factor is None:
         return "more than 100 times"
-    if factor == 0:
+    if limit == "unstable unloaded":
         return "none: unstable unloaded"
     least = "at least " if limit == "not followed" else ""
     return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
@@ -106,10 +110,10 @@ def small(value: float) -> str:
     return f"{value:.1e}"
 
 
-def place(point: Sequence[float | None]) -> str:
+def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
     """A point (3,) [m] in mm."""
-    known = [round(1e3 * x, 1) + 0.0 for x in point if x is not None]
-    return ", ".join(f"{x:.1f}".replace("-", MINUS) for x in known) + " mm" if len(known) == 3 else UNKNOWN
+    known = [rounding.mm(x).replace("-", MINUS) for x in point if x is not None]
+    return f"{', '.join(known)} mm" if len(known) == 3 else UNKNOWN
 
 
 def yes_or_no(value: object) -> str:

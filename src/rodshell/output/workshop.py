@@ -181,7 +181,7 @@ def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) ->
         "end_allowance": made.options.end_allowance,
         "stock_length": made.options.stock_length,
         "kerf": made.options.kerf,
-        "total_mass": float(made.mass.sum()),
+        "total_mass": float(made.mass.sum()) + len(joints) * (result.get("joint") or {}).get("mass", 0.0),
         "bracing": [
             {"from": joints[brace.joints[0]], "to": joints[brace.joints[1]], "flat": brace.flat, "final": brace.final}
             for brace in made.bracing

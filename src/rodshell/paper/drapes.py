@@ -117,7 +117,8 @@ def _drape(case: Case, method: Method, fall: Fall, progress: Progress) -> Drape:
         progress(f"({case.label}) {case.target.name}, {stage}", detail, residual)
 
     begun = perf_counter()
-    draped = drape(case.layout, ROD, case.target, method=method, fall=fall, progress=told)
+    falls = fall if method == "paper" else None
+    draped = drape(case.layout, ROD, case.target, method=method, fall=falls, progress=told)
     trimmed = trim(draped)
     seconds = perf_counter() - begun
     exact: dict[str, FlatRod] = {rod.name: rod for rod in chebyshev_net(case.target, case.layout).rods}

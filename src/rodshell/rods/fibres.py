@@ -133,9 +133,10 @@ def refuse_unknown_stress(rod: Rod, *, twisted: bool) -> None:
     twisted : whether its rods can be: by joints that turn them, or since they bend about two unlike axes.
     """
     if missing := _missing(rod, twisted):
+        needed = " and ".join([", ".join(missing[:-1]), missing[-1]] if missing[1:] else missing)
         raise InputError(
-            f"a strength can be checked only where the stress is known, and of this given section that needs "
-            f"{' and '.join(missing)}: give what is missing (rod.section), or leave out the strength"
+            "a strength can be checked only where the stress is known, and of this given section that needs "
+            f"{needed}: give what is missing (rod.section), or leave out the strength"
         )
 
 

@@ -30,12 +30,12 @@ MODES = 4  # lowest ones that are looked at
 MOST_FACTORIZATIONS = 120
 MOST_STEPS = 12  # of Newton's method for a point
 FARTHEST = 0.1  # of the length that a node moves from point to point
-STRAYED = 0.3  # of a step: a point so far off the prediction may lie on another path; half of it is aimed at
-SHRINKAGE, GROWTH = 0.4, 3.0  # of steps that failed, at least; and from point to point, at most
-RETURNED = 0.5  # of a step, from its end: where a mode's stiffness seems to vanish there, it may have been negative
+STRAYED = 0.3  # of a step: a point so far off its prediction may be on another path. Half of it is aimed at
+SHRINKAGE, GROWTH = 0.4, 3.0  # of a step that failed; at most, from one step to the next
+RETURNED = 0.5  # of a step, back from its end: a mode without stiffness there may have been unstable in between
 PASSING = 0.5 * CLOSE  # of the arc so far: the shortest step past a singular stiffness
-UNEXPLAINED = 4.0  # of the arc to an unstable point: the lowest modes of the stable one vanish farther ahead only
-LEAST = 1e-5  # of the arc so far: shorter steps are given up; that arc being counted as so much of the length at least
+UNEXPLAINED = 4.0  # times the arc to an unstable point: if no mode loses its stiffness nearer, it is on another path
+LEAST = 1e-5  # of the arc so far: shorter steps are given up; of the length: the least that counts as the arc so far
 SETTLED, SETTLED_FORCE = 1e-10, 1e-8  # of the length and of the largest axial force: last change of a point
 CHORD, SLOW = 5e-3, 0.2  # as in `newton_step`
 SAME_STIFFNESS = 1e-5, 1e-4  # of length and force: factors from this near are those of the point
@@ -129,7 +129,7 @@ def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats
         doubt = min(0.5, max(0.02, abs(now - foreseen) / now)) if np.isfinite(now) and np.isfinite(foreseen) else 0.5
         before, here = here, there
         if beyond is not None and here.ahead > UNEXPLAINED * (beyond.arc - here.arc) and here.strayed < 0.1 * STRAYED:
-            beyond = None  # it lies on another path
+            beyond = None
     if limit == "lost" and here.ahead * here.rate <= CLOSE * here.factor:
         limit = "limit point"  # so sharp a turn that its far side was not found, but no farther than that
     return Critical(here.factor, limit, unit_state, path.factorizations)
@@ -168,8 +168,7 @@ class _Path:
 
     def next_step(self, here: _Point, beyond: _Point | None, most: float, doubt: float) -> float:
         """How far to go: for the singular stiffness ahead, from below until it is near enough to pass."""
-        left = 0.5 * here.ahead * here.rate if np.isfinite(here.ahead) else np.inf  # of the factor, at least
-        near = 2 * left < 0.4 * CLOSE * here.factor
+        near = here.ahead * here.rate < 0.4 * CLOSE * here.factor
         step = max(2.0 * here.ahead, PASSING * here.arc) if near else (1 - doubt) * here.ahead
         if beyond is not None:
             span = beyond.arc - here.arc

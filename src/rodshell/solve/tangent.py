@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.sparse import csc_matrix
 
 from rodshell.rods.elements import Elements
@@ -61,22 +60,22 @@ class Tangent:
     def lowest(self, count: int, start: Floats | None = None) -> tuple[Floats, Floats]:
         """The `count` lowest modes of the last stiffness, which is stable: values (k,) ascending and modes (k, dofs).
 
-        By subspace iteration [Bathe 2014, section 11.6]; a mode's square sum over the scale is 1.
+        By orthogonal iteration with the inverse [Golub and Van Loan 2013, section 8.2.4]; a mode's square sum over the
+        scale is 1. The values are a little too large, never too small.
         start : (k, dofs) modes of a state nearby, or None.
         """
         size, scale = self.free.size, self._scale
         if start is None:  # no symmetry of the shell is one of this start
             start = np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None]) * scale
-        modes, lowest = start, np.inf
+        scaled, largest = _orthonormal(start / scale), 0.0
         for _ in range(MOST_ITERATIONS):
-            loads = modes / scale**2
-            images = np.array([self.pattern.solver.solve(load) for load in loads])
-            values, turn = eigh(_products(images, loads), _products(images / scale**2, images))
-            modes = np.einsum("ji,jk->ik", turn, images)
-            if abs(lowest - values[0]) <= CLOSE * values[0]:
+            images = np.array([self.pattern.solver.solve(row / scale) for row in scaled]) / scale
+            inverse, turn = np.linalg.eigh(_products(scaled, images))
+            scaled = _orthonormal(np.einsum("ji,jk->ik", turn[:, ::-1], images))
+            if abs(largest - inverse[-1]) <= CLOSE * inverse[-1]:
                 break
-            lowest = values[0]
-        return values, modes
+            largest = inverse[-1]
+        return 1.0 / inverse[::-1], scaled * scale
 
     def change(self, elements: Sequence[Elements], state: Floats, forces: Floats, modes: Floats, step: float) -> Floats:
         """(k, k) change of the last stiffness to that at the state given, over `step`, between modes (k, dofs)."""
@@ -92,6 +91,16 @@ class Tangent:
             element.evaluate(state, unused, hessians)
         self._stretch.with_forces(forces).evaluate(state, unused, self._hessians[-2])
         return self.pattern.assembly.assemble(self._hessians, self._blocks, self.free)
+
+
+def _orthonormal(rows: Floats) -> Floats:
+    """By Gram and Schmidt, twice, the first row first."""
+    result = rows.copy()
+    for k, row in enumerate(result):
+        for _ in range(2):
+            row -= np.einsum("i,ik->k", np.einsum("ik,k->i", result[:k], row), result[:k])
+            row /= np.sqrt(np.einsum("k,k->", row, row))
+    return result
 
 
 def _products(a: Floats, b: Floats) -> Floats:

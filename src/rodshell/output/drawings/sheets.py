@@ -166,7 +166,7 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     top = MARGIN + BLOCK
     pencil.line([(MARGIN, top), (width - MARGIN, top)], "TITLE", pen=Pen(INK, 0.35))
     left, right, y = MARGIN + 4, width - MARGIN - 4, top - 7.0
-    title = shortened(f"{block.name}: {sheet.title}", right - left - 80, 5.0, bold=True)
+    title = shortened(f"{block.name}: {sheet.title}", right - left - 80, 5.0)
     pencil.write(title, (left, y), 5.0, "TITLE", bold=True)
     pencil.write(f"Sheet {number} of {count}", (right, y), TEXT, "TITLE", anchor="end")
     y = write_entries(pencil, block, left, y - 6.2, right - left, FINE, 1.7 * FINE)

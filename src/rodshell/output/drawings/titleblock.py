@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from rodshell.output.archive import Archive, json_text, printable
-from rodshell.output.drawing import INK, PAPER, Drawing, Pen, Pencil
+from rodshell.output.drawing import INK, LETTER, PAPER, SOFT, Drawing, Pen, Pencil
 from rodshell.output.inputs import input_hash
-from rodshell.output.pdf import text_width
 from rodshell.output.plan import NOTE, nice_step
 from rodshell.output.rounding import rounding_of
 from rodshell.output.wording import case_rows, rounded, stress
@@ -104,7 +103,9 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     pencil.line([(left, y + 1.6 * size), (right, y + 1.6 * size)], "TITLE")
     pencil.write(f"{block.name}: {drawing.title.lower()}, 1:1", (left, y), 1.4 * size, "TITLE", bold=True)
     rows = [block.entries[k : k + COLUMNS] for k in range(0, len(block.entries), COLUMNS)]
-    lines = ["   ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(drawing)
+    lines = [" \N{MIDDLE DOT} ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(
+        drawing
+    )
     for k, line in enumerate(lines, start=1):
         pencil.write(line, (left, y - 1.5 * k * size), size, "TITLE")
     end = left + max(right - left, 0.25 * (right - left) + 4 * size)
@@ -119,20 +120,16 @@ def write_entries(
     step = width / COLUMNS
     for k, (label, value) in enumerate(block.entries):
         x, down = left + step * (k % COLUMNS), y - line * (k // COLUMNS)
-        pencil.write(label, (x, down), size, "TITLE", colour="#6c757d")
-        start = 8.5 * 0.62 * size
+        pencil.write(label, (x, down), size, "TITLE", colour=SOFT)
+        start = 9.5 * LETTER * size  # after the longest label
         pencil.write(shortened(value, step - start - 2.0, size), (x + start, down), size, "TITLE")
     return y - line * len(range(0, len(block.entries), COLUMNS))
 
 
-def shortened(text: str, width: float, size: float, *, bold: bool = False) -> str:
+def shortened(text: str, width: float, size: float) -> str:
     """A text that takes at most a width [mm] in a size; what is cut off is shown by dots."""
-    size *= 1.08 if bold else 1.0  # bold letters are some 6 % wider
-    if text_width(text) * size <= width:
-        return text
-    while text and text_width(text + "\N{HORIZONTAL ELLIPSIS}") * size > width:
-        text = text[:-1]
-    return text.rstrip() + "\N{HORIZONTAL ELLIPSIS}"
+    letters = int(width / (LETTER * size))
+    return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:

@@ -1,0 +1,84 @@
+"""What share of its own weight a shell bears, and what is said of it. Figures: `parity/test_loaded_shells.py`."""
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.checks import SelfWeight, self_weight, settled_shell
+from rodshell.checks.self_weight import weakest
+from rodshell.model import Shell
+from tests.checks.shells import ROD, dome
+
+
+def found(form: rs.Form) -> SelfWeight:
+    return self_weight(*settled_shell(form.popped["pinned"]))
+
+
+def with_rod(rod: rs.Rod) -> rs.Form:
+    form = dome()
+    return rs.find_form(form.target, form.layout, rod, ends=("pinned",))
+
+
+def test_the_factor_goes_with_stiffness_over_density():
+    stiffer = rs.Rod(ROD.section, rs.Material(youngs_modulus=60e6, density=2e3))
+    small, large = found(dome()), found(with_rod(stiffer))
+    assert large.load_factor == pytest.approx(30 * small.load_factor, rel=1e-6)
+
+
+def test_the_deflection_goes_with_density_over_stiffness_alone():
+    stiff = rs.Rod(ROD.section, rs.Material(youngs_modulus=200e6, density=1e3))
+    stiffer = rs.Rod(ROD.section, rs.Material(youngs_modulus=2e9, density=10e3))
+    assert found(with_rod(stiffer)).deflection == pytest.approx(found(with_rod(stiff)).deflection, rel=1e-6)
+
+
+def test_what_bears_more_than_100_times_its_weight_has_no_factor_but_a_deflection():
+    steel = found(with_rod(rs.Rod(ROD.section, rs.Material(210e9, 7850, 0.3))))
+    assert steel.load_factor is None
+    assert steel.limit == "none"
+    assert 0 < steel.deflection < 1e-4 * 0.2
+
+
+def test_rods_without_a_mass_are_said_to_have_none():
+    given = rs.Rod(rs.GivenSection(EA=3.0, EI1=8e-7, EI2=8e-7, GJ=5e-7))
+    form = with_rod(given)
+    archive = form.archive()
+    assert archive.result["self_weight"]["pinned"] == {"load_factor": None, "deflection": None, "limit": "no mass"}
+    assert any("no mass was given" in word for word in archive.result["warnings"])
+    assert "own weight borne: unknown: no mass was given" in archive.summary()
+
+
+def test_joints_weigh_what_they_are_said_to_weigh():
+    mesh, joint = dome().footprint.mesh, rs.Ball(mass=2e-3)
+    bare, heavy = (Shell.of(mesh, ROD, joint=one).mass[: mesh.node_count, 2].sum() for one in (rs.Ball(), joint))
+    assert heavy - bare == pytest.approx(2e-3 * len(mesh.grid.crossings))
+
+
+def test_heavy_joints_leave_less_to_bear():
+    form = dome()
+    heavy = rs.find_form(form.target, form.layout, ROD, ends=("pinned",), joint=rs.Ball(mass=1e-4))
+    share = ROD.mass_per_length * form.footprint.mesh.edge_lengths.sum()
+    share /= share + 1e-4 * len(form.footprint.mesh.grid.crossings)
+    assert found(heavy).load_factor == pytest.approx(share * found(form).load_factor, rel=0.2)  # they sit high up
+
+
+def test_what_is_sewn_bears_as_little_as_its_weakest_patch():
+    strong, weak = SelfWeight(None, 1e-3, "none", 5), SelfWeight(0.7, None, "limit point", 9)
+    assert weakest([strong, weak]) == SelfWeight(0.7, None, "limit point", 14)
+    assert weakest([strong, strong]) == SelfWeight(None, 1e-3, "none", 10)
+    assert weakest([strong, SelfWeight(None, None, "no mass")]).limit == "no mass"
+
+
+def test_summary_and_result_say_both_kinds_of_ends():
+    archive = dome().archive()
+    for ends, said in archive.result["self_weight"].items():
+        assert said["limit"] == "bifurcation"
+        assert f"weight    {ends:<8}own weight borne: {100 * said['load_factor']:.2g} %" in archive.summary()
+    assert "stable, unloaded" in archive.summary()
+
+
+def test_a_rubber_hemisphere_sinks_evenly_under_its_weight():
+    shell, settled = settled_shell(dome().popped["clamped"])
+    lighter = self_weight(shell, settled, gravity=9.81 / 100)
+    half = self_weight(shell, settled, gravity=9.81 / 200)
+    assert lighter.load_factor == pytest.approx(half.load_factor / 2, rel=1e-6)
+    assert np.isclose(lighter.deflection, 2 * half.deflection, rtol=0.15)  # nearly linear far below the limit

@@ -1,0 +1,121 @@
+"""Sheets can be read on paper, and say what they are and what they leave out."""
+
+import os
+import time
+from dataclasses import replace
+
+import pytest
+from forms import archive, wished
+from hostile import hostile_archive
+from sample_archive import sample_archive, table_archive
+
+from rodshell.errors import InputError
+from rodshell.output import Archive
+from rodshell.output.drawing import LETTER, Drawing
+from rodshell.output.drawings import sheet_set
+from rodshell.output.drawings.flat import flat_drawing
+from rodshell.output.drawings.sheets import MARGIN, TEXT, fitted, parts, tiled
+from rodshell.output.drawings.titleblock import title_block
+from rodshell.output.plan import flat_plan
+from rodshell.output.takeaway import PAPERS, DrawingStyle
+
+CAPITAL = 0.718  # height of Helvetica's capitals over its size [Adobe's font metrics]
+
+
+def sheets(made: Archive) -> list[Drawing]:
+    return sheet_set(made, flat_plan(made))[0]
+
+
+def styled(made: Archive, **style: object) -> Archive:
+    return replace(made, result={**made.result, "drawings": style})
+
+
+@pytest.mark.parametrize("paper", ["A4", "A3", "A1"])
+def test_capitals_are_never_lower_than_iso_3098_has_them(paper: str) -> None:
+    """1.8 mm is the smallest height of letters in ISO 3098, 2.5 mm the usual one."""
+    sizes = [text.size for sheet in sheets(styled(archive("dome"), paper=paper)) for text in sheet.texts]
+    assert CAPITAL * min(sizes) >= 1.8
+    assert pytest.approx(2.5, abs=0.02) == CAPITAL * TEXT
+
+
+def test_what_finds_no_room_is_counted_and_said() -> None:
+    """The whole plan of the dome on A3 has no room for ids of joints: those written and those left out are all."""
+    made = archive("dome")
+    plan = flat_plan(made)
+    whole = next(sheet for sheet in sheets(made) if sheet.title == "Flat plan")
+    ids = {joint.id for joint in plan.joints}
+    written = [text.text for text in whole.texts if text.text in ids]
+    assert whole.left_out == (f"all of {len(ids)} joint ids (named by the rods that cross)",)
+    assert not written
+    assert any(whole.left_out[0] in text.text for text in whole.texts)
+
+
+def test_parts_show_what_the_whole_leaves_out() -> None:
+    """All ids of joints stand on the parts, which are no larger than it takes: the next smaller scale has no room."""
+    plan, paper = flat_plan(archive("dome")), PAPERS["A3"]
+
+    def compose(text: float) -> Drawing:
+        return flat_drawing(plan, text)
+
+    shown = list(parts(compose, paper, fitted(compose, paper)))
+    texts = {text.text for sheet in shown for text in sheet.content.texts}
+    assert {joint.id for joint in plan.joints} <= texts
+    coarser = {2.5: 3, 2: 2.5, 1: 2}[shown[0].scale]
+    assert next(tiled(compose, paper, coarser)).content.left_out
+
+
+def test_a_sheet_that_shows_all_needs_no_parts() -> None:
+    plan, paper = flat_plan(table_archive()), PAPERS["A0"]
+    whole = fitted(lambda text: flat_drawing(plan, text), paper)
+    assert not whole.content.left_out
+    assert list(parts(lambda text: flat_drawing(plan, text), paper, whole)) == []
+
+
+def test_the_title_block_names_rods_joints_author_and_date() -> None:
+    made = styled(wished(), name="Pavilion roof", author="A. Nyone", date="2026-11-22", project="Park", tolerance=5e-4)
+    entries = dict(title_block(made, "").entries)
+    assert entries["Section"] == "circle, radius 1 mm"
+    assert entries["Material"].startswith("E 1 MPa, 1000 kg/m")
+    assert (entries["Drawn by"], entries["Date"], entries["Project"]) == ("A. Nyone", "2026-11-22", "Park")
+    assert (entries["Units"], entries["Tolerance"]) == ("mm, shown to 0.1 mm", "0.5 mm")
+    for sheet in sheets(made):
+        texts = {text.text for text in sheet.texts}
+        assert set(entries) | {"A. Nyone", "circle, radius 1 mm"} <= texts
+        assert any(text.startswith("Pavilion roof: ") for text in texts)
+
+
+def test_the_date_is_that_of_source_date_epoch_or_today(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    assert dict(title_block(sample_archive(3, 2), "").entries)["Date"] == "1970-01-01"
+    assert dict(title_block(styled(sample_archive(3, 2), date="2026-11-22"), "").entries)["Date"] == "2026-11-22"
+    for broken in ("soon", "1e400", "99999999999999999999"):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", broken)
+        before = time.strftime("%Y-%m-%d", time.gmtime())
+        assert (
+            before
+            <= dict(title_block(sample_archive(3, 2), "").entries)["Date"]
+            <= time.strftime("%Y-%m-%d", time.gmtime())
+        )
+    assert os.environ["SOURCE_DATE_EPOCH"] == broken
+
+
+def test_dates_that_are_no_days_are_refused() -> None:
+    with pytest.raises(InputError, match="2026-13-01"):
+        DrawingStyle(date="2026-13-01")
+    with pytest.raises(InputError, match="tolerance"):
+        DrawingStyle(tolerance=-1e-3)
+
+
+def test_long_names_are_shortened_to_their_place() -> None:
+    made = hostile_archive()
+    made = styled(made, **{**made.result["drawings"], "project": "W" * 500, "name": "W" * 500, "paper": "A4"})
+    for sheet in sheets(made):
+        for text in sheet.texts:
+            if set(text.text) & {"W"} and text.layer == "TITLE":
+                assert text.at[0] + LETTER * text.size * len(text.text) <= PAPERS["A4"][0] - MARGIN
+
+
+def test_a_result_without_rod_or_joint_says_so() -> None:
+    bare = {key: value for key, value in sample_archive(3, 2).result.items() if key not in ("rod", "joint")}
+    entries = dict(title_block(replace(sample_archive(3, 2), result=bare), "").entries)
+    assert entries["Section"] == entries["Material"] == "not given"
