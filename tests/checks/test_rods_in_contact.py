@@ -314,6 +314,18 @@ def test_rods_that_meet_at_both_their_ends_are_no_contact() -> None:
     assert contact_of_patches(joined, list(zip(shells, (arch, other), strict=True)), round_rod(5e-3)) == Contact()
 
 
+def test_rods_of_patches_that_cross_only_where_their_flat_grids_lie_are_a_contact() -> None:
+    """Patches are laid out side by side for drawing: that their lines cross there means nothing."""
+    one, other = FlatRod.u("U1", 0.0, 0.0, 0.5), FlatRod.v("V1", 0.0, -0.25, 0.25)
+    meshes = {"A": mesh_grid(FlatGrid.of([one]), 0.01), "B": mesh_grid(FlatGrid.of([other]), 0.01)}
+    shells = [rs.Shell.of(mesh, round_rod(5e-3)) for mesh in meshes.values()]
+    joined = side_by_side_meshes(meshes, 0.01).mesh
+    over = [meshes["A"].flat, meshes["B"].flat + [0.492, 0.0, 0.002]]
+    found = contact_of_patches(joined, list(zip(shells, over, strict=True)), round_rod(5e-3))
+    assert found.pairs == 1
+    assert found.clearance == pytest.approx(-8e-3)
+
+
 def test_fine_meshes_of_thick_rods_find_what_coarse_ones_do() -> None:
     """Edges a twentieth of the thickness are taken together: fewer pairs, and the same clearance to its sag."""
     found, sizes, outline = [], [], _Outline(0.02, 0.02, False)

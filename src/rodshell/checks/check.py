@@ -10,6 +10,7 @@ from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
 from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
+from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
 from rodshell.formfinding import Popped
@@ -38,6 +39,7 @@ class Checks:
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
     self_weight : by end condition, what share of its own weight the shell bears.
     contact : by end condition; `contact_on_the_way` of the deployment's stages.
+    other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
     """
 
     bending: dict[Ends, Bending]
@@ -48,6 +50,7 @@ class Checks:
     self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
     contact_on_the_way: tuple[Contact, ...] = ()
+    other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -165,7 +168,8 @@ def check(
         progress("self-weight", f"{ends} ends", 0.0)
         weighed[ends] = self_weight(*pair)
     if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, (), weighed, met)
+        others = _others(popped, settled, None)
+        return Checks(bent, held, carried, None, (), weighed, met, other_shapes=others)
     last = done["pinned"]
     deployment = deploy(
         last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
@@ -176,7 +180,26 @@ def check(
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way)
+    others = _others(popped, settled, deployment)
+    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others)
+
+
+def _others(
+    popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None
+) -> dict[Ends, OtherShapes]:
+    """Other stable shapes, with half of the factorisations that the shells and the deployment took.
+
+    Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
+    """
+    done = sum(one.report.factorizations for one in popped.values())
+    left = (done + (0 if deployment is None else deployment.factorizations)) // 2
+    found = dict[Ends, OtherShapes]()
+    for ends, (shell, at) in settled.items():
+        if at.report.stable:
+            own = deployment if ends == "pinned" else None
+            found[ends] = other_shapes(shell, at, most_factorizations=left if found else 2 * left // 3, deployment=own)
+            left -= 2 * left // 3
+    return found
 
 
 def _worst(bent: Bending) -> float:

@@ -109,7 +109,8 @@ def _weight_rows(result: Mapping[str, Any], ends: Sequence[str], rounding: Round
         return []
     shares = [wording.share_of_weight(one) if one else wording.UNKNOWN for one in found]
     sunk = [_shown(wording.millimetres, one.get("deflection") if one else None, rounding) for one in found]
-    rows = [("Own weight that it bears", shares)]
+    whose = "the weakest patch, its seam held," if result.get("patches") else "it"
+    rows = [(f"Own weight that {whose} bears", shares)]
     return rows if set(sunk) == {wording.UNKNOWN} else [*rows, ("Largest deflection under its own weight", sunk)]
 
 
@@ -118,11 +119,12 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     bent, held = result.get("bending") or {}, result.get("reactions") or {}
     unknown = unknown_below(result)
     columns = [key for key in (*ENDS, "pop_up") if key in bent and (key in ENDS or unknown < 1)]
-    rows, rounding, of = list[tuple[str, list[str]]](), rounding_of(result), bent.get("strength_of")
+    rows, rounding = list[tuple[str, list[str]]](), rounding_of(result)
+    of = bent.get("strength_of")
     for title, key, show in _BENDING:
         values = [bent[column].get(key) for column in columns]
         if any(value is not None for value in values):
-            title = f"Utilisation of {of}'s bending strength" if of and key == "utilisation" else title
+            title = f"Utilisation of {of}'s strength" if of and key == "utilisation" else title
             rows.append((title, [_shown(show, value, rounding) for value in values]))
     met = result.get("contact") or {}
     near = [(met.get("deployment" if column == "pop_up" else column) or {}).get("clearance") for column in columns]
@@ -142,12 +144,15 @@ def key_figures(result: Mapping[str, Any], plan: FlatPlan) -> list[tuple[str, li
     """Groups of key figures; what is not known is left out."""
     drape, rod = result.get("drape") or {}, result.get("rod") or {}
     parts = [rod.get("section"), rod.get("material"), rod]
-    made = [row for part in parts for row in wording.case_rows(part)]
     groups = [
         ("Target", wording.case_rows(result.get("target"))),
         ("Layout", wording.case_rows(result.get("layout"))),
         ("Cut list", _cut_list(plan)),
-        ("Rod", made + _listed(rod.get("preset") or {}, _PRESET, plan.rounding)),
+        (
+            "Rod",
+            [row for part in parts for row in wording.case_rows(part)]
+            + _listed(rod.get("preset") or {}, _PRESET, plan.rounding),
+        ),
         ("Net", _listed(result.get("net") or {}, _NET, plan.rounding)),
         (
             "Drape",

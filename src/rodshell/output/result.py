@@ -56,6 +56,10 @@ def drape_table(draped: Draped) -> dict[str, Any]:
     }
     if draped.rest is not None:
         drape["fall"] = asdict(draped.rest)
+    if draped.eccentricity:
+        drape["eccentricity"] = draped.eccentricity
+    if draped.sideways is not None:
+        drape["sideways"] = asdict(draped.sideways)
     if draped.own_ends is not None:
         drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
     return drape

@@ -134,8 +134,9 @@ def _checked(result: dict[str, Any]) -> list[str]:
             if place == "pop_up" and unknown:
                 line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
+    least = " (weakest patch, its seam held)" if result.get("patches") else ""
     for ends, weighed in result.get("self_weight", {}).items():
-        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}"
+        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}{least}"
         if weighed.get("deflection") is not None:
             line += f"; sinks by {mm(weighed['deflection'])} under it"
         lines.append(line)

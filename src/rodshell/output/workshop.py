@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.checks import Bending, Checks, JointLoads, Reactions, SelfWeight
+from rodshell.checks import (
+    Bending,
+    Checks,
+    Elsewhere,
+    JointLoads,
+    OtherShape,
+    OtherShapes,
+    Reactions,
+    SelfWeight,
+)
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 
@@ -56,6 +65,7 @@ def workshop_result(
         "self_weight": {ends: _self_weight(one) for ends, one in checks.self_weight.items()},
         **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
         "contact": _contact(checks),
+        "other_shapes": {ends: _other_shapes(one) for ends, one in checks.other_shapes.items()},
         "fabrication": _fabrication(result, mesh, made),
     }
 
@@ -171,7 +181,25 @@ def _deployment(checks: Checks) -> dict[str, Any]:
         {"share": share, "height": float(np.ptp(positions[:, 2])), **_bent([bent], slice(None), None)}
         for share, positions, bent in zip(way.share, way.positions, checks.on_the_way, strict=True)
     ]
-    return {"ends": "pinned", "stages": stages, "snaps": [list(pair) for pair in way.snaps], "lost_at": way.lost_at}
+    return {
+        "ends": "pinned",
+        "stages": stages,
+        "snaps": [[snap.start, snap.stop] for snap in way.snaps],
+        "snapped_by": [snap.moved for snap in way.snaps],
+        "lost_at": way.lost_at,
+        "reached_from_flat": way.reached_from_flat,
+        "elsewhere": None if way.elsewhere is None else _figures(way.elsewhere),
+        "guided": None if way.guided is None else list(way.guided),
+    }
+
+
+def _figures(shape: Elsewhere | OtherShape) -> dict[str, Any]:
+    """All that is known of a shape but its positions."""
+    return {key: value for key, value in vars(shape).items() if key != "positions"}
+
+
+def _other_shapes(searched: OtherShapes) -> dict[str, Any]:
+    return {"tried": searched.tried, "searched": searched.searched, "found": [_figures(one) for one in searched.found]}
 
 
 def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) -> dict[str, Any]:
