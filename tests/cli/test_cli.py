@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -37,7 +38,7 @@ class FakeArchive:
         self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
-    def save(self, folder: ResultFolder, kinds: list[str] | None = None, more: dict[str, str] | None = None) -> None:
+    def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
         self.kinds = kinds
         folder.put("case.toml", self.case_toml)
         folder.commit()
@@ -304,6 +305,55 @@ def test_progress_away_from_a_terminal_is_a_line_for_each_stage(
 ) -> None:
     assert main(["form", "hemisphere"]) == 0
     assert capsys.readouterr().err.splitlines() == ["rodshell: net", "rodshell: drape", "rodshell: pop up"]
+
+
+def test_a_long_silence_is_broken_by_a_line_that_says_everything(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rodshell.cli.progress.SILENCE", 0.05)
+    search = finder.find_form
+
+    def slow(*args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
+        progress("drape", "bound, iteration 3 of at most 60", 1e-3)
+        time.sleep(0.5)
+        return search(*args, progress=progress, **options)
+
+    finder.find_form = slow  # type: ignore[method-assign]
+    assert main(["form", "hemisphere"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "rodshell: drape"
+    assert re.fullmatch(r"rodshell: drape: bound, iteration 3 of at most 60, residual 1.0e-03, \d s", said[1])
+    assert main(["form", "hemisphere", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("given", ["0", "-3 s", "soon", "3 mm"])
+def test_a_time_limit_that_is_none_is_refused(
+    given: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "--time-limit = " in refused(capsys, "form", "hemisphere", f"--time-limit={given}")
+    assert finder.calls == []
+
+
+def test_out_of_time_before_anything_was_found_keeps_the_old_result(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    before = Path("dome/case.toml").read_bytes()
+    said = refused(
+        capsys, "form", "hemisphere", "--radius", "0.3", "--out", "dome", "--time-limit", "1e-6 s", "-q", code=3
+    )
+    assert "out of time after 1e-06 s in stage net (iteration 1); nothing was found yet" in said
+    assert Path("dome/case.toml").read_bytes() == before
+
+
+def test_out_of_time_is_said_as_such(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
+    finder.status = "out of time after 60 s in stage drape (bound, iteration 3)"
+    assert main(["form", "hemisphere", "-q"]) == 3
+    assert (
+        capsys.readouterr().err
+        == f"rodshell: {finder.status}; partial results are in {Path('out/hemisphere').resolve()}\n"
+    )
 
 
 def test_quiet_says_nothing(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,8 @@
 """All checks of a popped-up shell in one call."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 
 import numpy as np
@@ -13,6 +14,7 @@ from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
+from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
@@ -21,6 +23,7 @@ from rodshell.model import Shell
 from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
+from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import length_text, stress_text
@@ -40,6 +43,7 @@ class Checks:
     self_weight : by end condition, what share of its own weight the shell bears.
     contact : by end condition; `contact_on_the_way` of the deployment's stages.
     other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
+    out_of_time : a sentence on when that was and which checks are missing, or "".
     """
 
     bending: dict[Ends, Bending]
@@ -51,12 +55,14 @@ class Checks:
     contact: dict[Ends, Contact] = field(default_factory=dict)
     contact_on_the_way: tuple[Contact, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
+    out_of_time: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
-        way = (*way, *unknown_weights(self.self_weight), *self.touching)
+        late = (self.out_of_time,) if self.out_of_time else ()
+        way = (*late, *way, *unknown_weights(self.self_weight), *self.touching)
         bends = [
             float(bent.bending_strain.max())
             for bent in (*self.bending.values(), *self.on_the_way)
@@ -164,42 +170,67 @@ def check(
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     weighed = dict[Ends, SelfWeight]()
-    for ends, pair in settled.items():
-        progress("self-weight", f"{ends} ends", 0.0)
-        weighed[ends] = self_weight(*pair)
-    if "pinned" not in done or not stages:
-        others = _others(popped, settled, None)
-        return Checks(bent, held, carried, None, (), weighed, met, other_shapes=others)
-    last = done["pinned"]
-    deployment = deploy(
-        last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
-        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
-    )  # fmt: skip
-    mesh, laid = last.footprint.mesh, deployment.positions[0]
+    follow = "pinned" in done and stages > 0
+    deployment, others, late = None, dict[Ends, OtherShapes](), ""
+    missing = [f"self-weight with {ends} ends" for ends in settled]
+    missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
+    try:
+        for ends, pair in settled.items():
+            weighed[ends] = self_weight(*pair, progress=_weighing(ends, progress))
+            missing.pop(0)
+        if follow:
+            deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
+            missing.pop(0)
+        for ends, one in _other_shapes(popped, settled, deployment, progress):
+            others[ends] = one
+    except OutOfTimeError as error:
+        late = f"{error}; not checked: {', '.join(missing)}"
+    if deployment is None:
+        return Checks(bent, held, carried, None, (), weighed, met, other_shapes=others, out_of_time=late)
+    mesh, laid = done["pinned"].footprint.mesh, deployment.positions[0]
     flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    others = _others(popped, settled, deployment)
-    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others)
+    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, late)
 
 
-def _others(
-    popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None
-) -> dict[Ends, OtherShapes]:
+def _other_shapes(
+    popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None,
+    progress: Progress,
+) -> Iterator[tuple[Ends, OtherShapes]]:  # fmt: skip
     """Other stable shapes, with half of the factorisations that the shells and the deployment took.
 
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
     done = sum(one.report.factorizations for one in popped.values())
     left = (done + (0 if deployment is None else deployment.factorizations)) // 2
-    found = dict[Ends, OtherShapes]()
-    for ends, (shell, at) in settled.items():
-        if at.report.stable:
-            own = deployment if ends == "pinned" else None
-            found[ends] = other_shapes(shell, at, most_factorizations=left if found else 2 * left // 3, deployment=own)
-            left -= 2 * left // 3
-    return found
+    stable = [ends for ends, (_, at) in settled.items() if at.report.stable]
+    for ends in stable:
+        most = 2 * left // 3 if ends == stable[0] else left
+        left -= most
+        own = deployment if ends == "pinned" else None
+        told = partial(_starting, ends, progress)
+        yield ends, other_shapes(*settled[ends], most_factorizations=most, deployment=own, told=told)
+
+
+def _starting(ends: Ends, progress: Progress, start: int) -> None:
+    progress("other shapes", f"{ends} ends, start {start}", 0.0)
+
+
+def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
+    def told(count: int, factor: float) -> None:
+        done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
+        progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
+
+    return told
+
+
+def _deployed(last: Popped, found: Equilibrium, stages: int, progress: Progress) -> Deployment:
+    return deploy(
+        last.shell, last.state, last.forces, stages=stages, pattern=found.pattern,
+        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+    )  # fmt: skip
 
 
 def _worst(bent: Bending) -> float:

@@ -262,7 +262,9 @@ class _Path:
         def problem_at(share: float) -> Problem:
             return self._problem(share, self.shell.elements)
 
-        way = trace(problem_at, here, start, stop, shortest=SHORTEST, snap=snap, most_factorizations=most)
+        way = trace(
+            problem_at, here, start, stop, shortest=SHORTEST, snap=snap, most_factorizations=most, told=self._told
+        )
         self.factorizations += way.factorizations
         return way
 

@@ -45,13 +45,17 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
     def each(table: str) -> dict[Ends, Any]:
         return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
 
-    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in ends}
+    both = [end for end in ends if all(end in part.self_weight for part in parts)]
+    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in both}
+    late = next((part.out_of_time for part in parts if part.out_of_time), "")
     contact = {end: contacts[end] for end in ends}
     others = {end: _searched([part.other_shapes[end] for part in parts if end in part.other_shapes]) for end in ends}
     bending, held, joints = each("bending"), each("reactions"), each("joints")
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(bending, held, joints, None, (), weighed, contact, other_shapes=others, named=named)
+        return JoinedChecks(
+            bending, held, joints, None, (), weighed, contact, other_shapes=others, out_of_time=late, named=named
+        )
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(
@@ -62,7 +66,7 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
         name: [part.contact_on_the_way[k] for k in row] for (name, part), row in zip(named.items(), rows, strict=True)
     }
     met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
-    return JoinedChecks(bending, held, joints, way, bent, weighed, contact, met, others, named=named)
+    return JoinedChecks(bending, held, joints, way, bent, weighed, contact, met, others, late, named=named)
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:

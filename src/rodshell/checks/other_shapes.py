@@ -6,7 +6,7 @@ stiffness, one by one and mixed. From each start the energy is gone down to the 
 is a shape of the shell; that nothing is found proves nothing, so the search says how far it looked.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,8 +89,9 @@ class OtherShapes:
 
 
 def other_shapes(
-    shell: Shell, found: Equilibrium, *, most_factorizations: int, deployment: Deployment | None = None
-) -> OtherShapes:
+    shell: Shell, found: Equilibrium, *, most_factorizations: int, deployment: Deployment | None = None,
+    told: Callable[[int], None] = lambda start: None,
+) -> OtherShapes:  # fmt: skip
     """Look for other stable equilibria of a shell, its supports being held where they are.
 
     Parameters
@@ -98,6 +99,7 @@ def other_shapes(
     found : its stable equilibrium, the shell's source frames being there.
     most_factorizations : the search ends before they are used up; kicks that are small come first.
     deployment : of this shell; the shape that it ended in, if that was another one, is among those found.
+    told : called with the number of each start before it.
     """
     search = _Search(shell, found, deployment)
     kicks = list[float]()
@@ -106,6 +108,7 @@ def other_shapes(
         most = min(MOST_A_START, (most_factorizations - search.factorizations) // each)
         if most < FEWEST_A_START:
             break
+        told(len(kicks) + 1)
         search.go(start, kick, most)
         kicks.append(kick)
     return OtherShapes(len(kicks), 0.0 in kicks, max(kicks, default=0.0), tuple(search.shapes), search.factorizations)

@@ -27,7 +27,7 @@ from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.mixed_newton import STRAIN_TOLERANCE, Equilibrium, find_equilibrium
+from rodshell.solve.mixed_newton import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
@@ -74,7 +74,7 @@ def bound_drape(
     )
     found = _in_layers(
         problem, target, mesh, natural, eccentricity,
-        progress=lambda k, step: progress("drape", f"bound, iteration {k}", step),
+        progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
@@ -92,7 +92,7 @@ def bound_drape(
             f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
             "modes): use a smaller spacing"
         )
-    if not found.report.stable:
+    if not (found.report.stable or found.report.reason):
         warnings += _tightest_bend(target, layout, found.state[on_target])
     if degrees(net.min_angle) < WARN_ANGLE:
         x, y, z = net.min_angle_at
@@ -213,7 +213,7 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
 
 
 def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
-    """Distance [m] along each rod between its end and where this state crosses the target's end."""
+    """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
     windows, places = list[NDArray[np.intp]](), list[Floats]()
     for k, pieces in enumerate(cuts):
         s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
@@ -228,7 +228,8 @@ def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positio
     bend = np.zeros_like(slope)
     bent = x[2] > x[1]
     bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
-    return np.abs((f[0] - x[0] * slope + x[0] * x[1] * bend) / (slope - (x[0] + x[1]) * bend))
+    ahead = (f[0] - x[0] * slope + x[0] * x[1] * bend) / ((x[0] + x[1]) * bend - slope)
+    return ahead.reshape(-1, 2) * [-1.0, 1.0]
 
 
 def shape_of_net(net: ChebyshevNet) -> dict[str, object]:

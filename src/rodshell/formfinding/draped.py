@@ -34,8 +34,8 @@ class Draped:
     max_gap : largest distance between the target and a node that should touch it, or depth of a node inside [m].
     pulls : number of nodes on the target that it would have to pull to hold them.
     min_angle : smallest angle between two rods at a joint on the target [rad], at the point `min_angle_at` [m].
-    own_ends : (k,) distance along each rod between its end in the flat grid and the end that this drape alone
-        would give it [m]; None where they are the same.
+    own_ends : (k, 2) how far past its ends in the flat grid each of the `rods` would end by this drape alone, along
+        the rod [m]; None where they are the same.
     anchor : x, y of the anchor as it was given [m], or None; gravity : [m/s2].
     net : the net that the drape started from; None where it started from the flat grid.
     rest, fall : how it came to rest, and how it fell, where it fell in time (paper).

@@ -12,6 +12,7 @@ from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import Method, drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.flatness import flat_warning
 from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.roll import roll
@@ -29,6 +30,7 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.rods.section import Rod
+from rodshell.solve.report import Status
 from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.validation import choices_of
@@ -63,6 +65,8 @@ class FoundForm:
     @property
     def status(self) -> str:
         """ "converged", or which stage stopped and what to do."""
+        if self.draped.report.reason:
+            return self.draped.report.reason
         if not self.draped.converged:
             sentence = self.draped.report.status.sentence
             weighed = self.draped.method != "bound" and "bound" not in sentence
@@ -77,7 +81,8 @@ class FoundForm:
         wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
         off = _springs_off(self.agreement, advise=not (stretched or wide))
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
-        return (*self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
+        flat = flat_warning(self.trimmed.positions, self.rod)
+        return (*flat, *self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
 
 
 @dataclass(frozen=True)
@@ -129,16 +134,14 @@ def find_stages(
     )  # fmt: skip
     trimmed = cut(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
     footprint = map_back(trimmed)
-    popped: dict[Ends, Popped] = {}
-    if draped.converged:
-        last = start.popped if start else {}
-        popped = {
-            end: pop_up(
-                footprint, trimmed.boundary, rod,
-                ends=end, start=last.get(end, "draped"), joint=joint, progress=progress,
-            )
-            for end in ends
-        }  # fmt: skip
+    popped, last = dict[Ends, Popped](), start.popped if start else {}
+    for end in ends if draped.converged else ():
+        popped[end] = pop_up(
+            footprint, trimmed.boundary, rod,
+            ends=end, start=last.get(end, "draped"), joint=joint, progress=progress,
+        )  # fmt: skip
+        if popped[end].report.status is Status.OUT_OF_TIME:
+            break
     compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
     return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared)
 
@@ -186,7 +189,7 @@ def _spans(grid: FlatGrid) -> float:
 def _popped_status(popped: dict[Ends, Popped]) -> str:
     for ends, shell in popped.items():
         if not shell.report.converged:
-            return f"pop-up ({ends}) {shell.report.status.sentence}"
+            return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
     return "converged"
 
 

@@ -4,7 +4,7 @@ No target, no load and no contact: only rods, joints and the ends. Pinned ends h
 hold the direction of the draped rods as well. The end condition decides the shape (numerics.md, section 4a).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -129,6 +129,9 @@ class _PopUp:
     joint: Joint | Sequence[Joint]
     progress: Progress
 
+    def _told(self, what: str, most: int) -> Callable[[int, float], None]:
+        return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
+
     def shell(self, ends: Ends) -> Shell:
         return Shell.of(self.footprint.mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
 
@@ -180,16 +183,18 @@ class _PopUp:
             cut=True,
             most_modes=self.hopeless,
             most_iterations=MOST_AT_ONCE,
-            progress=lambda k, step: self.progress("pop-up", f"{ends}, iteration {k}", step),
+            progress=self._told(f"{ends}, iteration", MOST_AT_ONCE),
         )
-        if at_once.report.stable or at_once.report.status is Status.BUCKLED:
+        if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
             return shell, at_once
-        from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
+        from rodshell.solve.relax import MOST_STEPS, relax  # rarely wanted: imported with the dynamics only then
 
         slid = relax(
             self.problem(shell),
             state,
-            progress=lambda k, step: self.progress("pop-up", f"{ends}, sliding down, step {k}", step),
+            progress=lambda k, step: self.progress(
+                "pop-up", f"{ends}, sliding down, step {k} of at most {MOST_STEPS}", step
+            ),
         )
         return shell, replace(slid, report=slid.report.after(at_once.report))
 
@@ -211,7 +216,9 @@ class _PopUp:
             state,
             stiffer * carried_edges(last.forces, before, mesh),
             most_iterations=MOST_AGAIN,
-            progress=lambda k, step: self.progress("pop-up", f"{last.ends}, again, iteration {k}", step),
+            progress=lambda k, step: self.progress(
+                "pop-up", f"{last.ends}, again, iteration {k} of at most {MOST_AGAIN}", step
+            ),
         )
         strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
         return None if strayed or not found.report.stable else (shell, found)

@@ -73,11 +73,17 @@ def follow(
                 step *= 1.6
         else:
             step = 0.4 * min(step, there - t)
+        if found.report.status is Status.OUT_OF_TIME:
+            break
         if t < 1.0 and (step < SMALLEST_STEP or sum(one.iterations for one in reports) > MOST_OF_ALL):
             break
     ended = last or found
     report = ended.report.after(*(one for one in reports if one is not ended.report))
-    return replace(ended, report=report if t >= 1.0 else replace(report, status=Status.STALLED))
+    if t >= 1.0:
+        return replace(ended, report=report)
+    late = found.report.status is Status.OUT_OF_TIME
+    status = Status.OUT_OF_TIME if late else Status.STALLED
+    return replace(ended, report=replace(report, status=status, reason=found.report.reason))
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,7 @@ class Trace:
 
 def trace(
     problem_at: Callable[[float], Problem], here: Equilibrium, start: float, stop: float, *,
-    shortest: float, snap: bool, most_factorizations: int,
+    shortest: float, snap: bool, most_factorizations: int, told: Callable[[float], None] = lambda t: None,
 ) -> Trace:  # fmt: skip
     """Go from the stable equilibrium `here` at t = `start` towards `stop`, up or down, branch by branch.
 
@@ -117,6 +123,7 @@ def trace(
     shortest : step in t at which a branch that cannot be followed has ended.
     snap : whether to go down the energy there and on from where that leads; else the path ends there.
     most_factorizations : the path ends when they are used up.
+    told : called with t before each step; it may raise an error to end the path.
 
     Returns
     -------
@@ -124,6 +131,7 @@ def trace(
     """
     t, step, done, snaps = start, abs(stop - start), 0, list[Snap]()
     while t != stop:
+        told(t)
         step = min(step, abs(stop - t))
         there = stop if step == abs(stop - t) else t + float(np.copysign(step, stop - t))
         problem = replace(problem_at(there), elements=here.elements, pattern=here.pattern)
