@@ -9,15 +9,16 @@ from math import isfinite
 from numbers import Real
 from reprlib import repr as short
 from types import UnionType
-from typing import Any, TypeVar
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rodshell.errors import InputError
 from rodshell.units import shown
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
 Choice = TypeVar("Choice", bound=str)
 
 
@@ -40,9 +41,9 @@ def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
 
 
 def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice, ...]:
-    """`value` as a tuple of different words out of `choices`; one word may come without a sequence around it."""
+    """`value` as a tuple of different words out of `choices`, or of none; one may come without a sequence around it."""
     words = [value] if isinstance(value, str) else list(value) if isinstance(value, Sequence) else None
-    if not words:
+    if words is None:
         raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {_described(value)}")
     return tuple(dict.fromkeys(choice(name, word, choices) for word in words))
 
@@ -65,13 +66,15 @@ def positive(name: str, value: object, unit: str) -> None:
 
 def point(name: str, value: object) -> None:
     """Refuse what is not a pair of finite numbers [m]."""
-    pair = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else ()
+    pair: Any = value if hasattr(value, "__len__") and not isinstance(value, str | dict) else ()
     if len(pair) != 2 or not all(isinstance(one, Real) and isfinite(one) for one in pair):
         raise InputError(f"{name} must be two finite numbers x, y in m, not {value!r}")
 
 
-def finite(name: str, given: ArrayLike, *shape: int) -> Floats:
+def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
     """`given` as an array of the `shape`, to which it may be broadcast."""
+    import numpy as np  # here, so that the command line's help need not wait for it
+
     try:
         array = np.broadcast_to(np.asarray(given, dtype=float), shape)
     except (TypeError, ValueError):
@@ -82,20 +85,23 @@ def finite(name: str, given: ArrayLike, *shape: int) -> Floats:
     return array
 
 
-def vector(name: str, given: ArrayLike) -> Floats:
+def vector(name: str, given: "ArrayLike") -> "Floats":
     """(3,) finite numbers."""
+    import numpy as np
+
     if np.shape(given) != (3,):
         raise InputError(f"{name} must be three numbers (x, y, z), not {short(given)}")
     return finite(name, given, 3)
 
 
-def direction(name: str, given: ArrayLike) -> Floats:
+def direction(name: str, given: "ArrayLike") -> "Floats":
     """(3,) unit vector along `given`."""
     array = vector(name, given)
-    length = float(np.linalg.norm(array))
+    length = float((array @ array) ** 0.5)
     if length == 0:
         raise InputError(f"{name} must not be zero: it has no direction")
-    return np.asarray(array / length)
+    unit: Floats = array / length
+    return unit
 
 
 def _described(value: object) -> str:

@@ -140,7 +140,7 @@ def test_every_key_is_an_option_and_every_alias_is_one_of_a_key(
         assert f"--{key}, {alias} " in shown
 
 
-DRAWN = ("layers.", "project", "revision", "name", "author", "date")
+DRAWN = ("layers.", "project", "revision", "name", "author")
 ANY_WORDS = (*(f"drawings.{key}" for key in DRAWN), "drape.frames")
 WORDS = [key for key in case_keys() if key.startswith(ANY_WORDS)]
 

@@ -33,7 +33,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
             lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=("pinned", "x")),
             'ends must be "pinned" or "clamped", not "x"',
         ),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=()), 'ends must be one or several of "pinned", "clamped"'),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=1), 'one or several of "pinned", "clamped", not 1'),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, method="bond"), '"paper", not "bond": did you mean "bound"?'),
         (
             lambda: rs.find_form(TARGET, LAYOUT, ROD, gravity=-5.0),

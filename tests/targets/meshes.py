@@ -93,3 +93,22 @@ PARTS: dict[str, Callable[[], Mesh]] = {
     "ball": lambda: capped_sphere(20, 2.0),
     "torus": torus_piece,
 }
+
+
+def equilateral(height: Callable[[Floats, Floats], Floats], half: float, count: int) -> Mesh:
+    """A square of a height field over rows of equilateral triangles."""
+    side, rows = 2 * half / (count - 1), int(count / 0.75**0.5)
+    i, j = np.meshgrid(np.arange(count), np.arange(rows), indexing="ij")
+    x, y = side * (i + 0.5 * (j % 2) - 0.5 * count), side * 0.75**0.5 * (j - 0.5 * rows)
+    points, halves = lattice(x, y, height(x, y))
+    (a, b, c), d = halves[: len(halves) // 2].T, halves[len(halves) // 2 :, 2]
+    even = (a % rows % 2 == 0)[:, None]  # rows are shifted in turn, and their diagonals lean so
+    first = np.where(even, np.column_stack([a, b, d]), np.column_stack([a, b, c]))
+    return points, np.vstack([first, np.where(even, np.column_stack([b, c, d]), np.column_stack([a, c, d]))])
+
+
+def left_out(mesh: Mesh, gone: Callable[[Floats], NDArray[np.bool_]]) -> Mesh:
+    """The mesh without the faces whose centres (m, 3) are `gone`: where no edge of it runs, it ends in a staircase."""
+    points, faces = mesh
+    used, faces = np.unique(faces[~gone(points[faces].mean(axis=1))], return_inverse=True)
+    return points[used], faces.reshape(-1, 3)

@@ -277,7 +277,7 @@ class Case(Table):
         def fit() -> "Fit":
             from rodshell.checks.sizing import Fit
 
-            return Fit.on(target, layout, anchor=anchor)
+            return Fit.on(target, layout, anchor=anchor, joint=self.joint.build())
 
         return self.rod.build(fit, strength=self.checks.strength)
 

@@ -16,7 +16,7 @@ from rodshell.contact.bound import BoundToTarget
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.natural import with_natural_ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.thickness import layers_left_out, sideways
+from rodshell.formfinding.thickness import layers_left_out, strong_bending
 from rodshell.geometry.vectors import dot
 from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
@@ -82,9 +82,9 @@ def bound_drape(
     on = np.zeros(mesh.node_count, dtype=bool)
     on[on_target] = True
     edges, bends = (np.asarray(on[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
-    wide = sideways(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
-    if wide is not None:
-        warnings += wide.warnings
+    strong = strong_bending(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
+    if strong is not None:
+        warnings += strong.warnings
     if not eccentricity:
         warnings += layers_left_out(target, mesh, found.state, edges, rod, min(layout.spacing))
     if found.report.negative_modes:
@@ -118,7 +118,7 @@ def bound_drape(
         gravity=0.0,
         net=net,
         eccentricity=eccentricity,
-        sideways=wide,
+        strong_bending=strong,
         dropped=net.dropped,
         warnings=tuple(warnings),
     )
@@ -213,7 +213,7 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
 
 
 def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
-    """Distance [m] along each rod between its end and where this state crosses the target's end."""
+    """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
     windows, places = list[NDArray[np.intp]](), list[Floats]()
     for k, pieces in enumerate(cuts):
         s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
@@ -228,7 +228,8 @@ def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positio
     bend = np.zeros_like(slope)
     bent = x[2] > x[1]
     bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
-    return np.abs((f[0] - x[0] * slope + x[0] * x[1] * bend) / (slope - (x[0] + x[1]) * bend))
+    ahead = (f[0] - x[0] * slope + x[0] * x[1] * bend) / ((x[0] + x[1]) * bend - slope)
+    return ahead.reshape(-1, 2) * [-1.0, 1.0]
 
 
 def shape_of_net(net: ChebyshevNet) -> dict[str, object]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.formfinding.fall import Fall
-from rodshell.formfinding.thickness import Sideways
+from rodshell.formfinding.thickness import StrongBending
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.nets import ChebyshevNet
@@ -34,13 +34,13 @@ class Draped:
     max_gap : largest distance between the target and a node that should touch it, or depth of a node inside [m].
     pulls : number of nodes on the target that it would have to pull to hold them.
     min_angle : smallest angle between two rods at a joint on the target [rad], at the point `min_angle_at` [m].
-    own_ends : (k,) distance along each rod between its end in the flat grid and the end that this drape alone
-        would give it [m]; None where they are the same.
+    own_ends : (k, 2) how far past its ends in the flat grid each of the `rods` would end by this drape alone, along
+        the rod [m]; None where they are the same.
     anchor : x, y of the anchor as it was given [m], or None; gravity : [m/s2].
     net : the net that the drape started from; None where it started from the flat grid.
     rest, fall : how it came to rest, and how it fell, where it fell in time (paper).
     eccentricity : distance of the two layers of rods [m]; 0 where they meet.
-    sideways : how the rods bend within the target, where joints keep them from rolling (bound).
+    strong_bending : of rods with a strong axis, where joints keep them from rolling (bound).
     """
 
     method: str
@@ -64,7 +64,7 @@ class Draped:
     rest: "Rest | None" = None
     fall: Fall | None = None
     eccentricity: float = 0.0
-    sideways: Sideways | None = None
+    strong_bending: StrongBending | None = None
 
     @property
     def report(self) -> SolveReport:

@@ -12,6 +12,7 @@ from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import Method, drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.flatness import flat_warning
 from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.roll import roll
@@ -36,7 +37,6 @@ from rodshell.validation import choices_of
 
 Floats = NDArray[np.float64]
 
-SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
 STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
 ROLLED = pi / 4  # rad: a lath that turns by more bends about its other axis rather than its own
 LONG_TAIL = 3.0  # spacings past a rod's last joint
@@ -76,11 +76,9 @@ class FoundForm:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
-        stretched = _stretched(self.draped)
-        wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
-        off = _springs_off(self.agreement, advise=not (stretched or wide))
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
-        return (*self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
+        flat = flat_warning(self.trimmed.positions, self.rod)
+        return (*flat, *self.draped.warnings, *_stretched(self.draped), *tails, *_rolled(self.popped))
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ class PoppedTable:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return _popped_warnings(self.popped)
+        return _rolled(self.popped)
 
 
 def find_stages(
@@ -224,36 +222,10 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     )
 
 
-def _springs_off(compared: dict[Ends, Agreement], *, advise: bool) -> tuple[str, ...]:
-    """With its ends clamped a convex shell keeps to the target; one that does not is held by nothing there.
-
-    advise : what to do, where nothing else is known to be the cause.
-    """
-    gap = compared.get("clamped")
-    if gap is None or gap.max_relative < SPRUNG:
-        return ()
-    x, y, z = gap.where
-    advice = ": dips and ridges need seams, graded stiffness or supports" if advise else ""
-    return (
-        f"the free grid springs off the target by {gap.max:.3g} m ({100 * gap.max_relative:.1f} % of its size) near "
-        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends{advice}",
-    )
-
-
-def _popped_warnings(popped: dict[Ends, Popped]) -> tuple[str, ...]:
-    found = {ends: shell for ends, shell in popped.items() if shell.report.converged}
-    unstable = tuple(
-        f"the popped-up shell with {ends} ends is not stable: {shell.report.negative_modes} negative modes"
-        for ends, shell in found.items()
-        if not shell.report.stable
-    )
-    return (*unstable, *_rolled(found))
-
-
 def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
     """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
     for ends, shell in popped.items():
-        angles = roll(shell)
+        angles = roll(shell) if shell.report.converged else None
         if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
             return (
                 f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "

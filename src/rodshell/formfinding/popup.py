@@ -39,7 +39,7 @@ FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves t
 CLAMP_STEP = 0.25
 MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
 MOST_AGAIN = 8  # iterations from the last form before starting afresh
-HOPELESS = 0.5  # negative modes a joint: laths ended 7 % and more off the target from there, other shells have 0.2
+HOPELESS = 0.5  # negative modes a joint: laths end 2 to 17 % off the target from there, other shells have less than 0.2
 NEARBY = 0.1  # of the length: a state further from the guess may be another one
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.agreement import Agreement
 from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.flatness import flat_warning
 from rodshell.formfinding.joined import joined_agreement, joined_report
 from rodshell.formfinding.matching import Point
 from rodshell.formfinding.patches import carried_heading, patches_of
@@ -86,8 +87,9 @@ class SewnForm:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        own = set(self.target.warnings)
-        words = [f"patch {k}: {word}" for k, form in self.found.items() for word in form.warnings if word not in own]
+        whole = set(self.target.warnings)  # said once; and a patch may be flat where the shell is not
+        whole.update(*(flat_warning(form.trimmed.positions, self.rod) for form in self.found.values()))
+        words = [f"patch {k}: {word}" for k, form in self.found.items() for word in form.warnings if word not in whole]
         words += [
             f"patch {k}: rod ends were moved by up to {by:.3g} m to where they meet others: its net does not hold them "
             "well there, another heading or anchor may"
@@ -100,7 +102,7 @@ class SewnForm:
                 f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
                 "seam: another heading may leave out fewer (layout.rotate, or seams.patches for one patch alone)"
             )
-        return (*self.target.warnings, *words)
+        return (*flat_warning(self.draped, self.rod), *self.target.warnings, *words)
 
     def parameters(self) -> dict[str, object]:
         """Seams and what patches have of their own, as they stand in a case file."""

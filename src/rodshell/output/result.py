@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from rodshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
 from rodshell.formfinding.bound import shape_of_net
+from rodshell.formfinding.flatness import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod
 from rodshell.solve.report import SolveReport
+from rodshell.targets import Target
 
 States = dict[str, NDArray[Any]]
 
@@ -25,7 +27,7 @@ def form_result(form: FoundForm) -> dict[str, Any]:
     """result.json of a form, SI units; the keys are those of the documentation's page on files."""
     return {
         **head(form.target.name, form.status, form.warnings),
-        "target": {**form.target.parameters(), "reference_size": form.target.size},
+        "target": target_table(form.target, is_flat(form.trimmed.positions, form.rod)),
         "layout": form.layout.parameters(),
         "rod": rod_table(form.rod),
         "joint": joint_parameters(form.joint),
@@ -36,6 +38,11 @@ def form_result(form: FoundForm) -> dict[str, Any]:
         "drape": drape_table(form.draped),
         "pop_up": {ends: popped_table(shell.report, shell.start) for ends, shell in form.popped.items()},
     }
+
+
+def target_table(target: Target, flat: bool) -> dict[str, Any]:
+    """The target's parameters, its size, and whether it is too flat for its rods to bend."""
+    return {**target.parameters(), "reference_size": target.size, **({"flat": True} if flat else {})}
 
 
 def drape_table(draped: Draped) -> dict[str, Any]:
@@ -56,8 +63,13 @@ def drape_table(draped: Draped) -> dict[str, Any]:
     }
     if draped.rest is not None:
         drape["fall"] = asdict(draped.rest)
+    if draped.eccentricity:
+        drape["eccentricity"] = draped.eccentricity
+    if draped.strong_bending is not None:
+        drape["strong_bending"] = asdict(draped.strong_bending)
     if draped.own_ends is not None:
-        drape["own_ends"] = {"max": float(draped.own_ends.max()), "median": float(np.median(draped.own_ends))}
+        off = np.abs(draped.own_ends)
+        drape["own_ends"] = {"max": float(off.max()), "median": float(np.median(off))}
     return drape
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from rodshell.checks import Checks
 from rodshell.formfinding.bound import shape_of_net
+from rodshell.formfinding.flatness import is_flat
 from rodshell.formfinding.seams import End
 from rodshell.formfinding.sewn import SewnForm
 from rodshell.joints import joint_parameters
@@ -18,6 +19,7 @@ from rodshell.output.result import (
     head,
     popped_table,
     rod_table,
+    target_table,
 )
 
 
@@ -27,7 +29,7 @@ def sewn_result(form: SewnForm) -> dict[str, Any]:
     tightest = min(nets, key=lambda net: net.min_angle)
     return {
         **head(form.target.name, form.status, form.warnings),
-        "target": {**form.target.parameters(), "reference_size": form.target.size},
+        "target": target_table(form.target, is_flat(form.draped, form.rod)),
         "layout": form.layout.parameters(),
         "rod": rod_table(form.rod),
         "joint": joint_parameters(form.joint),

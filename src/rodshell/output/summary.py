@@ -25,7 +25,7 @@ def summary_text(result: dict[str, Any]) -> str:
     lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
-            f"  footprint known within {mm(net['error_estimate'])} before extrapolation; "
+            f"  footprint error {mm(net['error_estimate'])} before extrapolation; "
             f"smallest angle {net['min_angle_deg']:.1f} deg"
         )
     if drape := result.get("drape"):
@@ -36,7 +36,7 @@ def summary_text(result: dict[str, Any]) -> str:
         line += f"{gap} {mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
         lines.append(line + f"negative modes {drape['negative_modes']}")
         if own := drape.get("own_ends"):
-            lines.append(f"            its own rod ends within {mm(own['max'])}, median {mm(own['median'])}")
+            lines.append(f"            drape against net, rod ends: max {mm(own['max'])}, median {mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
         state = "stable, unloaded" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
@@ -134,10 +134,11 @@ def _checked(result: dict[str, Any]) -> list[str]:
             if place == "pop_up" and unknown:
                 line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
+    least = " (weakest patch, its seam held)" if result.get("patches") else ""
     for ends, weighed in result.get("self_weight", {}).items():
-        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}"
+        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}{least}"
         if weighed.get("deflection") is not None:
-            line += f"; sinks by {mm(weighed['deflection'])} under it"
+            line += f"; deflection under it: {mm(weighed['deflection'])}"
         lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"

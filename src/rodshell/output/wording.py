@@ -140,7 +140,9 @@ def _case_value(key: str, value: Any) -> str:
     if isinstance(value, list | tuple):
         between = ", " if key == "offset" else " \N{MULTIPLICATION SIGN} "
         return between.join(_case_value(key, item) for item in value)
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, int | float):
         return str(value)
     factor, unit = CASE_UNITS.get(key, (1.0, ""))
     if unit == "MPa" and value >= 1e8:

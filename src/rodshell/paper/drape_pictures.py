@@ -1,4 +1,4 @@
-"""The rows of the paper's Figs 6 and 7: setup, draped, trimmed, and the flat grid with G0 and the exact net."""
+"""The rows of the paper's Figs 6 and 7: setup, draped, trimmed, and the flat grid with its ends."""
 
 from collections.abc import Sequence
 
@@ -12,8 +12,13 @@ from rodshell.paper.panels import FINAL, FLAT, INK, Place, closed, dots, from_ab
 
 Floats = NDArray[np.float64]
 
-TITLES = ("1  the flat grid above the target", "2  draped", "3  trimmed", "4  G0 (dots), the exact net (dashed)")
-WITH_SOUGHT = "4  G0 (dots), net (dashed), genetic (violet)"
+TITLES = (
+    "1  the flat grid above the target",
+    "2  draped",
+    "3  trimmed",
+    "4  ends of the drape (dots), of the exact net (dashed)",
+)
+WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 
 
 def rows_svg(drapes: Sequence[Drape]) -> str:
@@ -40,9 +45,9 @@ def _panels(one: Drape) -> list[list[str]]:
 
 
 def _plan(one: Drape) -> list[str]:
-    """The trimmed grid in its plane, its ends, those of the exact net and those that the genetic algorithm found."""
+    """The trimmed grid in its plane, the drape's ends, those of the net and those that the genetic algorithm found."""
     mesh, sought = one.trimmed.mesh, _sought(one)
-    ends, net = from_above(mesh.flat[mesh.ends.ravel()]), from_above(_net_ends(mesh.grid, one.net))
+    ends, net = (from_above(_in_the_grid(mesh.grid, some)) for some in (one.ends, one.net))
     others = [] if sought is None else [from_above(sought)]
     place = Place(np.vstack([ends, net, *others]))
     dashed = closed(place(net), INK, stroke_dasharray="5 3")
@@ -56,8 +61,8 @@ def _sought(one: Drape) -> Floats | None:
     return found if found is not None and len(found) == 2 * sum(one.case.rods) else None
 
 
-def _net_ends(grid: FlatGrid, net: Floats) -> Floats:
-    """(2m, 2) where the exact net's rods end in the flat grid [m]."""
-    along, across = net.ravel(), np.repeat([rod.offset for rod in grid.rods], 2)
+def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:
+    """(2m, 2) ends of rods (m, 2) in the plane of the flat grid [m]."""
+    along, across = ends.ravel(), np.repeat([rod.offset for rod in grid.rods], 2)
     of_u = np.repeat([rod.family == "u" for rod in grid.rods], 2)
     return np.column_stack([np.where(of_u, along, across), np.where(of_u, across, along)])

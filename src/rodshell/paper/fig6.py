@@ -4,7 +4,7 @@ from rodshell.paper.drapefigure import DrapeFigure
 from rodshell.paper.drapes import Case, Progress, drape_all
 from rodshell.targets import Ellipsoid, Hemisphere, Paraboloid
 
-TITLE = "Fig 6 [HQK 3.2]: from the flat grid to G0, by three methods; G0 against the inextensible net"
+TITLE = "Fig 6 [HQK 3.2]: from the flat grid to G0, by three methods; where each ends against the inextensible net"
 CASES = (
     Case("a", Hemisphere(0.2), (17, 17)),
     Case("b", Paraboloid(0.2, 0.12), (15, 15)),

@@ -13,11 +13,13 @@ from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.targets.filling import fill_openings
 from rodshell.targets.fitting import fit_field, patch_spacing
+from rodshell.targets.jagged import smooth_loop
 from rodshell.targets.meshsamples import mesh_samples
 from rodshell.targets.patches import PatchField
 from rodshell.targets.rim import Rim
 from rodshell.targets.target import Floats, Gap, Implicit, Target
 from rodshell.targets.trianglemesh import TriangleMesh, sound_mesh
+from rodshell.units import length_text
 
 if TYPE_CHECKING:
     from rodshell.targets.footing import Footing
@@ -88,7 +90,15 @@ class Freeform(Target):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return self.repairs
+        ends, moved = self._open_ends
+        if not moved:
+            return self.repairs
+        of = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else "the edge of the mesh is"
+        return (
+            *self.repairs,
+            f"{of} jagged where faces were left out: the shell ends at a smooth curve, up to "
+            f"{length_text(max(moved))} from the vertices there; for another end give target.boundary",
+        )
 
     def parameters(self) -> dict[str, object]:
         return dict(self.source)
@@ -131,10 +141,22 @@ class Freeform(Target):
         """The open boundary, and the curves, as far as there are any."""
         rims = []
         if self.surface.loops:
-            rims.append(self._rim([self.surface.vertices[loop] for loop in self.surface.loops]))
+            rims.append(self._rim(self._open_ends[0]))
         if self.curves:
             rims.append(self._rim([_turning(self._over(curve), k > 0) for k, curve in enumerate(self.curves)]))
         return tuple(rims)
+
+    @cached_property
+    def _open_ends(self) -> tuple[list[Floats], list[float]]:
+        """The loops (n, 3) of the open boundary; and, of those that were jagged, how far they were smoothed [m]."""
+        ends, moved = list[Floats](), list[float]()
+        for loop in self.surface.loops:
+            x = self.surface.vertices[loop]
+            smooth = smooth_loop(x, self.surface.normals[loop])
+            ends.append(x if smooth is None else smooth)
+            if smooth is not None:
+                moved.append(float(np.linalg.norm(self._settle(smooth) - x, axis=1).max()))
+        return ends, moved
 
     def _rim(self, loops: list[Floats]) -> Rim:
         return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]))

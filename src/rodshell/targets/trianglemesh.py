@@ -204,7 +204,10 @@ class _Neighbours:
         ends = np.bincount(np.concatenate([a[rim], b[rim]]), minlength=len(mesh.vertices))
         if (ends > 2).any():
             where = place(mesh, int(np.argmax(ends)))
-            raise InputError(f"{name} is not manifold: two parts of it touch in the single point {where}")
+            raise InputError(
+                f"{name} is not manifold: two parts of it touch in the single point {where}: add or leave out a face "
+                "there"
+            )
         return _Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
 
     def pieces(self, keep: NDArray[np.bool_], faces: int) -> Ints:
