@@ -59,7 +59,7 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
 def softest_modes(solver: LinearSolver, free: Freedom, mass: Floats, count: int) -> list[Floats]:
     """`count` modes (n, 3) of a stable equilibrium whose stiffness `solver` has factorised, from the softest on.
 
-    By subspace iteration, which is enough for directions to look in: their s are good to some per cent.
+    By subspace iteration, which is enough for directions to look in: the last one's s may be a quarter too high.
 
     mass : (n, 3) lumped mass of each component.
     """

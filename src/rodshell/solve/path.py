@@ -147,7 +147,7 @@ def trace(
             done += found.report.factorizations
             if not found.report.stable:
                 break
-            if unaccounted(problem, here, found):
+            if surplus(problem, here, found) < -UNACCOUNTED:
                 snaps.append(Snap(t, there, farthest(problem, here, found)))
             step = 4 * shortest
         elif found.report.iterations <= EASY:
