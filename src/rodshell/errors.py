@@ -23,6 +23,12 @@ class OutputError(RodshellError, OSError):
     """A result cannot be written or read."""
 
 
+class OutOfTimeError(RodshellError):
+    """A job took longer than its time limit; nothing was found that could be kept."""
+
+    exit_code = 3
+
+
 class ConvergenceError(RodshellError):
     """A solve stopped short of its tolerance; `report` holds what was reached."""
 

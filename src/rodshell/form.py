@@ -19,7 +19,7 @@ from rodshell.fabrication import fabricate
 from rodshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
 from rodshell.formfinding.drape import Method
 from rodshell.formfinding.popup import Ends
-from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.progress import Progress, limited, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
 from rodshell.joints import Ball, Joint
 from rodshell.layout import FlatGrid, GridLayout
@@ -210,6 +210,8 @@ def _kept(
     result["bending"]["strength_of"] = judged.strength_of
     if takeaway.rod_chosen:
         result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
+    if checks.out_of_time and result["status"] == "converged":
+        result["status"] = checks.out_of_time
     result["drawings"] = takeaway.drawings.parameters()
     result["name"] = takeaway.drawings.name or result["name"]
     result["verdict"] = verdict(result).table()
@@ -230,6 +232,7 @@ def find_form(
     ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
     start: FoundForm | None = None,
     progress: Progress = silent,
+    time_limit: float | None = None,
 ) -> Form:
     """From a target to the flat grid that pops up into it, with the proof.
 
@@ -248,14 +251,16 @@ def find_form(
         left, and the result is the same as without, to the solver's tolerance. A shell that has several equilibria
         stays with the one that it is in.
     progress : called as progress(stage, detail, residual) at every iteration.
+    time_limit : [s] after which the search ends, at its next iteration, with what was found until then.
 
     Returns
     -------
-    The form. Its `status` is "converged", or says which stage stopped; nothing is raised for that.
+    The form. Its `status` is "converged", or says which stage stopped, or was out of time; nothing is raised for that.
 
     Raises
     ------
     InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
+    OutOfTimeError : the time limit came before there was a net.
     """
     for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
         instance(name, value, kind)
@@ -264,7 +269,7 @@ def find_form(
     found = find_stages(
         target, layout, rod,
         method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,
-        start=start, progress=progress,
+        start=start, progress=limited(progress, time_limit),
     )  # fmt: skip
     return Form(**{field.name: getattr(found, field.name) for field in fields(found)})
 
@@ -280,6 +285,7 @@ def sew(
     ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
     search: bool = False,
     progress: Progress = silent,
+    time_limit: float | None = None,
 ) -> Sewn:
     """From a target cut into patches to the flat grids that pop up into them and meet at the seams.
 
@@ -289,24 +295,31 @@ def sew(
         straight past its ends, unless it is closed.
     layout : of every patch, rods and length "auto"; its heading is that at the target's summit.
     own : what patches, by their names A, B, ... from left to right, have of their own.
-    rod, joint, ends, progress : as of `find_form`.
+    rod, joint, ends, progress, time_limit : as of `find_form`.
     search : whether to look for the heading that leaves out the fewest rods, in place of the layout's.
 
     Raises
     ------
     InputError : a value does not fit. NetLimitError : no net covers a patch from its anchor and heading.
+    OutOfTimeError : the time limit came before every patch had its net.
     """
     for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
         instance(name, value, kind)
     found = find_sewn_stages(
         target, [Seam.of(row) for row in seams], layout, rod,
-        own=own, joint=joint, ends=ends, search=search, progress=progress,
+        own=own, joint=joint, ends=ends, search=search, progress=limited(progress, time_limit),
     )  # fmt: skip
     return Sewn(**{field.name: getattr(found, field.name) for field in fields(found)})
 
 
 def pop_up_table(
-    grid: FlatGrid, finals: ArrayLike, rod: Rod, *, edge: float | None = None, progress: Progress = silent
+    grid: FlatGrid,
+    finals: ArrayLike,
+    rod: Rod,
+    *,
+    edge: float | None = None,
+    progress: Progress = silent,
+    time_limit: float | None = None,
 ) -> PoppedUp:
     """Pop up rods from elsewhere: pinned, from flat.
 
@@ -315,6 +328,7 @@ def pop_up_table(
     grid : the rods, flat (see `straight_rods`).
     finals : (m, 2, 3) where the ends of each rod go [m].
     edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+    progress, time_limit : as of `find_form`.
 
     Raises
     ------
@@ -330,5 +344,5 @@ def pop_up_table(
                 f"rod {rod_line.name} is {rod_line.length:.4g} m long, but its final ends lie {distance:.4g} m apart: "
                 "move them closer, or give a longer rod"
             )
-    found = pop_up_stages(grid, points, rod, edge=edge, progress=progress)
+    found = pop_up_stages(grid, points, rod, edge=edge, progress=limited(progress, time_limit))
     return PoppedUp(**{field.name: getattr(found, field.name) for field in fields(found)})

@@ -66,7 +66,7 @@ def positive(name: str, value: object, unit: str) -> None:
 
 def point(name: str, value: object) -> None:
     """Refuse what is not a pair of finite numbers [m]."""
-    pair = value if hasattr(value, "__len__") and not isinstance(value, str | dict) else ()
+    pair: Any = value if hasattr(value, "__len__") and not isinstance(value, str | dict) else ()
     if len(pair) != 2 or not all(isinstance(one, Real) and isfinite(one) for one in pair):
         raise InputError(f"{name} must be two finite numbers x, y in m, not {value!r}")
 

@@ -47,10 +47,15 @@ def test_rods_without_a_mass_are_said_to_have_none():
     assert "own weight borne: unknown: no mass was given" in archive.summary()
 
 
-def test_joints_weigh_what_they_are_said_to_weigh():
-    mesh, joint = dome().footprint.mesh, rs.Ball(mass=2e-3)
-    bare, heavy = (Shell.of(mesh, ROD, joint=one).mass[: mesh.node_count, 2].sum() for one in (rs.Ball(), joint))
-    assert heavy - bare == pytest.approx(2e-3 * len(mesh.grid.crossings))
+@pytest.mark.parametrize("eccentricity", [0.0, 1e-3])
+def test_joints_weigh_what_they_are_said_to_weigh_half_on_either_rod(eccentricity):
+    mesh = dome().footprint.mesh
+    bare, heavy = (
+        Shell.of(mesh, ROD, joint=rs.Pin(eccentricity=eccentricity, mass=mass)).mass[:, 2] for mass in (0.0, 2e-3)
+    )
+    more = (heavy - bare)[heavy > bare]
+    assert more.sum() == pytest.approx(2e-3 * len(mesh.grid.crossings))
+    assert np.allclose(more, 1e-3 if eccentricity else 2e-3)
 
 
 def test_heavy_joints_leave_less_to_bear():

@@ -49,7 +49,7 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
     """Or would be thicker than rods of this target are, or is not thinner than the thinnest in stock."""
     target, layout = half_sphere(radius)
     material = rs.Material.preset(name)
-    section = Fit.on(target, layout).section(material)
+    section = Fit.on(target, layout, joint=rs.Pin()).section(material)
     bends = bends_of(target, layout)
 
     def used(section: Any) -> float:
@@ -63,6 +63,16 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
         for thicker in STOCK[material.name][at + 1 : at + 2]:  # type: ignore[index]
             room = min(target.size / 100, min(layout.spacing) / 6)
             assert used(thicker) > 1 / 3 or depth(thicker) > room
+
+
+def test_a_lath_whose_joints_let_it_roll_is_thicker_for_it_bends_towards_its_thin_side_alone() -> None:
+    target, layout = half_sphere(5.0)
+    larch = rs.Material.preset("larch")
+    held, free = (Fit.on(target, layout, joint=joint).section(larch) for joint in (rs.Pin(), rs.Ball()))
+    assert depth(free) > depth(held)
+    form = rs.find_form(target, layout, rs.Rod(free, larch), ends=("clamped",))
+    bending = form.archive(takeaway=rs.Takeaway(stages=0)).result["bending"]["clamped"]
+    assert 0.2 < bending["utilisation"] <= 0.5
 
 
 def depth_strain(section: Any, normal: Any, geodesic: Any) -> float:
@@ -165,3 +175,23 @@ def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
     fit = Fit.between(np.array([2.0]), np.array([[[0.0, 0.0, 0.0], [chord, 0.0, 0.0]]]))
     np.testing.assert_allclose(fit.bends().normal, 0.3 * np.pi / 2.0, rtol=0.01)  # theta^2 / 32 of it
     assert fit.preset == "gfrp"
+
+
+def test_a_table_whose_rods_bend_to_rings_still_has_a_size() -> None:
+    fit = Fit.between(np.array([2.0]), np.zeros((1, 2, 3)))
+    assert 0 < depth(fit.section(rs.Material.preset("petg"))) < 0.01
+
+
+def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
+    """On a barrel rods bend least at 45 degrees: half as sharply as across it, so that twice as thick ones fit."""
+    options = ["--formula", "sqrt(25 - x^2) - 4", "--target.domain", "rectangle", "--target.size", "6 m, 6 m"]
+    options += ["--spacing", "1.5 m", "--rotate", "auto", "--objective", "curvature", "--pop_up.ends", "clamped"]
+    options += ["--rod.material.preset", "larch"]
+    out = tmp_path / "barrel"
+    assert main(["form", "heightfield", *options, "--only", "csv", "--quiet", "--out", str(out)]) == 0
+    case = load_case(out / "case.toml")
+    target, layout, rod, _ = case.build()
+    assert layout.rotate == pytest.approx(np.pi / 4)
+    assert rod.section == Fit.on(target, layout, anchor=case.drape.anchor).section(rs.Material.preset("larch"))
+    across = rs.GridLayout.orthogonal(spacing=1.5)
+    assert depth(rod.section) > depth(Fit.on(target, across).section(rs.Material.preset("larch")))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shells import dome
 from stress_twin import largest, shear_field, stresses, twisted_shells
 from test_bending import ROD, laid, rods_of_length
 
@@ -196,14 +197,29 @@ def test_stress_of_a_shell_is_that_of_the_twin(name: str) -> None:
 
 @pytest.mark.parametrize("eccentricity", [0.0, 2e-3])
 def test_rods_a_distance_apart_are_bent_along_their_own_lines(eccentricity: float) -> None:
-    """On a sphere rods of two layers have its curvature, by their distance from its middle; not a zigzag at joints."""
-    layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.015)
-    form = rs.find_form(rs.Hemisphere(0.2), layout, ROD, ends=())
-    mesh, x = form.footprint.mesh, form.trimmed.positions
-    shell = rs.Shell.of(mesh, ROD, joint=rs.Pin(eccentricity=eccentricity))
-    bent = bending_of(shell, shell.state(x, None, x / 0.2), ROD)
-    straight = bending_of(rs.Shell.of(mesh, ROD), x, ROD)
-    np.testing.assert_allclose(bent.curvature, straight.curvature, atol=0.01 * 5 + 0.02 * 5 * (eccentricity > 0))
+    """The middle rods on a sphere are great circles of their own layers; there is no zigzag where rods are joined."""
+    layout, joint = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.015), rs.Pin(eccentricity=eccentricity)
+    form = rs.find_form(rs.Hemisphere(0.2), layout, ROD, joint=joint, ends=("clamped",))
+    popped, mesh = form.popped["clamped"], form.footprint.mesh
+    bent = bending_of(popped.shell, popped.state, ROD)
+    middle = [mesh.rod_slice(k) for k, rod in enumerate(mesh.grid.rods) if rod.offset == 0.0]
+    radii = sorted(1 / np.median(bent.curvature[here]) for here in middle)
+    np.testing.assert_allclose(radii, [0.2 - eccentricity / 2, 0.2 + eccentricity / 2], rtol=2e-3)
+    for here in middle:
+        np.testing.assert_allclose(bent.curvature[here], np.median(bent.curvature[here]), rtol=0.05)
+
+
+@pytest.mark.parametrize("coupling", [rs.SharedDofs(), rs.ImplicitPenalty()])
+def test_rods_with_nodes_of_their_own_are_bent_as_those_that_share_them(coupling: object) -> None:
+    """Where springs let the rods of a joint part by a millimetre, both are as straight as before."""
+    mesh = dome().footprint.mesh
+    shell = rs.Shell.of(mesh, ROD, coupling=coupling)  # type: ignore[arg-type]
+    state = shell.state(dome().trimmed.positions)
+    if len(shell.node_blocks) == shell.node_count:
+        rods = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+        state[shell.node_blocks] += 1e-3 * np.where(rods % 2, 1.0, -1.0)[:, None]
+    expected = bending_of(rs.Shell.of(mesh, ROD), dome().trimmed.positions, ROD)
+    np.testing.assert_allclose(bending_of(shell, state, ROD).curvature, expected.curvature, atol=1e-9)
 
 
 GIVEN = {"EA": 1e5, "EI1": 1.0, "EI2": 1.0, "GJ": 0.7}

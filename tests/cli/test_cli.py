@@ -3,14 +3,16 @@
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import numba
 import numpy as np
@@ -37,7 +39,7 @@ class FakeArchive:
         self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
         self.case_toml = case_toml
 
-    def save(self, folder: ResultFolder, kinds: list[str] | None = None, more: dict[str, str] | None = None) -> None:
+    def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
         self.kinds = kinds
         folder.put("case.toml", self.case_toml)
         folder.commit()
@@ -47,10 +49,13 @@ class FakeArchive:
 
 
 class FakeForm:
+    told: ClassVar = list[dict[str, Any]]()
+
     def __init__(self, status: str, level: str) -> None:
         self.status, self.level = status, level
 
     def archive(self, case_toml: str = "", **options: Any) -> FakeArchive:
+        self.told.append(options)
         return FakeArchive(self.status, case_toml, self.level)
 
 
@@ -306,6 +311,55 @@ def test_progress_away_from_a_terminal_is_a_line_for_each_stage(
     assert capsys.readouterr().err.splitlines() == ["rodshell: net", "rodshell: drape", "rodshell: pop up"]
 
 
+def test_a_long_silence_is_broken_by_a_line_that_says_everything(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rodshell.cli.progress.SILENCE", 0.05)
+    search = finder.find_form
+
+    def slow(*args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
+        progress("drape", "bound, iteration 3 of at most 60", 1e-3)
+        time.sleep(0.5)
+        return search(*args, progress=progress, **options)
+
+    finder.find_form = slow  # type: ignore[method-assign]
+    assert main(["form", "hemisphere"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "rodshell: drape"
+    assert re.fullmatch(r"rodshell: drape: bound, iteration 3 of at most 60, residual 1.0e-03, \d s", said[1])
+    assert main(["form", "hemisphere", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("given", ["0", "-3 s", "soon", "3 mm"])
+def test_a_time_limit_that_is_none_is_refused(
+    given: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "--time-limit = " in refused(capsys, "form", "hemisphere", f"--time-limit={given}")
+    assert finder.calls == []
+
+
+def test_out_of_time_before_anything_was_found_keeps_the_old_result(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 0
+    before = Path("dome/case.toml").read_bytes()
+    said = refused(
+        capsys, "form", "hemisphere", "--radius", "0.3", "--out", "dome", "--time-limit", "1e-6 s", "-q", code=3
+    )
+    assert "out of time after 1e-06 s in stage net (iteration 1); nothing was found yet" in said
+    assert Path("dome/case.toml").read_bytes() == before
+
+
+def test_out_of_time_is_said_as_such(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
+    finder.status = "out of time after 60 s in stage drape (bound, iteration 3)"
+    assert main(["form", "hemisphere", "-q"]) == 3
+    assert (
+        capsys.readouterr().err
+        == f"rodshell: {finder.status}; partial results are in {Path('out/hemisphere').resolve()}\n"
+    )
+
+
 def test_quiet_says_nothing(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["form", "hemisphere", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
@@ -379,6 +433,28 @@ def test_a_table_takes_the_rod_that_is_asked_for(finder: FakeFinder) -> None:
     tube = rod("--rod.section.kind", "tube", "--rod.section.thickness", "0.1 mm").section
     assert isinstance(tube, Tube)
     assert tube.thickness == 0.0001
+
+
+def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dome: Path) -> None:
+    wishes = {"checks.stages": "3", "checks.strength": "30 MPa", "fabrication.kerf": "2 mm", "drawings.author": "Ada"}
+    wishes |= {"fabrication.stock_length": "6 m", "drawings.date": "2026-11-22", "drawings.tolerance": "2 mm"}
+    options = [word for key, value in wishes.items() for word in (f"--{key}", value)]
+    for source in (["dome"], [write_table(Path("rods.csv"), CROSS), "--unit", "m"]):
+        assert main(["popup", *source, *options]) == 0
+        told = FakeForm.told[-1]["takeaway"]
+        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).takeaway()
+
+
+def test_popup_writes_only_the_kinds_that_are_asked_for(
+    finder: FakeFinder, dome: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kinds = list[object]()
+    save = FakeArchive.save
+    monkeypatch.setattr(FakeArchive, "save", lambda self, to, only, **more: (kinds.append(only), save(self, to)))
+    assert main(["popup", "dome", "--only", "csv, dxf"]) == 0
+    assert kinds == [["csv", "dxf"]]
+    capsys.readouterr()
+    assert '"docx" is no kind of file' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
 
 
 def test_a_result_takes_the_rod_that_is_asked_for_in_place_of_its_own(finder: FakeFinder, dome: Path) -> None:

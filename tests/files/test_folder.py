@@ -249,11 +249,14 @@ def test_a_file_changed_after_a_kill_stays(dome: Path, monkeypatch: pytest.Monke
         patch.setattr(folder, "_apply", lambda *_: (_ for _ in ()).throw(Killed))
         with pytest.raises(Killed):
             rewrite(dome)
-    (dome / "schedule/rods.csv").write_text("mine")
+    for name in ("schedule/rods.csv", "drawings/plan.svg"):  # removed and written by the commit
+        (dome / name).parent.mkdir(exist_ok=True)
+        (dome / name).write_text("mine")
     with open_folder(dome):
         pass
-    assert (dome / "schedule/rods.csv").read_text() == "mine"
+    assert (dome / "schedule/rods.csv").read_text() == (dome / "drawings/plan.svg").read_text() == "mine"
     assert not (dome / "schedule/joints.csv").exists()
+    assert (dome / "drawings/strips.svg").exists()
 
 
 def test_a_living_process_keeps_its_stage_and_a_dead_one_does_not(dome: Path) -> None:

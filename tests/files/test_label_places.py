@@ -62,7 +62,7 @@ def test_no_two_leaders_of_the_flat_plan_cross_nor_run_through_a_name(name: str)
 
 @pytest.mark.parametrize("name", ["oval", "roof", "opening", "sewn"])
 def test_ids_of_joints_can_be_read_on_the_sheet(name: str) -> None:
-    """Capitals at least 1.8 mm high, each nearest to its own joint, and of most joints in a 1:1 drawing."""
+    """Capitals of 1.8 mm or more, each nearer to its own joint than to any other, and of most joints at 1:1."""
     _, plan = named(name)
     at = {joint.id: mark for joint, mark in zip(plan.joints, plan.marks, strict=True)}
     for text in fitted(lambda size: flat_drawing(plan, size), (420.0, 297.0)).content.texts:

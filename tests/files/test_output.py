@@ -161,7 +161,7 @@ def test_opening_angle_of_skew_rods_is_that_of_their_directions(table_out: Path)
     for row in rows(table_out, "joints.csv"):
         a, b = (np.diff(lines[row[f"rod_{side}"]], axis=0)[0] for side in "ab")
         expected = np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b)))
-        assert float(row["flat_deg"]) == pytest.approx(expected, abs=1e-3)
+        assert float(row["flat_deg"]) == pytest.approx(expected, abs=6e-3)  # shown to 0.01 degrees
         assert row["final_state"] == "popped_pinned"
 
 
@@ -317,7 +317,7 @@ def test_report_gives_the_verdict_first(out: Path) -> None:
     assert "kind = &#34;hemisphere&#34;" in page
 
 
-def test_report_puts_failure_and_warnings_before_all(archive: Archive, tmp_path: Path) -> None:
+def test_report_puts_failure_and_then_warnings_once_before_all_else(archive: Archive, tmp_path: Path) -> None:
     shells = {
         "pinned": {"status": "stalled", "stable": False},
         "clamped": {"status": "converged", "stable": False, "negative_modes": 1},
@@ -358,15 +358,15 @@ def test_least_result_is_written(tmp_path: Path) -> None:
     assert rows(out, "joints.csv")[0]["final_deg"] == ""
 
 
-def test_pictures_share_the_view_and_have_their_own_scale(archive: Archive) -> None:
-    """Ticks up to the next round number over the picture's own largest gap, of 0, 1.2 and 0.12 mm."""
+def test_pictures_share_the_view_and_the_scale(archive: Archive) -> None:
+    """Ticks up to the next round number over the largest gap of all, of 0, 1.2 and 0.12 mm; each says its own."""
     pictures = {state: picture_svg(archive, state) for state in ("draped", "popped_pinned", "popped_clamped")}
     boxes = {re.search(r'viewBox="[^"]+"', svg)[0] for svg in pictures.values()}
     assert len(boxes) == 1
-    for state, tick in (("draped", "0.001"), ("popped_pinned", "1"), ("popped_clamped", "0.1")):
+    for state in pictures:
         texts = [text.text for text in ET.fromstring(pictures[state]).iter(f"{SVG}text")]
         assert "gap to target in mm, + outside" in texts
-        assert {f"\N{MINUS SIGN}{tick}", "0", tick} <= set(texts[-6:])
+        assert {"\N{MINUS SIGN}1", "0", "1"} <= set(texts[-6:])
         assert ("\N{MINUS SIGN}1.2 mm" in texts) == (state == "popped_pinned")
     with pytest.raises(OutputError, match="popped_clamped"):
         picture_svg(archive, "popped")

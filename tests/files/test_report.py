@@ -14,7 +14,7 @@ from sample_archive import sample_archive, table_archive, with_way_up
 import rodshell as rs
 from rodshell.output import Archive, wording
 from rodshell.output.archive import export
-from rodshell.output.figures import key_figures
+from rodshell.output.figures import checks_table, key_figures
 from rodshell.output.plan import flat_plan
 from rodshell.output.result import rod_table
 from rodshell.output.verdict import facts
@@ -239,6 +239,20 @@ def test_the_summary_names_the_rod(rod: rs.Rod, line: str) -> None:
     assert said.startswith(f"  rod       {line}")
     assert said.endswith("rubber's; for another: rod.material)") == ("rubber's;" in line)
     assert said.endswith("rod.material)") == ("rubber" in line)
+
+
+def test_strengths_of_a_preset_are_shown_with_what_they_mean_and_their_source() -> None:
+    made = archive("dome")
+    rod = rod_table(rs.Rod(rs.Circle(0.02), rs.Material.preset("larch")))
+    result = {**made.result, "rod": rod, "bending": {"strength_of": "larch", "clamped": {"utilisation": 0.4}}}
+    rows = dict(dict(key_figures(result, flat_plan(made)))["Rod"])
+    assert rows["preset"] == "larch"
+    assert rows["bending strength"] == "30 MPa"
+    assert rows["these strengths are"] == "characteristic, short-term: reduce for duration and moisture"
+    assert rows["source"].startswith("EN 338")
+    table = checks_table(result)
+    assert table is not None
+    assert ("Utilisation of larch's strength", ["40 %"]) in table["rows"]
 
 
 def test_lengths_with_allowances_are_told_from_those_without() -> None:

@@ -1,5 +1,6 @@
 """The paper's drape in time against gravity statics, which shares only the energies with it."""
 
+import os
 import re
 from functools import cache
 from pathlib import Path
@@ -8,11 +9,14 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.errors import InputError, StabilityError
+from rodshell.case import load_case
+from rodshell.cli import main
+from rodshell.errors import InputError, OutputError, StabilityError
 from rodshell.formfinding.calming import calming, decay
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
+from rodshell.output.manifest import read_manifest
 from rodshell.solve.report import Status
 from rodshell.solve.time_series import TimeSeries
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
@@ -158,6 +162,37 @@ def test_frames_stream_to_disk(tmp_path: Path) -> None:
     nodes = len(draped.positions)
     np.testing.assert_allclose(series.states[0, :nodes, 2], RADIUS + 0.05, atol=1e-12)
     np.testing.assert_allclose(series.states[-1, :nodes], draped.positions, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["times.npy", "states.npy", "energies.npy"])
+def test_frames_replace_no_file(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(OutputError, match=f"will not replace .*{name}"):
+        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=Fall(duration=0.1, stream=tmp_path))
+    assert (tmp_path / name).read_text() == "mine"
+    assert os.listdir(tmp_path) == [name]
+
+
+def test_frames_of_a_case_are_files_of_its_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They stand in its folder and nowhere else, and a second run replaces them with the rest."""
+    monkeypatch.chdir(tmp_path)
+    options = ["--rods", "3x3", "--spacing", "60mm", "--length", "700mm", "--edge", "60mm", "--drape.duration", "0.1s"]
+    command = ["form", "hemisphere", "--method", "paper", *options, "--only", "csv", "--out", "dome", "-q"]
+    for _ in range(2):
+        assert main([*command, "--drape.frames", "my frames"]) == 3
+        series = TimeSeries.load("dome/my frames")
+        np.testing.assert_allclose(series.times, np.arange(11) * 0.01, atol=1e-12)
+    assert "my frames/states.npy" in read_manifest(Path("dome"))
+    assert os.listdir() == ["dome"]
+    Path("dome/my frames/states.npy").write_bytes(b"mine")
+    assert main([*command, "--drape.frames", "my frames"]) == 2
+    assert Path("dome/my frames/states.npy").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("frames", ["/tmp/frames", "../frames", "a/../../b", "C:\\frames", "C:frames", ".", ""])
+def test_a_case_writes_frames_nowhere_else(frames: str) -> None:
+    with pytest.raises(rs.InputError, match=r"drape\.frames.*result's own folder"):
+        load_case("hemisphere", {"drape.method": "paper", "drape.frames": frames})
 
 
 def test_friction_holds_what_else_slides_off() -> None:

@@ -15,6 +15,7 @@ from rodshell.formfinding import bound, pipeline
 from rodshell.formfinding.roll import roll
 from rodshell.output import read
 from rodshell.output.archive import json_text
+from rodshell.output.verdict import verdict
 from rodshell.solve.report import Status
 
 SIZE = 0.2
@@ -86,13 +87,14 @@ def test_a_pop_up_that_stops_early_is_named_and_has_no_agreement(monkeypatch):
     assert form.result()["pop_up"]["pinned"]["stable"] is False
 
 
-def test_a_popped_up_saddle_is_warned_of(monkeypatch):
+def test_a_popped_up_saddle_is_told_by_the_verdict(monkeypatch):
     monkeypatch.setattr(pipeline, "pop_up", altered_pop_up(negative_modes=2))
     form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=("pinned",))
     assert form.status == "converged"
-    assert any("pinned" in text and "not stable" in text and "2 negative modes" in text for text in form.warnings)
-    assert form.result()["warnings"] == list(form.warnings)
     assert form.result()["pop_up"]["pinned"]["stable"] is False
+    judged = verdict(form.result())
+    assert judged.level == "unbuildable"
+    assert judged.reasons[0].startswith("with pinned ends the shell is unstable (2 buckling modes)")
 
 
 @pytest.mark.parametrize(("stiffness", "stretched"), [(0.3e6, True), (1e8, False)])
@@ -107,9 +109,9 @@ def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remed
     if stretched:
         assert f"stretch by {100 * form.draped.report.max_strain:.2g} %" in found[0]
         assert "rod.material" in found[0]
-        sprung = [text for text in form.warnings if "springs off" in text]
-        assert len(sprung) == 1
-        assert sprung[0].endswith("even with clamped ends")
+        off = [text for text in form.verdict.reasons if "off the target" in text]
+        assert len(off) == 1
+        assert "dips and ridges" not in off[0]
 
 
 STANDING, LYING = rs.RectangularSection(width=4e-3, height=1e-3), rs.RectangularSection(width=1e-3, height=4e-3)
@@ -186,7 +188,8 @@ def test_a_drape_by_weight_that_fails_is_told_of_the_bound_one_once(method, stat
 
 def test_a_wave_that_springs_off_is_advised_seams():
     gap = replace(hemisphere_form().agreement["clamped"], max=0.03 * SIZE)
-    (words,) = replace(hemisphere_form(), agreement={"clamped": gap}).warnings
+    form = replace(hemisphere_form(), agreement={"clamped": gap})
+    (words,) = [text for text in verdict(form.result()).reasons if "off the target" in text]
     assert words.endswith("dips and ridges need seams, graded stiffness or supports")
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import rodshell as rs
+from rodshell.checks import self_weight, settled_shell
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.families import LEAVE_OUT, choose_families
@@ -191,6 +192,15 @@ def test_seams_carry_what_the_patches_do_not() -> None:
     edge = np.delete(forces, np.ravel(both), axis=0).sum(axis=0)
     np.testing.assert_allclose(edge + seam["forces"]["clamped"]["sum"], 0.0, atol=1e-8 * held["largest_force"])
     assert seam["forces"]["clamped"]["largest"] > 0.01 * held["largest_force"]
+
+
+def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> None:
+    form = sewn("two bumps, in the valley")
+    archive = form.archive()
+    for ends, weighed in archive.result["self_weight"].items():
+        own = [self_weight(*settled_shell(one.popped[ends])) for one in form.found.values()]
+        assert weighed["load_factor"] == min(one.load_factor for one in own)
+    assert archive.summary().count("(weakest patch, its seam held)") == 2
 
 
 def test_a_sphere_beyond_the_nets_limit_is_formed_in_two() -> None:

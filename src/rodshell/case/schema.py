@@ -3,10 +3,10 @@
 Those of targets, and of rods and joints, have modules of their own.
 """
 
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from rodshell.case.rod_tables import BallTable, JointKinds, RodTable
 from rodshell.case.table import Table
@@ -96,7 +96,16 @@ class DrapeTable(Table):
     duration: Duration | None = Field(default=None, description="longest fall; default 6 s at a size of 0.2 m")
     friction: Share = Field(default=0.0, description="Coulomb's coefficient between falling rods and target")
     drag: Share = Field(default=0.0, description="rate in 1/s at which falling rods lose velocity to the air")
-    frames: str | None = Field(default=None, description="folder for the frames of a fall; default: none are kept")
+    frames: str | None = Field(default=None, description="folder below --out for the frames of a fall; default: none")
+
+    @field_validator("frames")
+    @classmethod
+    def _inside(cls, value: str | None) -> str | None:
+        """A case from somebody else must not write to any place."""
+        parts = PureWindowsPath("frames" if value is None else value).parts  # it knows both kinds of paths
+        if not parts or ".." in parts or any(one in part for part in parts for one in "/\\:"):
+            raise ValueError('frames are kept in the result\'s own folder: give a name in it such as "frames"')
+        return value
 
     @model_validator(mode="after")
     def _uses_all(self) -> Self:
@@ -266,7 +275,7 @@ class Case(Table):
         def fit() -> "Fit":
             from rodshell.checks.sizing import Fit
 
-            return Fit.on(target, layout, anchor=anchor)
+            return Fit.on(target, layout, anchor=anchor, joint=self.joint.build())
 
         return self.rod.build(fit, strength=self.checks.strength)
 

@@ -3,8 +3,9 @@
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check, settled_shell
 from rodshell.checks.contact import Contact, contact_of
-from rodshell.checks.deployment import Deployment, deploy
+from rodshell.checks.deployment import Deployment, Elsewhere, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
+from rodshell.checks.other_shapes import OtherShape, OtherShapes, other_shapes
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight
 
@@ -13,7 +14,10 @@ __all__ = [
     "Checks",
     "Contact",
     "Deployment",
+    "Elsewhere",
     "JointLoads",
+    "OtherShape",
+    "OtherShapes",
     "Reactions",
     "SelfWeight",
     "bending",
@@ -23,6 +27,7 @@ __all__ = [
     "curvatures",
     "deploy",
     "joint_loads",
+    "other_shapes",
     "reactions",
     "self_weight",
     "settled_shell",

@@ -1,31 +1,34 @@
 """All checks of a popped-up shell in one call."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 
 import numpy as np
 
 from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
+from rodshell.checks.clamping import reached_by_turning
 from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
+from rodshell.checks.other_shapes import OtherShapes, other_shapes
 from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
+from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
+from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.units import length_text, stress_text
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
-THIN = 0.05  # strain of the outermost fibre up to which rods are thin: radii of ten depths
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ class Checks:
     deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
     self_weight : by end condition, what share of its own weight the shell bears.
     contact : by end condition; `contact_on_the_way` of the deployment's stages.
+    other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
+    clamped_from_flat : whether the pinned shell, reached from flat, comes to the clamped shape when its ends are
+        turned into their clamps; None where that is not known.
+    out_of_time : a sentence on when that was and which checks are missing, or "".
     """
 
     bending: dict[Ends, Bending]
@@ -48,86 +55,54 @@ class Checks:
     self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
     contact_on_the_way: tuple[Contact, ...] = ()
+    other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
+    clamped_from_flat: bool | None = None
+    out_of_time: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
-        way = (*way, *unknown_weights(self.self_weight), *self.touching)
-        bends = [
-            float(bent.bending_strain.max())
-            for bent in (*self.bending.values(), *self.on_the_way)
-            if bent.bending_strain is not None
-        ]
-        if max(bends, default=0.0) <= THIN:
-            return way
-        return (
-            *way,
-            f"bending strains the rods by {100 * max(bends):.2g} %: they are too thick for their bends, the theory of "
-            f"thin rods holds up to {100 * THIN:.0f} % or so; use thinner rods or a larger target",
-        )
+        late = (self.out_of_time,) if self.out_of_time else ()
+        turned: tuple[str, ...] = ()
+        if self.clamped_from_flat is False:
+            turned = ("turned into their clamps after deployment, the ends lead to another than the clamped shape",)
+        return (*late, *way, *turned, *unknown_weights(self.self_weight), *self.tight)
+
+    @property
+    def before_the_end(self) -> tuple[tuple[float, Bending], ...]:
+        """Stages of the deployment below the final shape, with their shares."""
+        shares = () if self.deployment is None else self.deployment.share.tolist()
+        return tuple((share, bent) for share, bent in zip(shares, self.on_the_way, strict=True) if share < 1)
 
     @property
     def nearest_on_the_way(self) -> tuple[float, Contact] | None:
-        """The stage of the deployment in which rods are nearest, by its share; None where nothing was checked."""
+        """The stage below the final shape in which rods are nearest, by its share; None where nothing was checked."""
         if self.deployment is None or not self.contact_on_the_way:
             return None
-        pairs = zip(self.deployment.share.tolist(), self.contact_on_the_way, strict=True)
+        pairs = zip(self.deployment.share.tolist()[:-1], self.contact_on_the_way[:-1], strict=True)
         return min(pairs, key=lambda pair: inf if pair[1].clearance is None else pair[1].clearance)
 
     @property
-    def touching(self) -> tuple[str, ...]:
-        """A sentence where rods touch, or come so near to each other that there is no room for joints."""
+    def tight(self) -> tuple[str, ...]:
+        """A sentence where rods that do not touch come so near to each other that there is no room for joints."""
         shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
-        if (nearest := self.nearest_on_the_way) is not None and nearest[0] < 1:
+        if (nearest := self.nearest_on_the_way) is not None:
             share, found = nearest
             shapes.append((found, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid"))
         near = [(found, where) for found, where in shapes if found.clearance is not None]
-        if not near:
+        if not near or any(found.pairs for found, _ in near):
             return ()
         worst, where = min(near, key=lambda pair: pair[0].clearance or 0.0)
         assert worst.clearance is not None
         assert worst.rods is not None
         assert worst.where is not None
-        place = "({:.4g}, {:.4g}, {:.4g}) m".format(*worst.where)
         who = f"rods {worst.rods[0]} and {worst.rods[1]}" if worst.rods[0] != worst.rods[1] else f"rod {worst.rods[0]}"
-        remedy = "use thinner rods (rod.section) or a larger spacing"
-        if not worst.pairs:
-            return (
-                f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near {place}: that "
-                f"leaves hardly any room for joints; {remedy}",
-            )
-        does = "overlap" if who.startswith("rods") else "runs into itself"
-        count = f" (the worst of {worst.pairs} pairs that touch)" if worst.pairs > 1 else ""
         return (
-            f"{who} {does} by {length_text(-worst.clearance)} {where}, near {place}{count}: rods cannot run through "
-            f"each other; {remedy}",
+            f"{who} pass each other with {length_text(worst.clearance)} between them {where}, near "
+            f"({worst.where[0]:.4g}, {worst.where[1]:.4g}, {worst.where[2]:.4g}) m: that leaves hardly any room for "
+            "joints; use thinner rods (rod.section) or a larger spacing",
         )
-
-    def overstress(self, strength: float | None, mesh: GridMesh) -> tuple[str, ...]:
-        """A sentence where the rods would break, in a final shape or on the way up, with the place and with torsion.
-
-        strength : of the rods' material [Pa], or None.
-        """
-        if strength is None:
-            return ()
-        shares = () if self.deployment is None else self.deployment.share
-        final = [(_worst(bent) / strength, f"with {ends} ends", bent) for ends, bent in self.bending.items()]
-        way = [
-            (_worst(bent) / strength, f"on the way up (stage at {100 * share:.0f} %)", bent)
-            for share, bent in zip(shares, self.on_the_way, strict=True)
-            if share < 1
-        ]
-        worst = [max(each, key=lambda one: one[0]) for each in (final, way) if each]
-        broken = sorted((one for one in worst if one[0] > 1), key=lambda one: -one[0])
-        if not broken:
-            return ()
-        found = ", ".join(
-            f"{max(101, round(100 * used))} % of the strength {where} in {_most_stressed(bent, mesh)}"
-            for used, where, bent in broken
-        )
-        only = "" if any(one[0] > 1 for one in final) else ", or close the joints near that place last"
-        return (f"the rods would break: {found}; use thinner, softer or stronger rods, or a flatter target{only}",)
 
     def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
         """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
@@ -161,39 +136,70 @@ def check(
     held = {ends: reactions(*pair) for ends, pair in settled.items()}
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     weighed = dict[Ends, SelfWeight]()
-    for ends, pair in settled.items():
-        progress("self-weight", f"{ends} ends", 0.0)
-        weighed[ends] = self_weight(*pair)
-    if "pinned" not in done or not stages:
-        return Checks(bent, held, carried, None, (), weighed, met)
-    last = done["pinned"]
-    deployment = deploy(
-        last.shell, last.state, last.forces, stages=stages, pattern=settled["pinned"][1].pattern,
-        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
-    )  # fmt: skip
-    mesh, laid = last.footprint.mesh, deployment.positions[0]
+    follow = "pinned" in done and stages > 0
+    deployment, turned, others, late = None, None, dict[Ends, OtherShapes](), ""
+    missing = [f"self-weight with {ends} ends" for ends in settled]
+    missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
+    try:
+        for ends, pair in settled.items():
+            weighed[ends] = self_weight(*pair, progress=_weighing(ends, progress))
+            missing.pop(0)
+        if follow:
+            deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
+            if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
+                progress("deployment", "turning the ends into their clamps", 0.0)
+                turned = reached_by_turning(done["pinned"], done["clamped"])
+            missing.pop(0)
+        for ends, one in _other_shapes(popped, settled, deployment, progress):
+            others[ends] = one
+    except OutOfTimeError as error:
+        late = f"{error}; not checked: {', '.join(missing)}"
+    if deployment is None:
+        return Checks(bent, held, carried, None, (), weighed, met, other_shapes=others, out_of_time=late)
+    mesh, laid = done["pinned"].footprint.mesh, deployment.positions[0]
     flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way)
+    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, late)
 
 
-def _worst(bent: Bending) -> float:
-    return 0.0 if bent.stress is None else float(bent.stress.max())
+def _other_shapes(
+    popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None,
+    progress: Progress,
+) -> Iterator[tuple[Ends, OtherShapes]]:  # fmt: skip
+    """Other stable shapes, with half of the factorisations that the shells and the deployment took.
+
+    Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
+    """
+    done = sum(one.report.factorizations for one in popped.values())
+    left = (done + (0 if deployment is None else deployment.factorizations)) // 2
+    stable = [ends for ends, (_, at) in settled.items() if at.report.stable]
+    for ends in stable:
+        most = 2 * left // 3 if ends == stable[0] else left
+        left -= most
+        own = deployment if ends == "pinned" else None
+        told = partial(_starting, ends, progress)
+        yield ends, other_shapes(*settled[ends], most_factorizations=most, deployment=own, told=told)
 
 
-def _most_stressed(bent: Bending, mesh: GridMesh) -> str:
-    """The rod, how far along it, and how much of it is torsion."""
-    assert bent.stress is not None
-    assert bent.torsion_stress is not None
-    at = int(np.argmax(bent.stress))
-    rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
-    sheared = float(bent.torsion_stress[at])
-    torsion = (
-        f" (with a shear stress of {stress_text(sheared)} of torsion)" if sheared > WORTH * bent.stress[at] else ""
-    )
-    return f"{rod.name}, {length_text(float(mesh.stations[at]) - rod.start)} from its start{torsion}"
+def _starting(ends: Ends, progress: Progress, start: int) -> None:
+    progress("other shapes", f"{ends} ends, start {start}", 0.0)
+
+
+def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
+    def told(count: int, factor: float) -> None:
+        done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
+        progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
+
+    return told
+
+
+def _deployed(last: Popped, found: Equilibrium, stages: int, progress: Progress) -> Deployment:
+    return deploy(
+        last.shell, last.state, last.forces, stages=stages, pattern=found.pattern,
+        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+    )  # fmt: skip
 
 
 def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:

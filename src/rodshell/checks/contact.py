@@ -109,7 +109,8 @@ def contact(
     outline = _Outline.of(rod)
     if outline is None:
         return Contact()
-    edges = _Edges(mesh, places, outline, directors, crossings or _crossing_lines(mesh.grid.rods, outline))
+    by_design = _crossing_lines(mesh.grid.rods, outline) if crossings is None else crossings
+    edges = _Edges(mesh, places, outline, directors, by_design)
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
     counted = gap <= limit

@@ -9,6 +9,7 @@ import numpy as np
 from rodshell.checks.check import Checks
 from rodshell.checks.contact import Contact, joined_contact
 from rodshell.checks.deployment import Deployment
+from rodshell.checks.other_shapes import OtherShapes
 from rodshell.checks.self_weight import weakest
 from rodshell.formfinding.popup import Ends
 
@@ -25,9 +26,9 @@ class JoinedChecks(Checks):
             f"patch {name}: {word}"
             for name, one in self.named.items()
             for word in one.warnings
-            if word not in one.touching
+            if word not in one.tight
         ]
-        return (*words, *self.touching)
+        return (*words, *self.tight)
 
 
 def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> JoinedChecks:
@@ -44,35 +45,60 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
     def each(table: str) -> dict[Ends, Any]:
         return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
 
-    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in ends}
+    both = [end for end in ends if all(end in part.self_weight for part in parts)]
+    weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in both}
+    late = next((part.out_of_time for part in parts if part.out_of_time), "")
     contact = {end: contacts[end] for end in ends}
+    others = {end: _searched([part.other_shapes[end] for part in parts if end in part.other_shapes]) for end in ends}
+    bending, held, joints = each("bending"), each("reactions"), each("joints")
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(each("bending"), each("reactions"), each("joints"), None, (), weighed, contact, named=named)
+        return JoinedChecks(
+            bending, held, joints, None, (), weighed, contact, other_shapes=others, out_of_time=late, named=named
+        )
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
     bent = tuple(
         _stacked([part.on_the_way[row[k]] for part, row in zip(parts, rows, strict=True)]) for k in range(len(shared))
     )
-    way = _joined_ways(ways, rows)
+    way, turned = _joined_ways(ways, rows), _all([part.clamped_from_flat for part in parts])
     found = {
         name: [part.contact_on_the_way[k] for k in row] for (name, part), row in zip(named.items(), rows, strict=True)
     }
     met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
-    return JoinedChecks(
-        each("bending"), each("reactions"), each("joints"), way, bent, weighed, contact, met, named=named
-    )
+    return JoinedChecks(bending, held, joints, way, bent, weighed, contact, met, others, turned, late, named=named)
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
     """The ways up of several shells at the shares that all reached, their `rows`."""
     lost = [one.lost_at for one in ways if one.lost_at is not None]
+    elsewhere = [one.elsewhere for one in ways if one.elsewhere is not None]
     return Deployment(
         ways[0].share[rows[0]],
         np.concatenate([one.positions[row] for one, row in zip(ways, rows, strict=True)], axis=1),
         (),
-        tuple(sorted({pair for one in ways for pair in one.snaps})),
+        tuple(sorted({snap for one in ways for snap in one.snaps}, key=lambda snap: snap.start)),
         max(lost, default=None),
+        _all([one.reached_from_flat for one in ways]),
+        max(elsewhere, key=lambda one: one.distance, default=None),
+        max((one.guided for one in ways if one.guided is not None), default=None),
+        sum(one.factorizations for one in ways),
+    )
+
+
+def _all(answers: Sequence[bool | None]) -> bool | None:
+    """Whether all are true; None where that is not known."""
+    return False if False in answers else None if None in answers else True
+
+
+def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
+    """The searches of several shells as one: each found the other shapes of its own shell."""
+    return OtherShapes(
+        sum(one.tried for one in parts),
+        any(one.popped_through for one in parts),
+        max((one.largest_kick for one in parts), default=0.0),
+        tuple(shape for one in parts for shape in one.found),
+        sum(one.factorizations for one in parts),
     )
 
 

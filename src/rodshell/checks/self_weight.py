@@ -5,7 +5,7 @@ path of equilibria that begins at the unloaded shell is stable up to there. A li
 unloaded shell is bent, and sinks before it buckles.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -52,13 +52,21 @@ class SelfWeight:
         return np.inf if self.limit == "none" else 0.0
 
 
-def self_weight(shell: Shell, found: Equilibrium, *, gravity: float = GRAVITY, most: float = MOST) -> SelfWeight:
+def self_weight(
+    shell: Shell,
+    found: Equilibrium,
+    *,
+    gravity: float = GRAVITY,
+    most: float = MOST,
+    progress: Callable[[int, float], None] = lambda count, factor: None,
+) -> SelfWeight:
     """Load a shell in equilibrium, `found`, with its own weight until it is no longer stable.
 
     Parameters
     ----------
     gravity : [m/s2].
     most : the largest factor that is of interest.
+    progress : as of `first_critical`.
     """
     if not shell.mass[np.unique(shell.stretch.blocks), 2].all():  # joints may have some even then
         return SelfWeight(None, None, "no mass")
@@ -67,7 +75,7 @@ def self_weight(shell: Shell, found: Equilibrium, *, gravity: float = GRAVITY, m
     supports = Supports(shell.held_ends())
     length = 0.5 * float(np.ptp(shell.positions(found.state), axis=0).max())
     problem = Problem(shell.elements, shell.stretch, supports, length, places=shell.places, pattern=found.pattern)
-    end = first_critical(problem, found.state, found.forces, load, most=most)
+    end = first_critical(problem, found.state, found.forces, load, most=most, progress=progress)
     deflection = None
     if end.state is not None:
         moved = shell.positions(end.state) - shell.positions(found.state)

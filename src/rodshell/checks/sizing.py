@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError, NetLimitError
+from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.rods.fibres import fibre_strain
@@ -35,6 +36,10 @@ class Bends(NamedTuple):
     normal: Floats
     geodesic: Floats
 
+    def rolled(self) -> "Bends":
+        """The same of laths that are free to turn about their own axes: they bend towards their thin side alone."""
+        return Bends(np.hypot(self.normal, self.geodesic), np.zeros_like(self.geodesic))
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -54,17 +59,33 @@ class Fit:
     bends: Callable[[], Bends]
 
     @classmethod
-    def on(cls, target: Target, layout: GridLayout, *, anchor: tuple[float, float] | None = None) -> Self:
-        """By the net of a layout on its target."""
+    def on(
+        cls,
+        target: Target,
+        layout: GridLayout,
+        *,
+        anchor: tuple[float, float] | None = None,
+        joint: Joint | None = None,
+    ) -> Self:
+        """By the net of a layout on its target.
+
+        joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
+        """
         slender = SLENDER * target.size
         thickest = min(2 * slender, ROOM * min(layout.spacing))
-        return cls(2 * target.size, slender, thickest, lambda: bends_of(target, layout, anchor))
+
+        def bends() -> Bends:
+            found = bends_of(target, layout, anchor)
+            return found if (joint or Ball()).holds_normals else found.rolled()
+
+        return cls(2 * target.size, slender, thickest, bends)
 
     @classmethod
     def between(cls, lengths: Floats, ends: Floats) -> Self:
         """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m], as if each bent like a sine."""
         chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        width = float(np.ptp(ends[:, :, :2], axis=(0, 1)).max())
+        ring = float(lengths.max()) / np.pi  # of a rod whose ends meet
+        width = max(float(np.ptp(ends[:, :, :2], axis=(0, 1)).max()), ring)
         rise = 2 * np.sqrt(np.clip(1 - chords / lengths, 0.0, 1.0))  # amplitude of the tangent's angle [rad]
         slender = SLENDER * width / 2
         return cls(width, slender, 2 * slender, lambda: Bends(np.pi * rise / lengths, np.zeros(len(lengths))))

@@ -6,7 +6,7 @@ from importlib import import_module
 import click
 
 from rodshell.cli.interruption import Interrupted
-from rodshell.errors import InputError, RodshellError
+from rodshell.errors import InputError, OutOfTimeError, RodshellError
 
 COMMANDS = {
     "form": "From a target to the flat grid that pops up into it.",
@@ -76,6 +76,8 @@ def app(ctx: click.Context) -> None:
 
 def failed(error: BaseException) -> int:
     """Say what was wrong in one line; the exit code. Raises what is no user's error."""
+    if isinstance(error, OutOfTimeError):
+        return _fail(f"{error}; nothing was found yet that could be written", error.exit_code)
     if isinstance(error, RodshellError):
         return _fail(str(error), error.exit_code)
     if isinstance(error, click.NoSuchOption):

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from rodshell.cli.outcome import force_option, wanted_kinds
+from rodshell.cli.progress import Progress
 
 
 @click.command()
@@ -22,7 +23,8 @@ def command(folder: str, only: str | None, out: str | None, force: bool, quiet: 
     from rodshell.output.archive import export
 
     where = Path(out or folder).expanduser()
-    names = export(read(folder), where, wanted_kinds(only), force=force)
+    with Progress(quiet=quiet) as progress:
+        names = export(read(folder), where, wanted_kinds(only), force=force, progress=progress)
     if not quiet:
         for name in names:
             click.echo(where / name)

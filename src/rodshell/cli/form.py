@@ -8,14 +8,25 @@ import click
 
 from rodshell.case import BUILT_IN, Case, load_case
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
-from rodshell.cli.outcome import Kept, announce_rod, deliver, force_option, output_folder, wanted_kinds
+from rodshell.cli.outcome import (
+    Kept,
+    announce_rod,
+    deliver,
+    force_option,
+    output_folder,
+    seconds_of,
+    time_limit_option,
+    wanted_kinds,
+)
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.units import length_text
 
 if TYPE_CHECKING:
+    from rodshell.formfinding.progress import Progress as Calls
     from rodshell.formfinding.search import Search
     from rodshell.layout import GridLayout
     from rodshell.output import Archive
+    from rodshell.output.folder import ResultFolder
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -30,11 +41,19 @@ SEARCH = "search.svg"
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME.")
 @click.option("--only", metavar="KINDS", help="Files beside the archive, such as dxf,csv; see rodshell export --help.")
+@time_limit_option
 @force_option
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs.")
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 def command(
-    name: str, out: str | None, only: str | None, force: bool, as_json: bool, quiet: bool, **values: str | None
+    name: str,
+    out: str | None,
+    only: str | None,
+    time_limit: str | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    **values: str | None,
 ) -> int:
     """From a target to the flat grid that pops up into it: drape, trim, map back, pop up, compare.
 
@@ -42,69 +61,90 @@ def command(
     glTF), a Rhino file (3dm), or heights (CSV, PNG). Each key of a case is an option too.
     """
     case = load_case(name, overrides_of(values))
-    return run(case, name, out=out, only=only, force=force, as_json=as_json, quiet=quiet)
+    limit = seconds_of(time_limit)
+    return run(case, name, out=out, only=only, limit=limit, force=force, as_json=as_json, quiet=quiet)
 
 
 assert command.help is not None
 command.help = command.help.format(names=", ".join(BUILT_IN))
 
 
-def run(case: Case, name: str, *, out: str | None, only: str | None, force: bool, as_json: bool, quiet: bool) -> int:
-    """Find the form of a case and write it; the exit code."""
+def run(
+    case: Case,
+    name: str,
+    *,
+    out: str | None,
+    only: str | None,
+    limit: float | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Find the form of a case and write it; the exit code.
+
+    limit : longest time [s] for all but the files.
+    """
+    from rodshell.formfinding.progress import limited
     from rodshell.output.archive import ARCHIVE
     from rodshell.output.files import reserved
     from rodshell.output.inputs import kept_case, read_inputs
+    from rodshell.solve.time_series import NAMES
 
     kinds = wanted_kinds(only)
     inputs = read_inputs(case.to_toml())
     copies = kept_case(case.to_toml(), inputs, Path())[1]
     names = [*ARCHIVE, *copies, *reserved(kinds), *([SEARCH] if case.undecided else [])]
+    names += [f"{case.drape.frames}/{name}.npy" for name in NAMES] if case.drape.frames else []
     with output_folder(out, name, names, force=force) as place:
         work = _sew if case.seams.lines else _form
-        found, picture = work(case, inputs, quiet=quiet, table=not (quiet or as_json))
-        kept = Kept(found, kinds, picture)
-        return deliver(kept, kept.save, place, as_json=as_json, quiet=quiet)
+        announce_compilation(quiet=quiet)
+        progress = Progress(quiet=quiet)
+        with progress:
+            archive, searched = work(case, inputs, place, limited(progress, limit), quiet=quiet)
+        if searched and not (quiet or as_json):
+            click.echo(searched.table())
+        kept = Kept(archive, kinds, {SEARCH: _picture(searched)} if searched else {})
+        return deliver(kept, kept.save, place, progress=progress, as_json=as_json, quiet=quiet)
 
 
-def _form(case: Case, inputs: dict[str, bytes], *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
-    """The form of a case, and the picture of its search; `table` prints that."""
+def _form(
+    case: Case, inputs: dict[str, bytes], place: "ResultFolder", progress: "Calls", *, quiet: bool
+) -> "tuple[Archive, Search | None]":
+    """The form of a case, and the search for its anchor and heading; frames are staged in `place`."""
     takeaway = case.takeaway()
-    announce_compilation(quiet=quiet)
     target, layout, rod, options = case.build()
     _announce_sizes(case, target, layout, quiet=quiet)
+    if case.drape.frames:
+        options["fall"] = replace(options["fall"], stream=place.new / case.drape.frames)
     from rodshell.form import find_form
 
-    with Progress(quiet=quiet) as progress:
-        found = None
-        if case.undecided:
-            found = _search(case, target, layout, rod, progress)
-            layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
-            case = case.decided(found.best.anchor, found.best.heading)
-            rod = case.rod_on(target, layout, anchor=found.best.anchor)
-        announce_rod(case, rod, quiet=quiet)
-        case = case.with_rod(rod)
-        form = find_form(target, layout, rod, progress=progress, **options)
-        archive = form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress)
-    if found and table:
-        click.echo(found.table())
-    return archive, {SEARCH: _picture(found)} if found else {}
+    found = None
+    if case.undecided:
+        found = _search(case, target, layout, rod, progress)
+        layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
+        case = case.decided(found.best.anchor, found.best.heading)
+        rod = case.rod_on(target, layout, anchor=found.best.anchor)
+    announce_rod(case, rod, quiet=quiet)
+    case = case.with_rod(rod)
+    form = find_form(target, layout, rod, progress=progress, **options)
+    return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), found
 
 
-def _sew(case: Case, inputs: dict[str, bytes], *, quiet: bool, table: bool) -> "tuple[Archive, dict[str, str]]":
+def _sew(
+    case: Case, inputs: dict[str, bytes], place: "ResultFolder", progress: "Calls", *, quiet: bool
+) -> "tuple[Archive, None]":
     """The form of a case with seams."""
     takeaway = case.takeaway()
-    announce_compilation(quiet=quiet)
     target, layout, rod, options = case.build_sewn()
     _announce_sizes(case, target, layout, quiet=quiet)
     announce_rod(case, rod, quiet=quiet)
     case = case.with_rod(rod)
     from rodshell.form import sew
 
-    with Progress(quiet=quiet) as progress:
-        search = case.layout.rotate == "auto"
-        form = sew(target, layout=layout, rod=rod, search=search, progress=progress, **options)
-        case = case.headed(form.layout.rotate)
-        return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), {}
+    search = case.layout.rotate == "auto"
+    form = sew(target, layout=layout, rod=rod, search=search, progress=progress, **options)
+    case = case.headed(form.layout.rotate)
+    return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), None
 
 
 def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet: bool) -> None:
@@ -118,7 +158,7 @@ def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet
         click.echo(f"rodshell: {target.name}, {length_text(2 * target.size)} wide; {said}", err=True)
 
 
-def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: Progress) -> "Search":
+def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: "Calls") -> "Search":
     """Try anchors and headings for those of the two that are "auto"."""
     from rodshell.formfinding.search import search
 

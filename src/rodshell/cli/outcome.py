@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import click
 
 from rodshell.cli.interruption import Interruption
+from rodshell.cli.progress import Progress
+from rodshell.errors import InputError
 
 if TYPE_CHECKING:
     from rodshell.case import Case
@@ -54,8 +56,8 @@ class Kept:
     def result(self) -> dict[str, Any]:
         return self.archive.result
 
-    def save(self, folder: "ResultFolder") -> Path:
-        return self.archive.save(folder, self.kinds, more=self.more)
+    def save(self, folder: "ResultFolder", progress: Progress) -> Path:
+        return self.archive.save(folder, self.kinds, more=self.more, progress=progress)
 
 
 def output_folder(
@@ -102,19 +104,49 @@ def announce_rod(case: "Case", rod: "Rod", *, quiet: bool) -> None:
         click.echo(f"rodshell: rod: {rod_text(rod_table(rod))}; {chosen(case.rod.left_open, strength)}", err=True)
 
 
+def time_limit_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--time-limit of the commands that search."""
+    text = 'Longest time such as "60 s" for all but the files; what was found until then is written.'
+    return click.option("--time-limit", metavar="TIME", help=text)(command)
+
+
+def seconds_of(given: str | None) -> float | None:
+    """What --time-limit gives [s].
+
+    Raises
+    ------
+    InputError : it is not a time, or not a positive one.
+    """
+    from rodshell.units import parse_quantity
+
+    seconds = None if given is None else parse_quantity(given, "time", "--time-limit")
+    if seconds is not None and seconds <= 0:
+        raise InputError(f'--time-limit = "{given}": must be larger than zero')
+    return seconds
+
+
 def deliver(
-    result: Result, save: "Callable[[ResultFolder], object]", place: "ResultFolder", *, as_json: bool, quiet: bool
+    result: Result,
+    save: "Callable[[ResultFolder, Progress], object]",
+    place: "ResultFolder",
+    *,
+    progress: Progress,
+    as_json: bool,
+    quiet: bool,
 ) -> int:
     """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
     Interruption.check()
-    folder = _saved(save, place)
+    with progress:
+        folder = _saved(lambda where: save(where, progress), place)
     if as_json:
         click.echo(json.dumps({"out": str(folder), **result.result()}))
     elif not quiet:
         click.echo(result.summary())
         click.echo(f"written to {folder}")
     if result.status != "converged":
-        click.echo(f"rodshell: NOT CONVERGED: {result.status}; partial results are in {folder}", err=True)
+        late = result.status.startswith("out of time")
+        said = result.status if late else f"NOT CONVERGED: {result.status}"
+        click.echo(f"rodshell: {said}; partial results are in {folder}", err=True)
         return NOT_CONVERGED
     verdict = result.result().get("verdict")
     if verdict and verdict["level"] == "unbuildable":

@@ -1,8 +1,10 @@
 """`rodshell paper`: the paper's figures, made again with their errors."""
 
 from contextlib import ExitStack
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,6 +12,9 @@ from rodshell.cli.outcome import deliver, force_option, output_folder
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.errors import InputError
 from rodshell.paper import FIGURES, reserved
+
+if TYPE_CHECKING:
+    from rodshell.output.folder import ResultFolder
 
 
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))
@@ -41,5 +46,10 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
         for name, place in zip(names, places, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:
                 made = import_module(f"rodshell.paper.{name}").make(progress, **given)
-            codes.append(deliver(made, made.save, place, as_json=as_json, quiet=quiet))
+            saved = partial(_save, made)
+            codes.append(deliver(made, saved, place, progress=progress, as_json=as_json, quiet=quiet))
     return max(codes)
+
+
+def _save(made: Any, place: "ResultFolder", _: Progress) -> None:
+    made.save(place)

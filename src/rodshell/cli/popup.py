@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING
 import click
 
 from rodshell.cli.options import CaseCommand, case_options, overrides_of
-from rodshell.cli.outcome import Kept, announce_rod, deliver, force_option, output_folder, wanted_kinds
+from rodshell.cli.outcome import (
+    Kept,
+    announce_rod,
+    deliver,
+    force_option,
+    output_folder,
+    seconds_of,
+    time_limit_option,
+    wanted_kinds,
+)
 from rodshell.cli.progress import Progress, announce_compilation
 from rodshell.errors import InputError
 from rodshell.units import shown
@@ -23,6 +32,7 @@ ASIDE = ("checks", "fabrication", "drawings")  # tables of what does not decide 
 @click.option("--unit", metavar="UNIT", help="Of the table's coordinates: m, mm, in, ...; a table needs it.")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME-popup.")
 @click.option("--only", metavar="KINDS", help="Files beside the archive, such as dxf,csv; see rodshell export --help.")
+@time_limit_option
 @force_option
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs.")
 @click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
@@ -31,6 +41,7 @@ def command(
     unit: str | None,
     out: str | None,
     only: str | None,
+    time_limit: str | None,
     force: bool,
     as_json: bool,
     quiet: bool,
@@ -43,7 +54,7 @@ def command(
     for a table one that is chosen to fit; each key of [rod] sets it anew. So do those of [checks], [fabrication] and
     [drawings] what is checked, made and drawn.
     """
-    path, kinds = Path(source), wanted_kinds(only)
+    path, kinds, seconds = Path(source), wanted_kinds(only), seconds_of(time_limit)
     ends, case = _ends_and_case(path, unit, overrides_of(values))
     name = f"{path.resolve().stem}-popup"
     if Path(out or Path("out") / name).resolve() == path.resolve():
@@ -54,16 +65,18 @@ def command(
         announce_compilation(quiet=quiet)
         from rodshell.checks.sizing import Fit
         from rodshell.form import pop_up_table
+        from rodshell.formfinding.progress import limited
         from rodshell.layout import straight_rods
 
         grid = straight_rods(ends.flat, names=ends.names)
         rod = case.rod.build(lambda: Fit.between(ends.lengths, ends.final))
         announce_rod(case, rod, quiet=quiet)
         takeaway = case.takeaway()
-        with Progress(quiet=quiet) as progress:
+        with Progress(quiet=quiet) as shown:
+            progress = limited(shown, seconds)
             popped = pop_up_table(grid, ends.final, rod, progress=progress)
             kept = Kept(popped.archive(takeaway=takeaway, progress=progress), kinds)
-        return deliver(kept, kept.save, place, as_json=as_json, quiet=quiet)
+        return deliver(kept, kept.save, place, progress=shown, as_json=as_json, quiet=quiet)
 
 
 def _ends_and_case(path: Path, unit: str | None, given: dict[str, object]) -> "tuple[RodEnds, Case]":

@@ -16,7 +16,7 @@ from rodshell.contact.bound import BoundToTarget
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.natural import with_natural_ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.thickness import layers_left_out, sideways
+from rodshell.formfinding.thickness import layers_left_out, strong_bending
 from rodshell.geometry.vectors import dot
 from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
@@ -27,7 +27,7 @@ from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.mixed_newton import STRAIN_TOLERANCE, Equilibrium, find_equilibrium
+from rodshell.solve.mixed_newton import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
@@ -74,7 +74,7 @@ def bound_drape(
     )
     found = _in_layers(
         problem, target, mesh, natural, eccentricity,
-        progress=lambda k, step: progress("drape", f"bound, iteration {k}", step),
+        progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
@@ -82,9 +82,9 @@ def bound_drape(
     on = np.zeros(mesh.node_count, dtype=bool)
     on[on_target] = True
     edges, bends = (np.asarray(on[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
-    wide = sideways(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
-    if wide is not None:
-        warnings += wide.warnings
+    strong = strong_bending(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
+    if strong is not None:
+        warnings += strong.warnings
     if not eccentricity:
         warnings += layers_left_out(target, mesh, found.state, edges, rod, min(layout.spacing))
     if found.report.negative_modes:
@@ -92,7 +92,7 @@ def bound_drape(
             f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
             "modes): use a smaller spacing"
         )
-    if not found.report.stable:
+    if not (found.report.stable or found.report.reason):
         warnings += _tightest_bend(target, layout, found.state[on_target])
     if degrees(net.min_angle) < WARN_ANGLE:
         x, y, z = net.min_angle_at
@@ -118,7 +118,7 @@ def bound_drape(
         gravity=0.0,
         net=net,
         eccentricity=eccentricity,
-        sideways=wide,
+        strong_bending=strong,
         dropped=net.dropped,
         warnings=tuple(warnings),
     )

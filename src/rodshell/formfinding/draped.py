@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.formfinding.fall import Fall
-from rodshell.formfinding.thickness import Sideways
+from rodshell.formfinding.thickness import StrongBending
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.nets import ChebyshevNet
@@ -40,7 +40,7 @@ class Draped:
     net : the net that the drape started from; None where it started from the flat grid.
     rest, fall : how it came to rest, and how it fell, where it fell in time (paper).
     eccentricity : distance of the two layers of rods [m]; 0 where they meet.
-    sideways : how the rods bend within the target, where joints keep them from rolling (bound).
+    strong_bending : of rods with a strong axis, where joints keep them from rolling (bound).
     """
 
     method: str
@@ -64,7 +64,7 @@ class Draped:
     rest: "Rest | None" = None
     fall: Fall | None = None
     eccentricity: float = 0.0
-    sideways: Sideways | None = None
+    strong_bending: StrongBending | None = None
 
     @property
     def report(self) -> SolveReport:

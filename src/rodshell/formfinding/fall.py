@@ -22,7 +22,7 @@ class Fall:
     stopped : what an impact takes of a node's velocity, see `ModifiedMass`.
     friction : Coulomb's coefficient between rods and target.
     drag : rate at which all velocities decay [1/s].
-    stream : folder for the frames, read with `TimeSeries.load`; None keeps none.
+    stream : folder for the frames, which holds none yet, read with `TimeSeries.load`; None keeps none.
     every : frames are streamed each so many steps.
     settle : end as soon as the grid is at rest; else go on for the whole duration.
     """
@@ -45,8 +45,8 @@ class Fall:
                 raise InputError(f"the fall's {name} must be positive, not {value}")
 
     def parameters(self) -> dict[str, object]:
-        """As it stands in a case file, in SI."""
+        """As it stands in a case file, in SI; without `stream`, which a case file may not have everywhere."""
         ties = {name: getattr(self.coupling, name, None) for name in ("C1", "C2")}
         given = {name: getattr(self, name) for name in ("height", "time_step", "duration", "friction", "drag")}
-        named = {"coupling": self.coupling.name, "frames": None if self.stream is None else str(self.stream)}
-        return {name: value for name, value in (given | ties | named).items() if value is not None}
+        known = {name: value for name, value in (given | ties).items() if value is not None}
+        return {**known, "coupling": self.coupling.name}

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.contact.modified_mass import ModifiedMass, Touching
-from rodshell.errors import ConvergenceError, StabilityError
+from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
 from rodshell.formfinding.calming import calming
 from rodshell.formfinding.draped import Draped, middle_surface, smallest_joint_angle
 from rodshell.formfinding.fall import Fall
@@ -76,7 +76,7 @@ def falling_drape(
     rest, report = falling.outcome(series)
     assert series.last is not None
     positions = middle_surface(mesh, shell.mesh, shell.positions(series.last.state))
-    if slid_off(mesh, positions, layout, top, target):
+    if not report.reason and slid_off(mesh, positions, layout, top, target):
         report = replace(report, status=Status.SLID_OFF)
     angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
     return Draped(
@@ -119,6 +119,7 @@ class _Falling:
         self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.places))
         self._ties: ExplicitTies | None = None
         self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
+        self._late = ""
         self._seen = list[tuple[float, float]]()  # times [s] and kinetic energies [J]
 
     def run(self, positions: Floats) -> TimeSeries:
@@ -127,7 +128,7 @@ class _Falling:
         state = self.shell.state(positions, normals=normals)
         step = fall.time_step or min(USUAL_STEP * self._slowness, self._safe_step(state))
         duration = fall.duration or USUAL_DURATION * self._slowness
-        self._step = step
+        self._step, self._duration = step, duration
         never = int(np.ceil(duration / step)) + 1
         try:
             return simulate(
@@ -183,7 +184,12 @@ class _Falling:
                 self._refuse_unstable(moment)
             energy, force = self.activity(moment)
             self._seen.append((moment.time, energy))
-            self._progress("drape", f"falling, t = {moment.time:.3f} s, kinetic energy {energy:.1e} J", force)
+            where = f"falling, {100 * moment.time / self._duration:.0f} % of {self._duration:.3g} s"
+            try:
+                self._progress("drape", f"{where}, kinetic energy {energy:.1e} J", force)
+            except OutOfTimeError as late:
+                self._late = str(late)
+                return True
             return self.fall.settle and self.rests(energy, force)
 
         return look
@@ -221,8 +227,9 @@ class _Falling:
         gap = joint_gap(self.shell, last.state)
         rest = Rest(resting, last.time, energy, force, gap, growth, done.steps, done.refused_steps)
         strain = float(np.abs(self.shell.stretch.strains(last.state)).max())
+        status = Status.OUT_OF_TIME if self._late else Status.MOVING
         report = SolveReport(
-            Status.CONVERGED if resting else Status.MOVING,
+            Status.CONVERGED if resting else status,
             self.shell.freedom().size,
             done.iterations,
             done.factorizations,
@@ -230,6 +237,7 @@ class _Falling:
             force,
             strain,
             sum(s < UNSTABLE for s in growth),
+            "" if resting else self._late,
         )
         return rest, report
 

@@ -50,10 +50,11 @@ def gravity_drape(
     mesh: GridMesh | None = None
     state: Floats | None = None
     levels, apart = list[SolveReport](), joint.eccentricity if joint else 0.0
-    for edge in _edges(layout):
+    edges = _edges(layout)
+    for edge in edges:
         coarse, mesh = mesh, mesh_grid(grid, edge, marks=middle_marks(grid, layout))
         start = over(mesh, layout, top) if coarse is None or state is None else coarse.prolong(state, mesh)
-        name = f"level {len(levels) + 1}"
+        name = f"level {len(levels) + 1} of {len(edges)}"
         shell = Shell.of(mesh, rod, joint=joint)
         normals = node_normals(mesh, start) if shell.angles else None
         if apart and normals is not None:
@@ -148,13 +149,14 @@ def _settle(
         problem = Problem(
             (*shell.elements, contact), shell.stretch, supports, target.size, load=load, places=shell.places
         )
+        most = MOST_COLD if cold and update == 0 else MOST_WARM
         found = find_equilibrium(
             problem,
             state,
             forces,
             descend=update == 0,
-            most_iterations=MOST_COLD if cold and update == 0 else MOST_WARM,
-            progress=_telling(progress, f"gravity, {name}, contact {update + 1}"),
+            most_iterations=most,
+            progress=_telling(progress, f"gravity, {name}, contact {update + 1} of at most {CONTACT_UPDATES}", most),
         )
         state, forces = found.state, found.forces
         reports.append(found.report)
@@ -165,11 +167,11 @@ def _settle(
     status = found.report.status
     if found.report.converged and depth >= DEPTH * target.size:
         status = Status.STALLED
-    if slid_off(mesh, shell.positions(state), layout, top, target):
+    if not found.report.reason and slid_off(mesh, shell.positions(state), layout, top, target):
         status = Status.SLID_OFF
     report = replace(found.report.after(*reports[:-1]), status=status)
     return replace(found, report=report), contact
 
 
-def _telling(progress: Progress, where: str) -> Callable[[int, float], None]:
-    return lambda iteration, step: progress("drape", f"{where}, iteration {iteration}", step)
+def _telling(progress: Progress, where: str, most: int) -> Callable[[int, float], None]:
+    return lambda iteration, step: progress("drape", f"{where}, iteration {iteration} of at most {most}", step)

@@ -15,6 +15,7 @@ def joined_report(reports: Sequence[SolveReport]) -> SolveReport:
     total = replace(
         reports[0],
         status=worst,
+        reason=next((one.reason for one in reports if one.reason), ""),
         dofs=sum(one.dofs for one in reports),
         force_residual=max(one.force_residual for one in reports),
         max_strain=max(one.max_strain for one in reports),

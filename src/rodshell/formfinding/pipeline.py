@@ -30,13 +30,13 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.rods.section import Rod
+from rodshell.solve.report import Status
 from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.validation import choices_of
 
 Floats = NDArray[np.float64]
 
-SPRUNG = 0.02  # of the size: on convex targets clamped ends leave a tenth of it
 STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
 ROLLED = pi / 4  # rad: a lath that turns by more bends about its other axis rather than its own
 LONG_TAIL = 3.0  # spacings past a rod's last joint
@@ -64,6 +64,8 @@ class FoundForm:
     @property
     def status(self) -> str:
         """ "converged", or which stage stopped and what to do."""
+        if self.draped.report.reason:
+            return self.draped.report.reason
         if not self.draped.converged:
             sentence = self.draped.report.status.sentence
             weighed = self.draped.method != "bound" and "bound" not in sentence
@@ -74,12 +76,9 @@ class FoundForm:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
-        stretched = _stretched(self.draped)
-        wide = self.draped.sideways is not None and bool(self.draped.sideways.warnings)
-        off = _springs_off(self.agreement, advise=not (stretched or wide))
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
         flat = flat_warning(self.trimmed.positions, self.rod)
-        return (*flat, *self.draped.warnings, *stretched, *tails, *_popped_warnings(self.popped), *off)
+        return (*flat, *self.draped.warnings, *_stretched(self.draped), *tails, *_rolled(self.popped))
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class PoppedTable:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return _popped_warnings(self.popped)
+        return _rolled(self.popped)
 
 
 def find_stages(
@@ -131,16 +130,14 @@ def find_stages(
     )  # fmt: skip
     trimmed = cut(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
     footprint = map_back(trimmed)
-    popped: dict[Ends, Popped] = {}
-    if draped.converged:
-        last = start.popped if start else {}
-        popped = {
-            end: pop_up(
-                footprint, trimmed.boundary, rod,
-                ends=end, start=last.get(end, "draped"), joint=joint, progress=progress,
-            )
-            for end in ends
-        }  # fmt: skip
+    popped, last = dict[Ends, Popped](), start.popped if start else {}
+    for end in ends if draped.converged else ():
+        popped[end] = pop_up(
+            footprint, trimmed.boundary, rod,
+            ends=end, start=last.get(end, "draped"), joint=joint, progress=progress,
+        )  # fmt: skip
+        if popped[end].report.status is Status.OUT_OF_TIME:
+            break
     compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
     return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared)
 
@@ -188,7 +185,7 @@ def _spans(grid: FlatGrid) -> float:
 def _popped_status(popped: dict[Ends, Popped]) -> str:
     for ends, shell in popped.items():
         if not shell.report.converged:
-            return f"pop-up ({ends}) {shell.report.status.sentence}"
+            return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
     return "converged"
 
 
@@ -225,36 +222,10 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     )
 
 
-def _springs_off(compared: dict[Ends, Agreement], *, advise: bool) -> tuple[str, ...]:
-    """With its ends clamped a convex shell keeps to the target; one that does not is held by nothing there.
-
-    advise : what to do, where nothing else is known to be the cause.
-    """
-    gap = compared.get("clamped")
-    if gap is None or gap.max_relative < SPRUNG:
-        return ()
-    x, y, z = gap.where
-    advice = ": dips and ridges need seams, graded stiffness or supports" if advise else ""
-    return (
-        f"the free grid springs off the target by {gap.max:.3g} m ({100 * gap.max_relative:.1f} % of its size) near "
-        f"({x:.4g}, {y:.4g}, {z:.4g}) m, even with clamped ends{advice}",
-    )
-
-
-def _popped_warnings(popped: dict[Ends, Popped]) -> tuple[str, ...]:
-    found = {ends: shell for ends, shell in popped.items() if shell.report.converged}
-    unstable = tuple(
-        f"the popped-up shell with {ends} ends is not stable: {shell.report.negative_modes} negative modes"
-        for ends, shell in found.items()
-        if not shell.report.stable
-    )
-    return (*unstable, *_rolled(found))
-
-
 def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
     """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
     for ends, shell in popped.items():
-        angles = roll(shell)
+        angles = roll(shell) if shell.report.converged else None
         if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
             return (
                 f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "

@@ -4,7 +4,7 @@ No target, no load and no contact: only rods, joints and the ends. Pinned ends h
 hold the direction of the draped rods as well. The end condition decides the shape (numerics.md, section 4a).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -18,6 +18,7 @@ from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.vectors import dot, unit
 from rodshell.joints import Ball, Joint, require_joint
+from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
@@ -39,7 +40,7 @@ FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves t
 CLAMP_STEP = 0.25
 MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
 MOST_AGAIN = 8  # iterations from the last form before starting afresh
-HOPELESS = 0.5  # negative modes a joint: laths ended 7 % and more off the target from there, other shells have 0.2
+HOPELESS = 0.5  # negative modes a joint: laths end 2 to 17 % off the target from there, other shells have less than 0.2
 NEARBY = 0.1  # of the length: a state further from the guess may be another one
 
 
@@ -129,6 +130,9 @@ class _PopUp:
     joint: Joint | Sequence[Joint]
     progress: Progress
 
+    def _told(self, what: str, most: int) -> Callable[[int, float], None]:
+        return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
+
     def shell(self, ends: Ends) -> Shell:
         return Shell.of(self.footprint.mesh, self.rod, clamped=ends == "clamped", joint=self.joint)
 
@@ -180,16 +184,18 @@ class _PopUp:
             cut=True,
             most_modes=self.hopeless,
             most_iterations=MOST_AT_ONCE,
-            progress=lambda k, step: self.progress("pop-up", f"{ends}, iteration {k}", step),
+            progress=self._told(f"{ends}, iteration", MOST_AT_ONCE),
         )
-        if at_once.report.stable or at_once.report.status is Status.BUCKLED:
+        if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
             return shell, at_once
-        from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
+        from rodshell.solve.relax import MOST_STEPS, relax  # rarely wanted: imported with the dynamics only then
 
         slid = relax(
             self.problem(shell),
             state,
-            progress=lambda k, step: self.progress("pop-up", f"{ends}, sliding down, step {k}", step),
+            progress=lambda k, step: self.progress(
+                "pop-up", f"{ends}, sliding down, step {k} of at most {MOST_STEPS}", step
+            ),
         )
         return shell, replace(slid, report=slid.report.after(at_once.report))
 
@@ -211,7 +217,9 @@ class _PopUp:
             state,
             stiffer * carried_edges(last.forces, before, mesh),
             most_iterations=MOST_AGAIN,
-            progress=lambda k, step: self.progress("pop-up", f"{last.ends}, again, iteration {k}", step),
+            progress=lambda k, step: self.progress(
+                "pop-up", f"{last.ends}, again, iteration {k} of at most {MOST_AGAIN}", step
+            ),
         )
         strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
         return None if strayed or not found.report.stable else (shell, found)
@@ -235,15 +243,11 @@ class _PopUp:
         """From the pinned state, turn the end directions to those of the boundary."""
         mesh, outward = self.footprint.mesh, self.boundary.tangents
         shell, positions = self.shell("clamped"), free.positions(pinned.state)
-        inner = np.column_stack([mesh.rod_nodes[mesh.rod_start + 1], mesh.rod_nodes[mesh.rod_stop - 2]]).ravel()
-        now = unit(positions[mesh.ends.ravel()] - positions[inner])
-        angle = np.arccos(np.clip(dot(now, outward), -1, 1))[:, None]
-        sine = np.maximum(np.sin(angle), 1e-12)
+        now = end_directions(mesh, positions)
         start = self.upright(shell, positions, now)
 
         def goals(t: float) -> Floats:
-            turned = np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * outward) / sine, now)
-            there = shell.state(positions, unit(turned))[shell.ghosts] - positions[mesh.ends.ravel()]
+            there = shell.state(positions, turned(now, outward, t))[shell.ghosts] - positions[mesh.ends.ravel()]
             return np.vstack([start[shell.ends], start[shell.ends] + there])
 
         found = follow(
@@ -256,6 +260,19 @@ class _PopUp:
             ),
         )
         return shell, replace(found, report=found.report.after(pinned.report))
+
+
+def end_directions(mesh: GridMesh, positions: Floats) -> Floats:
+    """(2m, 3) unit vectors in which the rods' ends point out of the shell at these node positions (n, 3)."""
+    inner = np.column_stack([mesh.rod_nodes[mesh.rod_start + 1], mesh.rod_nodes[mesh.rod_stop - 2]]).ravel()
+    return unit(positions[mesh.ends.ravel()] - positions[inner])
+
+
+def turned(now: Floats, goal: Floats, t: float) -> Floats:
+    """Unit vectors (k, 3) turned by the share t of the angle from `now` to `goal`, each in its own plane."""
+    angle = np.arccos(np.clip(dot(now, goal), -1, 1))[:, None]
+    sine = np.maximum(np.sin(angle), 1e-12)
+    return unit(np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * goal) / sine, now))
 
 
 def aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:

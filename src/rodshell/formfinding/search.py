@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.errors import InputError, RodshellError
+from rodshell.errors import InputError, OutOfTimeError, RodshellError
 from rodshell.formfinding.pipeline import find_stages
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridLayout
@@ -109,7 +109,10 @@ def search(
     }[objective]
     trials = list[Trial]()
     for k, (anchor, heading) in enumerate((anchor, heading) for anchor in points for heading in turns):
-        progress("search", f"{k + 1} of {len(points) * len(turns)}", 0.0)
+        try:
+            progress("search", f"{k + 1} of {len(points) * len(turns)}", 0.0)
+        except OutOfTimeError as late:
+            raise OutOfTimeError(f"{late}{_best_so_far(objective, trials)}") from late
         try:
             trials.append(Trial(anchor, heading, measure(replace(tried, rotate=heading), anchor)))
         except RodshellError as reason:
@@ -117,6 +120,15 @@ def search(
     if not any(np.isfinite(trial.value) for trial in trials):
         raise InputError(f"none of {len(trials)} anchors and headings will do; the first: {trials[0].reason}")
     return Search(objective, tuple(trials))
+
+
+def _best_so_far(objective: Objective, trials: list[Trial]) -> str:
+    if not any(np.isfinite(trial.value) for trial in trials):
+        return ""
+    best = Search(objective, tuple(trials)).best
+    x, y = best.anchor
+    heading = f"{degrees(best.heading):.4g} deg"
+    return f"; the best of {len(trials)} tried: anchor {x:.4g},{y:.4g} m, rotate {heading}"
 
 
 def largest_curvature(net: ChebyshevNet) -> float:

@@ -1,9 +1,9 @@
 """What the thickness of rods does to a net of lines: two layers of different lengths, and laths too wide to follow it.
 
 A net knows no thickness. Rods laid one above the other lie on parallel surfaces, along which lengths differ by their
-distance times the curvature. And a lath that lies flat must bend within the surface, about its strong axis, by the
-geodesic curvature of its line; joints that hold its normal keep it from rolling out of that. Like a strip bent on edge
-it then buckles sideways between two joints where the moment exceeds pi/a sqrt(EI1 GJ), a being their distance
+distance times the curvature. And a lath whose joints keep it from rolling bends about its strong axis, too: lying flat
+by the geodesic curvature of its line, on edge by the surface's. Like any strip it then buckles sideways between two
+joints where that moment exceeds pi/a sqrt(EI GJ), EI being the smaller stiffness and a the joints' distance
 [Timoshenko and Gere, Theory of Elastic Stability, chapter 6, pure bending of a strip].
 """
 
@@ -60,18 +60,20 @@ def layers_left_out(
 
 
 @dataclass(frozen=True)
-class Sideways:
-    """How laths bend within the surface, about their strong axis, on a net.
+class StrongBending:
+    """How the rods of a net bend about their strong axis.
 
     Parameters
     ----------
-    ratio : EI2 / EI1.
-    curvature : geodesic curvature where the moment is largest [1/m].
-    moment : the largest moment that it takes, over that at which the lath buckles sideways between its joints.
+    ratio : of the larger bending stiffness to the smaller.
+    flat : whether they lie flat, the strong axis being the surface's normal; else they stand on edge.
+    curvature : about the strong axis, where the moment is largest [1/m].
+    moment : the largest moment that it takes, over that at which a rod buckles sideways between its joints.
     beyond : share of the rods' length where the moment is beyond that.
     """
 
     ratio: float
+    flat: bool
     curvature: float
     moment: float
     beyond: float
@@ -80,36 +82,45 @@ class Sideways:
     def warnings(self) -> tuple[str, ...]:
         if self.beyond <= MUCH:
             return ()
+        ways, stiffnesses = ["within the surface", "out of it"], ["EI2", "EI1"]
+        if not self.flat:
+            ways, stiffnesses = ["out of the surface", "within it"], ["EI1", "EI2"]
         return (
-            f"the rods are {self.ratio:.3g} times as stiff within the surface as out of it (EI2/EI1), and the net "
-            f"bends them within it down to a radius of {length_text(1.0 / self.curvature)}: up to {self.moment:.3g} "
-            f"times the moment at which they buckle sideways between joints, and beyond it on {100 * self.beyond:.0f} "
-            "% of their length; use narrower rods (rod.section), a smaller spacing or a flatter target",
+            f"the rods are {self.ratio:.3g} times as stiff {ways[0]} as {ways[1]} ({'/'.join(stiffnesses)}), and the "
+            f"target bends them that way down to a radius of {length_text(1.0 / self.curvature)}: up to "
+            f"{self.moment:.3g} times the moment at which they buckle sideways between joints, and beyond it on "
+            f"{100 * self.beyond:.0f} % of their length; use rods with less of a strong axis (rod.section), a smaller "
+            "spacing or a flatter target",
         )
 
 
-def sideways(target: Target, mesh: GridMesh, positions: Floats, bends: NDArray[np.bool_], rod: Rod) -> Sideways:
-    """Of a rod that lies flat on the target and cannot roll at its joints.
+def strong_bending(
+    target: Target, mesh: GridMesh, positions: Floats, bends: NDArray[np.bool_], rod: Rod
+) -> StrongBending | None:
+    """Of rods that cannot roll at their joints; None where they bend alike all ways.
 
     bends : (b,) those of the mesh that lie on the target, its nodes being at `positions` (n, 3) [m].
     """
-    weak, strong = rod.bend_stiffnesses
+    stiffnesses = rod.bend_stiffnesses
+    weak, strong = sorted(stiffnesses)
+    if weak == strong or not bends.any():
+        return None
+    flat = stiffnesses[1] == strong
     before, here, after = (positions[mesh.bends[bends, k]] for k in range(3))
-    tangents = unit(here - before), unit(after - here)
-    side = unit(cross(target.on_surface(here).normal, after - before))
-    curvature = np.abs(dot(tangents[1] - tangents[0], side)) / mesh.voronoi_lengths[bends]
-    critical = pi * sqrt(weak * rod.twist_stiffness) / _spans(mesh)[mesh.bend_rods[bends]]
-    moment = strong * curvature / critical if strong > weak else np.zeros_like(curvature)
+    towards = target.on_surface(here).normal
+    if flat:
+        towards = unit(cross(towards, after - before))
     length = mesh.voronoi_lengths[bends]
-    beyond = float(length[moment > 1.0].sum() / max(length.sum(), np.finfo(float).tiny))
-    worst = int(np.argmax(moment)) if len(moment) else 0
-    largest = (float(curvature[worst]), float(moment[worst])) if len(moment) else (0.0, 0.0)
-    return Sideways(strong / weak, *largest, beyond)
+    curvature = np.abs(dot(unit(after - here) - unit(here - before), towards)) / length
+    moment = strong * curvature * _spans(mesh)[mesh.bend_rods[bends]] / (pi * sqrt(weak * rod.twist_stiffness))
+    worst = int(np.argmax(moment))
+    beyond = float(length[moment > 1.0].sum() / length.sum())
+    return StrongBending(strong / weak, flat, float(curvature[worst]), float(moment[worst]), beyond)
 
 
 def _spans(mesh: GridMesh) -> Floats:
-    """(m,) usual distance of the joints of each rod [m]."""
-    crossings, result = mesh.grid.crossings, np.full(len(mesh.grid.rods), np.inf)
+    """(m,) usual distance of the joints of each rod [m]; 0 of a rod that has but one."""
+    crossings, result = mesh.grid.crossings, np.zeros(len(mesh.grid.rods))
     for rod in range(len(result)):
         gaps = np.diff(np.sort(crossings.at[crossings.rods == rod]))
         if len(gaps):

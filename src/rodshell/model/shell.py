@@ -349,7 +349,9 @@ class _Builder:
         half = 0.5 * mesh.edge_lengths * np.array([rod.mass_per_length for rod in self.rods])[mesh.edge_rods]
         for side in range(2):
             np.add.at(mass, mesh.edges[:, side], half[:, None])
-        np.add.at(mass, mesh.joint_nodes, np.array([one.mass for one in self.joints])[:, None])
+        of_joints = 0.5 * np.array([one.mass for one in self.joints])
+        for nodes in (mesh.joint_nodes, mesh.joint_nodes if mesh.second_nodes is None else mesh.second_nodes):
+            np.add.at(mass, nodes, of_joints[:, None])  # half on either rod
         if self.twist:
             first = mesh.node_count + len(self.ghosts)
             rotary = np.array([rod.rotary_inertia for rod in self.rods])[mesh.edge_rods]

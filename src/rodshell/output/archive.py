@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import wraps
 from io import BytesIO
+from itertools import chain
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import OutputError
+from rodshell.formfinding.progress import Progress, silent
 from rodshell.output.folder import ResultFolder, open_folder, read_json, reading
 from rodshell.output.inputs import kept_case, opened_case
 
@@ -64,9 +66,10 @@ class Archive:
         *,
         force: bool = False,
         more: Mapping[str, str] | None = None,
+        progress: Progress = silent,
     ) -> Path:
         """As `write`."""
-        return write(self, folder, kinds, force=force, more=more)
+        return write(self, folder, kinds, force=force, more=more, progress=progress)
 
     @property
     def verdict(self) -> "Verdict":
@@ -107,6 +110,7 @@ def write(
     *,
     force: bool = False,
     more: Mapping[str, str] | None = None,
+    progress: Progress = silent,
 ) -> Path:
     """Write the whole result folder, replacing an older result's files and no others; returns its absolute path.
 
@@ -115,6 +119,7 @@ def write(
     kinds : of files beside the archive (see `files.KINDS`); default: all that every installation can.
     force : also replace files that rodshell did not write, or that were changed since, where it has to write.
     more : other files, by name.
+    progress : called for each file; time limits are none of its business, since what was found is to be kept.
 
     Raises
     ------
@@ -134,8 +139,10 @@ def write(
         stream = BytesIO()
         np.savez_compressed(stream, allow_pickle=False, **archive.states)
         place.put("states.npz", stream.getvalue())
-        for name, content in (*copies.items(), *files_of(archive, wanted), *(more or {}).items()):
-            place.put(name, content)
+        parts = chain(copies.items(), files_of(archive, wanted), (more or {}).items())
+        for number, (name, made) in enumerate(parts, start=1):
+            progress("files", f"{number} written, {name}", 0.0)
+            place.put(name, made)
         place.commit()
         return place.path
 
@@ -146,10 +153,11 @@ def export(
     kinds: Iterable[str] | None = None,
     *,
     force: bool = False,
+    progress: Progress = silent,
 ) -> list[str]:
     """Write files of some kinds (see `files.KINDS`) into `folder`, all of them or none; returns their names.
 
-    force : as of `write`.
+    force, progress : as of `write`.
 
     Raises
     ------
@@ -157,10 +165,11 @@ def export(
     """
     from rodshell.output.files import files_of, reserved
 
-    names = []
+    names = list[str]()
     wanted = None if kinds is None else list(kinds)
     with open_folder(folder, reserved=reserved(wanted), force=force) as place:
         for name, content in files_of(archive.as_stored(), wanted):
+            progress("files", f"{len(names) + 1} written, {name}", 0.0)
             place.put(name, content)
             names.append(name)
         place.commit(keep_others=True)

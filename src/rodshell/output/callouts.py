@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.output.drawing import LETTER, SMALL, Text
-from rodshell.output.labels import CLOSE, Label, Room, fits, nearby, off_its_mark, spread, take, upright
+from rodshell.output.labels import CLOSE, Label, Room, fits, lines_near, nearby, off_its_mark, spread, take, upright
 
 Floats = NDArray[np.float64]
 
@@ -15,6 +15,7 @@ SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names, over the usual one: the largest
 OFF = 1.3  # from a place to where its name may begin
 GAPS = (1.1, 1.7, np.inf)  # from name to name, or what there is all around; at the wider ones their ways turn evenly
 EVENED = 6  # times
+MANY = 24  # names: where more find no room, the drawing needs a larger scale, not other places for them
 FARTHEST = 8.0  # from a place to where its name's own line begins
 
 
@@ -43,7 +44,7 @@ def callouts(
     Each stands on a line of its own, side by side with its neighbours', and a little farther along it where it would
     cover a text or one of `lines` (m, 2, 2). Where not all find room, in an opening, they are written smaller,
     or spaced wider; one that finds none yet stands wherever there is some next to its place, and is left out where
-    there is none.
+    there is none, or where it is one of more than MANY.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def callouts(
     for size, gap in ((text * share, gap) for gap in GAPS for share in SIZES):
         tried = _tried(names, places, away, size, gap, room, lines)
         best = tried if best is None or tried.missing < best.missing else best
-        if not best.missing:
+        if not best.missing or (size <= text * SMALL and best.missing > MANY):
             break
     assert best is not None
     room.join(best.room)
@@ -62,7 +63,7 @@ def callouts(
     for label, name, place, way in zip(best.labels, names, places, away, strict=True):
         if label is not None:
             found.append(Callout(label.written(best.size), np.vstack([place, label.leader(best.size)])))
-        else:
+        elif best.missing <= MANY:
             found += _elsewhere(name, place, way, sizes, room, lines)
     return found
 
@@ -131,6 +132,7 @@ def _free(name: str, place: Floats, start: Floats, way: Floats, size: float, roo
     half = (0.3 + 0.5 * LETTER * len(name)) * size
     foot = off_its_mark(np.array([place, start]), size)
     near = float(np.linalg.norm(start - place)) < FARTHEST * size
+    lines = lines_near(lines, start, 2 * half + CLOSE * size) if near else lines
     for step in range(CLOSE if near and room.free(foot) else 0):
         label = Label(name, start + (half + 0.5 * step * size) * way, angle, start, moved=True)
         if fits(label, size, room, lines):

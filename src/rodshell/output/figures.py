@@ -48,6 +48,13 @@ _DRAPE: tuple[Entry, ...] = (
     ("smallest angle between rods", "min_angle_deg", wording.degrees),
     ("time", "seconds", wording.seconds),
 )
+_PRESET: tuple[Entry, ...] = (
+    ("the preset's grade", "grade", str),
+    ("bending strength", "bending_strength", wording.stress),
+    ("shear strength", "shear_strength", wording.stress),
+    ("these strengths are", "strength_note", str),
+    ("source", "source", str),
+)
 _BENDING: tuple[Entry, ...] = (
     ("Smallest radius of curvature", "min_radius", wording.millimetres),
     ("\N{EN DASH} largest curvature out of the shell", "normal_curvature", wording.curvature),
@@ -102,7 +109,8 @@ def _weight_rows(result: Mapping[str, Any], ends: Sequence[str], rounding: Round
         return []
     shares = [wording.share_of_weight(one) if one else wording.UNKNOWN for one in found]
     sunk = [_shown(wording.millimetres, one.get("deflection") if one else None, rounding) for one in found]
-    rows = [("Own weight that it bears", shares)]
+    whose = "the weakest patch, its seam held," if result.get("patches") else "it"
+    rows = [(f"Own weight that {whose} bears", shares)]
     return rows if set(sunk) == {wording.UNKNOWN} else [*rows, ("Largest deflection under its own weight", sunk)]
 
 
@@ -112,9 +120,11 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     unknown = unknown_below(result)
     columns = [key for key in (*ENDS, "pop_up") if key in bent and (key in ENDS or unknown < 1)]
     rows, rounding = list[tuple[str, list[str]]](), rounding_of(result)
+    of = bent.get("strength_of")
     for title, key, show in _BENDING:
         values = [bent[column].get(key) for column in columns]
         if any(value is not None for value in values):
+            title = f"Utilisation of {of}'s strength" if of and key == "utilisation" else title
             rows.append((title, [_shown(show, value, rounding) for value in values]))
     met = result.get("contact") or {}
     near = [(met.get("deployment" if column == "pop_up" else column) or {}).get("clearance") for column in columns]
@@ -138,7 +148,11 @@ def key_figures(result: Mapping[str, Any], plan: FlatPlan) -> list[tuple[str, li
         ("Target", wording.case_rows(result.get("target"))),
         ("Layout", wording.case_rows(result.get("layout"))),
         ("Cut list", _cut_list(plan)),
-        ("Rod", [row for part in parts for row in wording.case_rows(part)]),
+        (
+            "Rod",
+            [row for part in parts for row in wording.case_rows(part)]
+            + _listed(rod.get("preset") or {}, _PRESET, plan.rounding),
+        ),
         ("Net", _listed(result.get("net") or {}, _NET, plan.rounding)),
         (
             "Drape",

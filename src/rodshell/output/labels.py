@@ -13,7 +13,7 @@ Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 CLOSE = 5  # places that are tried on a label's own line
-STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # beside it
+STEPS, TURNS = 16, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # beside it
 THIN = 0.1  # what a line takes, over the size of its text
 
 
@@ -144,6 +144,7 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
     """
     first = float(np.arctan2(way[1], way[0]))
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
+    lines = lines_near(lines, end, 0.5 * (STEPS + 2) * size + 2 * float(half.max()))
     for step, turn in ((step, turn) for step in range(STEPS) for turn in TURNS):
         ray = np.array([np.cos(first + turn), np.sin(first + turn)])
         to_side = float(np.min(half / np.maximum(np.abs(ray), 1e-12)))  # from the box's middle to its rim
@@ -243,6 +244,14 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     sides = box[[1, 3]] - box[0]
     axes = (2.0 * sides / np.sum(sides**2, axis=1)[:, None]).T
     return bool(runs_through((lines - box.mean(axis=0)) @ axes).any())
+
+
+def lines_near(lines: Floats, place: Floats, reach: float) -> Floats:
+    """Those of the lines (m, 2, 2) that may come as near to a place (2,) as `reach`, across and along."""
+    if not len(lines):
+        return lines
+    near = np.all((lines.min(axis=1) < place + reach) & (lines.max(axis=1) > place - reach), axis=1)
+    return np.asarray(lines[near])
 
 
 def runs_through(lines: Floats) -> NDArray[np.bool_]:

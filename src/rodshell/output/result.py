@@ -63,6 +63,10 @@ def drape_table(draped: Draped) -> dict[str, Any]:
     }
     if draped.rest is not None:
         drape["fall"] = asdict(draped.rest)
+    if draped.eccentricity:
+        drape["eccentricity"] = draped.eccentricity
+    if draped.strong_bending is not None:
+        drape["strong_bending"] = asdict(draped.strong_bending)
     if draped.own_ends is not None:
         off = np.abs(draped.own_ends)
         drape["own_ends"] = {"max": float(off.max()), "median": float(np.median(off))}

@@ -25,7 +25,7 @@ def summary_text(result: dict[str, Any]) -> str:
     lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
-            f"  footprint known within {mm(net['error_estimate'])} before extrapolation; "
+            f"  footprint error {mm(net['error_estimate'])} before extrapolation; "
             f"smallest angle {net['min_angle_deg']:.1f} deg"
         )
     if drape := result.get("drape"):
@@ -36,7 +36,7 @@ def summary_text(result: dict[str, Any]) -> str:
         line += f"{gap} {mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
         lines.append(line + f"negative modes {drape['negative_modes']}")
         if own := drape.get("own_ends"):
-            lines.append(f"            its own rod ends within {mm(own['max'])}, median {mm(own['median'])}")
+            lines.append(f"            drape against net, rod ends: max {mm(own['max'])}, median {mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
         state = "stable, unloaded" if shell["stable"] else shell["status"] + ", NOT STABLE"
         line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
@@ -45,6 +45,7 @@ def summary_text(result: dict[str, Any]) -> str:
             line += f"rms {mm(gap['rms'])} ({percent(gap['rms_relative'])})"
         lines.append(line)
     lines += _checked(result)
+    lines += _paths(result)
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
     if len(result["dropped"]) > 6:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
@@ -134,10 +135,11 @@ def _checked(result: dict[str, Any]) -> list[str]:
             if place == "pop_up" and unknown:
                 line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
+    least = " (weakest patch, its seam held)" if result.get("patches") else ""
     for ends, weighed in result.get("self_weight", {}).items():
-        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}"
+        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}{least}"
         if weighed.get("deflection") is not None:
-            line += f"; sinks by {mm(weighed['deflection'])} under it"
+            line += f"; deflection under it: {mm(weighed['deflection'])}"
         lines.append(line)
     for ends, held in result.get("reactions", {}).items():
         sums = f"forces {held['force_imbalance']:.1e}, moments {held['moment_imbalance']:.1e} of the largest"
@@ -164,3 +166,26 @@ def _lengths(result: dict[str, Any]) -> Callable[[float], str]:
         return millimetres(metres, rounding=rounding) if abs(metres) >= 1e-9 else "0 mm"
 
     return shown
+
+
+def _paths(result: dict[str, Any]) -> Iterator[str]:
+    """Whether the shell is reached from flat, and what other shapes it has."""
+    way = result.get("deployment") or {}
+    if "reached_from_flat" in way:
+        snaps = f", snapping at {', '.join(stage(low) for low, _ in way['snaps'])}" if way["snaps"] else ""
+        words = {True: f"reached{snaps}", False: "ends in another shape", None: "not known whether it is reached"}
+        yield f"  from flat {way['ends']:<8}{words[way['reached_from_flat']]}"
+        if way.get("clamped", {}).get("reached_from_flat"):
+            yield "  from flat clamped reached: the ends are turned into their clamps after the deployment"
+    for ends, searched in (result.get("other_shapes") or {}).items():
+        others = [one for one in searched["found"] if not one["mirror"]]
+        found = ["its mirror image"] if len(others) < len(searched["found"]) else []
+        if others:
+            near = min(others, key=lambda one: float(one["distance"]))
+            found.append(
+                f"{len(others)} other stable shape{'s' if len(others) > 1 else ''}, the nearest "
+                f"{percent(near['distance'])} of half its width away at {rounded(near['energy'])} times the energy"
+            )
+        elif searched["tried"]:
+            found.append("no other stable shape found")
+        yield f"  shapes    {ends:<8}{'; '.join([*found, searched['searched']])}"

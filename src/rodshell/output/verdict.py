@@ -64,7 +64,7 @@ def verdict(result: Result) -> Verdict:
     shells = entries(result, "pop_up")
     faults = {ends: [*_shell_faults(result, ends)] for ends in shells}
     usable = [ends for ends, found in faults.items() if not found]
-    deployment = [*_fibre_faults(result, "pop_up"), *_contact_faults(result, "deployment")]
+    deployment = [*_fibre_faults(result, "deployment"), *_contact_faults(result, "deployment")]
     grave = [sentence for found in faults.values() for sentence in found] + deployment
     if (result.get("target") or {}).get("flat"):
         return Verdict("unbuildable", ("the target is flat, nothing pops up",))
@@ -74,7 +74,7 @@ def verdict(result: Result) -> Verdict:
         return Verdict("unbuildable", (why,))
     best = _best(result, usable)
     off = 0.0 if best is None else float(best[1]["max_relative"])
-    far = [_off_words(best)] if best is not None and off > OFF else []
+    far = [_off_words(result, best)] if best is not None and off > OFF else []
     open_points = [*_open_points(result, usable), *map(str, result.get("warnings") or [])]
     if not usable or deployment or off > FAR_OFF:
         gravest = [*far, *grave] if off > FAR_OFF else [*grave, *far]
@@ -130,21 +130,26 @@ def _contact_faults(result: Result, shape: str) -> Iterator[str]:
     if not touching.get("pairs"):
         return
     first, second = touching["rods"]
-    pairs = f"{touching['pairs']} pairs of rods touch or cross, worst" if touching["pairs"] > 1 else "rods touch:"
-    overlap = f"overlap {millimetres(-touching['clearance'])}"
-    yield f"{_shape(shape, touching)} {pairs} {first} and {second} near ({place(touching['where'])}), {overlap}"
+    who = f"{first} and {second} overlap" if first != second else f"{first} runs into itself"
+    worst = f"{touching['pairs']} pairs of rods touch or cross, worst: " if touching["pairs"] > 1 else "rods touch: "
+    yield (
+        f"{_shape(shape, touching)} {worst}{who} by {millimetres(-touching['clearance'])} near "
+        f"({place(touching['where'])}): use thinner rods (rod.section) or a larger spacing"
+    )
 
 
 def _fibre_faults(result: Result, shape: str) -> Iterator[str]:
     """Stress above the strength, strain beyond thin rods."""
     bent = entries(result, "bending").get(shape) or {}
     used, strain = bent.get("utilisation"), bent.get("max_bending_strain")
+    where = f" in {bent['rod']}, {millimetres(bent['at'])} from its start" if bent.get("rod") else ""
     if used is not None and used > 1:
-        yield f"{_shape(shape, bent)} the rods would break: {percent(max(used, 1.01))} of their strength"
+        share = f"{max(101, round(100 * used))} % of their strength"  # never 100 % of what breaks
+        yield f"{_shape(shape, bent)} the rods would break: {share}{where}"
     if strain is not None and strain > THIN:
         yield (
             f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for their bends, "
-            f"the theory of thin rods holds up to some {percent(THIN)}"
+            f"the theory of thin rods holds up to some {percent(THIN)}; use thinner rods or a larger target"
         )
 
 
@@ -163,12 +168,17 @@ def _best(result: Result, usable: list[str]) -> tuple[str, Mapping[str, Any]] | 
     return min(known, key=lambda pair: float(pair[1]["max_relative"]), default=None)
 
 
-def _off_words(best: tuple[str, Mapping[str, Any]]) -> str:
+def _off_words(result: Result, best: tuple[str, Mapping[str, Any]]) -> str:
+    """How far off the best shell is; with clamped ends a convex shell keeps to the target, and dips are the cause."""
     ends, gap = best
     where = f", near ({place(gap['where'])})" if gap.get("where") else ""
+    drape = result.get("drape") or {}
+    known = drape.get("method") != "bound" or (drape.get("strong_bending") or {}).get("beyond", 0.0) > 0
+    dips = ends == "clamped" and not known
+    advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
     return (
         f"with {ends} ends, the best that was asked for, the shell is off the target by {millimetres(gap['max'])} "
-        f"({percent(gap['max_relative'])} of its size){where}: dips and ridges need seams, graded stiffness or supports"
+        f"({percent(gap['max_relative'])} of its size){where}{advice}"
     )
 
 
@@ -199,17 +209,12 @@ def _weight(result: Result, usable: list[str]) -> Iterator[str]:
 
 
 def _from_flat(result: Result) -> Iterator[str]:
-    """Whether the final shape is reached from the flat grid."""
-    way = result.get("deployment")
-    if not way:
-        if "pinned" in entries(result, "pop_up"):
-            yield "whether the shell is reached from flat was not checked (checks.stages = 0)"
-        return
-    unknown = unknown_below(result)
-    if unknown >= 1:
-        yield "the deployment from flat could not be followed: whether the shell is reached from flat is not known"
-    elif unknown:
-        yield f"the deployment from flat could not be followed below {stage(unknown)} of the way"
+    """What its deployment leaves open is among a result's warnings."""
+    if not result.get("deployment"):
+        yield (
+            "whether the shell is reached from flat was not checked: that takes pinned ends (pop_up.ends) and "
+            "checks.stages above 0"
+        )
 
 
 def _other_shapes(result: Result, usable: list[str]) -> Iterator[str]:

@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.checks import Bending, Checks, JointLoads, Reactions, SelfWeight
+from rodshell.checks import (
+    Bending,
+    Checks,
+    Elsewhere,
+    JointLoads,
+    OtherShape,
+    OtherShapes,
+    Reactions,
+    SelfWeight,
+)
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 
@@ -44,18 +53,18 @@ def workshop_result(
         **result,
         "warnings": [
             *result["warnings"],
-            *checks.overstress(strength, mesh),
             *torsion,
             *checks.warnings,
             *made.warnings,
         ],
         "rods": rods,
-        "bending": {"shear_strength": shear_strength, **_bending(checks, strength)},
+        "bending": {"shear_strength": shear_strength, **_bending(checks, mesh, strength)},
         "reactions": {ends: _reactions(held) for ends, held in checks.reactions.items()},
         "joint_loads": {ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
         "self_weight": {ends: _self_weight(one) for ends, one in checks.self_weight.items()},
         **({} if checks.deployment is None else {"deployment": _deployment(checks)}),
         "contact": _contact(checks),
+        "other_shapes": {ends: _other_shapes(one) for ends, one in checks.other_shapes.items()},
         "fabrication": _fabrication(result, mesh, made),
     }
 
@@ -110,16 +119,32 @@ def _bent(bent: list[Bending], where: slice, strength: float | None) -> dict[str
     return figures
 
 
-def _bending(checks: Checks, strength: float | None) -> dict[str, Any]:
+def _bending(checks: Checks, mesh: GridMesh, strength: float | None) -> dict[str, Any]:
     everywhere = slice(None)
     table: dict[str, Any] = {"strength": strength}
     for ends, bent in checks.bending.items():
-        table[ends] = _bent([bent], everywhere, strength)
+        table[ends] = {**_bent([bent], everywhere, strength), **_place(bent, mesh)}
     if checks.deployment is not None:
         table["pop_up"] = _bent(list(checks.on_the_way), everywhere, strength)
         sharpest_stage = int(np.argmax([bent.curvature.max() for bent in checks.on_the_way]))
         table["pop_up"]["share"] = checks.deployment.share[sharpest_stage]
+    if checks.before_the_end:
+        share, worst = max(checks.before_the_end, key=lambda stage: float(_stressed(stage[1]).max()))
+        stages = [bent for _, bent in checks.before_the_end]
+        table["deployment"] = {**_bent(stages, everywhere, strength), "share": share, **_place(worst, mesh)}
     return table
+
+
+def _stressed(bent: Bending) -> Floats:
+    """What rods are judged by at each entry of `rod_nodes`: stress, or where that is not known curvature."""
+    return bent.curvature if bent.stress is None else bent.stress
+
+
+def _place(bent: Bending, mesh: GridMesh) -> dict[str, Any]:
+    """The most stressed place: the rod, and how far along it [m]."""
+    at = int(np.argmax(_stressed(bent)))
+    rod = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, at, side="right")) - 1]
+    return {"rod": rod.name, "at": float(mesh.stations[at]) - rod.start}
 
 
 def _contact(checks: Checks) -> dict[str, Any]:
@@ -171,7 +196,28 @@ def _deployment(checks: Checks) -> dict[str, Any]:
         {"share": share, "height": float(np.ptp(positions[:, 2])), **_bent([bent], slice(None), None)}
         for share, positions, bent in zip(way.share, way.positions, checks.on_the_way, strict=True)
     ]
-    return {"ends": "pinned", "stages": stages, "snaps": [list(pair) for pair in way.snaps], "lost_at": way.lost_at}
+    return {
+        "ends": "pinned",
+        "stages": stages,
+        "snaps": [[snap.start, snap.stop] for snap in way.snaps],
+        "snapped_by": [snap.moved for snap in way.snaps],
+        "lost_at": way.lost_at,
+        "reached_from_flat": way.reached_from_flat,
+        "elsewhere": None if way.elsewhere is None else _figures(way.elsewhere),
+        "guided": None if way.guided is None else list(way.guided),
+        "clamped": {"reached_from_flat": checks.clamped_from_flat},
+    }
+
+
+def _figures(shape: Elsewhere | OtherShape) -> dict[str, Any]:
+    """All that is known of a shape but its positions."""
+    return {key: value for key, value in vars(shape).items() if key != "positions"}
+
+
+def _other_shapes(searched: OtherShapes) -> dict[str, Any]:
+    found = [_figures(one) for one in searched.found]
+    looked = {"popped_through": searched.popped_through, "largest_kick": searched.largest_kick}
+    return {"tried": searched.tried, "searched": searched.searched, **looked, "found": found}
 
 
 def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) -> dict[str, Any]:

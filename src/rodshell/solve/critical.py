@@ -9,7 +9,7 @@ singular stiffness is. Steps go for it from below until a stable and an unstable
 stable one is the answer, so that it is never larger than what was found to be stable.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Literal
@@ -87,7 +87,15 @@ class _Point:
     behind: float = -np.inf
 
 
-def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats, *, most: float = 100.0) -> Critical:
+def first_critical(
+    problem: Problem,
+    state: Floats,
+    forces: Floats,
+    load: Floats,
+    *,
+    most: float = 100.0,
+    progress: Callable[[int, float], None] = lambda count, factor: None,
+) -> Critical:
     """Follow a shell from equilibrium without the load until it loses its stability.
 
     Parameters
@@ -97,6 +105,7 @@ def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats
     state, forces : (n, 3) its equilibrium [m], axial forces (e,) [N].
     load : (n, 3) W, the dead load that grows, at factor 1 [N]; not zero in the free directions.
     most : factor up to which the path is followed.
+    progress : told of the factorisations made and the factor reached, at every step; what it raises ends the search.
     """
     path = _Path(problem, state, load)
     here = path.begin(state, forces)
@@ -106,6 +115,7 @@ def first_critical(problem: Problem, state: Floats, forces: Floats, load: Floats
     beyond, before, unit_state, longest = None, None, None, np.inf
     doubt = 0.5  # share of the way ahead that is left: how well the last point foresaw this one
     while path.factorizations < MOST_FACTORIZATIONS:
+        progress(path.factorizations, here.factor)
         if here.factor >= most:
             limit = "none"
             break

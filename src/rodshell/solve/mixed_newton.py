@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.errors import OutOfTimeError
 from rodshell.rods.elements import Elements
 from rodshell.solve.linear import SingularError
 from rodshell.solve.newton_step import HopelessError, NewtonStep
@@ -27,6 +28,7 @@ Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6
 CIRCLES, ALIKE = 12, 1e-3  # steps; and how near to each other
+MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
 
@@ -57,7 +59,7 @@ def find_equilibrium(
     descend: bool = False,
     cut: bool = False,
     most_modes: int | None = None,
-    most_iterations: int = 60,
+    most_iterations: int = MOST_ITERATIONS,
     progress: Progress | None = None,
 ) -> Equilibrium:
     """Equilibrium near `state` (n, 3) [m] with axial forces near `forces` (e,) [N].
@@ -72,7 +74,7 @@ def find_equilibrium(
     """
     begin = time.perf_counter()
     step = NewtonStep(problem, state, cut=cut, most_modes=most_modes)
-    status, steps = Status.STALLED, list[float]()
+    status, steps, reason = Status.STALLED, list[float](), ""
     while step.iterations + step.counts <= most_iterations:
         new = step.counts
         try:
@@ -88,9 +90,15 @@ def find_equilibrium(
             break
         state, forces = state_next, forces_next
         if progress is not None and new:
-            progress(step.iterations, moved / problem.length)
+            try:
+                progress(step.iterations, moved / problem.length)
+            except OutOfTimeError as late:
+                reason = str(late)
         if step.settled and mismatch < STRAIN_TOLERANCE:
             status = Status.CONVERGED
+            break
+        if reason:
+            status = Status.OUT_OF_TIME
             break
         steps.append(moved)
         if _in_circles(steps):
@@ -107,6 +115,7 @@ def find_equilibrium(
         force_residual=float(np.abs(residual).max(initial=0.0)),
         max_strain=float(np.abs(problem.stretch.strains(state)).max()),
         negative_modes=step.negative_modes,
+        reason=reason if status is Status.OUT_OF_TIME else "",
     )
     mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     step.refresh(state)
@@ -126,7 +135,7 @@ def find_stable(
     *,
     cut: bool = False,
     most_modes: int | None = None,
-    most_iterations: int = 60,
+    most_iterations: int = MOST_ITERATIONS,
     progress: Progress | None = None,
 ) -> Equilibrium:
     """As `find_equilibrium`; where that ends on a saddle, slide off along its mode, to either side in turn.
@@ -151,7 +160,8 @@ def find_stable(
                     progress=progress,
                 )
             )
-            if tries[-1].report.stable:
+            if tries[-1].report.stable or tries[-1].report.status is Status.OUT_OF_TIME:
                 break
-    best = tries[-1] if tries[-1].report.stable else first
+    last = tries[-1].report
+    best = tries[-1] if last.stable or last.status is Status.OUT_OF_TIME else first
     return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))

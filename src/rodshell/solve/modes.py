@@ -1,4 +1,4 @@
-"""The slowest modes of a body about an equilibrium: K x = s M x, from the lowest s on."""
+"""The slowest modes of a body about an equilibrium, K x = s M x, from the lowest s on: their s, or the modes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +8,11 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements, Floats, Ints
 from rodshell.solve.implicit_euler import Motion
-from rodshell.solve.linear import Qdldl
+from rodshell.solve.linear import LinearSolver, Qdldl
 from rodshell.solve.step_limit import tangent_stiffness
 
 SHIFT = 10.0  # [1/s2]: first guess of a shift below all s
+SWEEPS = 4  # of the subspace iteration
 GROWTH = 10.0  # of the shift, until nothing is below it
 
 
@@ -53,3 +54,21 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
     start = np.sin(1.0 + np.arange(free.size) ** 2)  # the same at every run
     values = eigsh(scaled, k=count, sigma=-shift, OPinv=inverse, v0=start, tol=1e-6, return_eigenvectors=False)
     return np.sort(values)
+
+
+def softest_modes(solver: LinearSolver, free: Freedom, mass: Floats, count: int) -> list[Floats]:
+    """`count` modes (n, 3) of a stable equilibrium whose stiffness `solver` has factorised, from the softest on.
+
+    By subspace iteration, which is enough for directions to look in: their s are good to some per cent.
+
+    mass : (n, 3) lumped mass of each component.
+    """
+    root = np.sqrt(free.reduce_diagonal(mass))
+    count = min(count, free.size)
+    basis = np.random.default_rng(0).standard_normal((free.size, min(count + 2, free.size)))
+    for _ in range(SWEEPS):
+        basis = np.linalg.qr(basis)[0]
+        image = np.column_stack([root * solver.solve(root * column) for column in basis.T])
+        softness, turn = np.linalg.eigh(basis.T @ image)
+        basis = image @ turn[:, np.argsort(-softness)]
+    return [free.expand(column / root) for column in basis.T[:count]]

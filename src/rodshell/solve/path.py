@@ -1,12 +1,20 @@
-"""Following an equilibrium along a path of loads or supports, from t = 0 to t = 1."""
+"""Following an equilibrium along a path of loads or supports.
+
+`follow` wants the end, from t = 0 to t = 1, by whatever stable equilibria Newton's method finds on the way. `trace`
+wants the path: it goes on only from one equilibrium to the next on the same branch, and tells them by their energy.
+Between two equilibria on one branch the work of the supports accounts for the change of energy; where it does not,
+the step was too long, or the branch has ended in a limit point or a bifurcation. What happens there in reality is a
+snap: at held supports the energy falls until the structure rests in another stable equilibrium.
+"""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.solve.mixed_newton import Equilibrium, find_stable
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport, Status
 
@@ -16,6 +24,10 @@ EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
 SMALLEST_STEP = 1e-3
 MOST_OF_ALL = 400  # iterations of the whole path; the paths that arrive take 30 to 100
+UNACCOUNTED = 0.02  # of the energy: more than the trapezoidal rule leaves of a short step along one branch
+MOST_A_STEP = 8  # iterations of a step along a branch
+TINY = 1e-300
+DISTURBANCE = 1e-3  # of the length, along the mode of an unstable equilibrium, from where the energy falls
 
 
 def follow(
@@ -61,8 +73,134 @@ def follow(
                 step *= 1.6
         else:
             step = 0.4 * min(step, there - t)
+        if found.report.status is Status.OUT_OF_TIME:
+            break
         if t < 1.0 and (step < SMALLEST_STEP or sum(one.iterations for one in reports) > MOST_OF_ALL):
             break
     ended = last or found
     report = ended.report.after(*(one for one in reports if one is not ended.report))
-    return replace(ended, report=report if t >= 1.0 else replace(report, status=Status.STALLED))
+    if t >= 1.0:
+        return replace(ended, report=report)
+    late = found.report.status is Status.OUT_OF_TIME
+    status = Status.OUT_OF_TIME if late else Status.STALLED
+    return replace(ended, report=replace(report, status=status, reason=found.report.reason))
+
+
+@dataclass(frozen=True)
+class Snap:
+    """Where a branch of stable equilibria ended and the structure went to another one.
+
+    Parameters
+    ----------
+    start, stop : of the step in t in which it happened.
+    moved : how far the node went that went farthest [m].
+    """
+
+    start: float
+    stop: float
+    moved: float
+
+
+@dataclass(frozen=True)
+class Trace:
+    """How far a path was traced: the last t with its stable equilibrium, the snaps on the way, and the work."""
+
+    t: float
+    found: Equilibrium
+    snaps: tuple[Snap, ...]
+    factorizations: int
+
+
+def trace(
+    problem_at: Callable[[float], Problem], here: Equilibrium, start: float, stop: float, *,
+    shortest: float, snap: bool, most_factorizations: int, told: Callable[[float], None] = lambda t: None,
+) -> Trace:  # fmt: skip
+    """Go from the stable equilibrium `here` at t = `start` towards `stop`, up or down, branch by branch.
+
+    Parameters
+    ----------
+    problem_at : the problem at t, its constraint being `Supports` with prescribed blocks; source frames as in `follow`.
+    shortest : step in t at which a branch that cannot be followed has ended.
+    snap : whether to go down the energy there and on from where that leads; else the path ends there.
+    most_factorizations : the path ends when they are used up.
+    told : called with t before each step; it may raise an error to end the path.
+
+    Returns
+    -------
+    The path; its t is `stop` where it arrived.
+    """
+    t, step, done, snaps = start, abs(stop - start), 0, list[Snap]()
+    while t != stop:
+        told(t)
+        step = min(step, abs(stop - t))
+        there = stop if step == abs(stop - t) else t + float(np.copysign(step, stop - t))
+        problem = replace(problem_at(there), elements=here.elements, pattern=here.pattern)
+        found = find_stable(problem, here.state, here.forces, most_iterations=MOST_A_STEP)
+        done += found.report.factorizations
+        if not found.report.stable or unaccounted(problem, here, found):
+            if done >= most_factorizations or (step <= shortest and not snap):
+                break
+            if step > shortest:
+                step = max(0.4 * step, shortest)
+                continue
+            found = _fallen(problem, here, found)
+            done += found.report.factorizations
+            if not found.report.stable:
+                break
+            if unaccounted(problem, here, found):
+                snaps.append(Snap(t, there, farthest(problem, here, found)))
+            step = 4 * shortest
+        elif found.report.iterations <= EASY:
+            step *= 1.6
+        t, here = there, found
+    return Trace(t, here, tuple(snaps), done)
+
+
+def unaccounted(problem: Problem, here: Equilibrium, there: Equilibrium) -> bool:
+    """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
+    by the trapezoidal rule."""
+    return abs(surplus(problem, here, there)) > UNACCOUNTED
+
+
+def surplus(problem: Problem, here: Equilibrium, there: Equilibrium) -> float:
+    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell."""
+    assert isinstance(problem.constraint, Supports)
+    moved = problem.constraint.moved
+    one, two = (potential(problem, at) for at in (here, there))
+    work = 0.5 * float(np.sum((here.gradient + there.gradient)[moved] * (there.state - here.state)[moved]))
+    return (two - one - work) / max(abs(one), abs(two), TINY)
+
+
+def potential(problem: Problem, found: Equilibrium) -> float:
+    """Energy of an equilibrium less the work of the load [J]."""
+    unused = np.zeros_like(found.state)
+    elastic = sum(one.evaluate(found.state, unused) for one in (*found.elements, problem.stretch))
+    return elastic - (0.0 if problem.load is None else float(np.sum(problem.load * found.state)))
+
+
+def farthest(problem: Problem, one: Equilibrium, two: Equilibrium) -> float:
+    """Largest distance of a node between two states [m]."""
+    nodes = np.unique(problem.stretch.blocks)
+    return float(np.linalg.norm(two.state[nodes] - one.state[nodes], axis=1).max())
+
+
+def _fallen(problem: Problem, here: Equilibrium, found: Equilibrium) -> Equilibrium:
+    """The stable equilibrium down the energy, the supports being where the problem has them.
+
+    By Newton's method with shifted Hessians, which takes a fifth of the work of the steepest descent and mostly leads
+    to the same equilibrium; by the descent where that fails or gains energy.
+    """
+    from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
+
+    supports, state, forces = problem.constraint, here.state, here.forces
+    assert isinstance(supports, Supports)
+    if found.mode is not None:
+        state, forces = found.state + DISTURBANCE * problem.length * found.mode, found.forces
+        problem = replace(problem, elements=found.elements)
+    down = find_equilibrium(problem, state, forces, descend=True)
+    if down.report.stable and surplus(problem, here, down) < UNACCOUNTED:
+        return down
+    state = state.copy()
+    state[supports.moved] = supports.goals
+    slid = relax(problem, state)
+    return replace(slid, report=slid.report.after(down.report))

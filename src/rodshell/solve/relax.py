@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.errors import OutOfTimeError
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.mixed_newton import Equilibrium, find_stable
 from rodshell.solve.problem import Problem, linear_solver
@@ -55,8 +56,11 @@ def relax(problem: Problem, state: Floats, *, progress: Callable[[int, float], N
         moved = float(np.abs(taken.state - state).max())
         state = taken.state
         motion = motion.refreshed(state)
-        if progress is not None:
-            progress(number, moved / problem.length)
+        try:
+            if progress is not None:
+                progress(number, moved / problem.length)
+        except OutOfTimeError:
+            break  # the solve that follows ends at its first iteration, and says so
         if length > LONG and moved < STILL * problem.length:
             break
         length = min(GROWTH * length, GROWTH * LONG)

@@ -13,6 +13,7 @@ class Status(Enum):
     SLID_OFF = "slid off"
     MOVING = "not at rest"
     BUCKLED = "buckled"
+    OUT_OF_TIME = "out of time"
 
     @property
     def sentence(self) -> str:
@@ -26,7 +27,8 @@ _SENTENCES = {
     Status.DIVERGED: "the iteration diverged; reduce the spacing, or choose another anchor or heading",
     Status.SLID_OFF: "the grid slid off the target (nothing holds it there without friction); use method = bound",
     Status.BUCKLED: "was given up at its start: released from the target, the rods would buckle between their joints "
-    "in very many places; rods that bend more easily within the surface, a smaller spacing or a flatter target may do",
+    "in very many places; rods with less of a strong axis, a smaller spacing or a flatter target may do",
+    Status.OUT_OF_TIME: "was out of time",
     Status.MOVING: "was not at rest when its time was over; give it a longer duration, or drag",
 }
 
@@ -41,6 +43,7 @@ class SolveReport:
     force_residual : largest component of the gradient in the free directions [N].
     max_strain : largest axial strain, or constraint strain where rods are inextensible [-].
     negative_modes : of the exact Hessian in the free directions at the final state; 0 says stable.
+    reason : when and where it was out of time, or "".
     """
 
     status: Status
@@ -51,6 +54,12 @@ class SolveReport:
     force_residual: float
     max_strain: float
     negative_modes: int
+    reason: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """How it ended, and what to do."""
+        return self.reason or self.status.sentence
 
     @property
     def converged(self) -> bool:

@@ -57,7 +57,7 @@ def simulate(
         always meet the even grid again.
     every : record each so many steps of the grid; the start is always recorded.
     halvings : how often a step may be halved.
-    stream : folder for the record, instead of memory; read it with `TimeSeries.load`.
+    stream : folder for the record, instead of memory; read it with `TimeSeries.load`. No file is replaced there.
     progress : told of every moment that is recorded.
     stepper : takes the steps; `ImplicitEuler` with `matrix` without.
     stop : asked at every moment of the grid of times whether to end there.
@@ -68,6 +68,7 @@ def simulate(
     ------
     ConvergenceError : a step fails at its smallest; the record up to there is the error's `report`.
     StabilityError : the step is beyond the limit of the motion's explicit ties.
+    OutputError : `stream` cannot be written, or holds a record.
     InputError : a value that is not finite comes in, from the caller or from a force.
     """
     velocity = np.zeros_like(state) if velocity is None else velocity

@@ -106,7 +106,7 @@ NAMES = ("times", "states", "velocities", "energies")
 
 
 class Recorder:
-    """Room for `rows` moments, in memory or as one .npy file each in the folder `stream`.
+    """Room for `rows` moments, in memory or as one .npy file each in the folder `stream`, which holds none yet.
 
     A row counts from the moment its time is written, which is last: a kill leaves whole rows only.
     """
@@ -118,6 +118,9 @@ class Recorder:
             self._arrays = [np.zeros(size) for size in shapes]
         else:
             folder = Path(stream)
+            there = [folder / f"{name}.npy" for name in NAMES if (folder / f"{name}.npy").exists()]
+            if there:
+                raise OutputError(f"will not replace {there[0]}: give a folder that holds no time series, or move that")
             try:
                 folder.mkdir(parents=True, exist_ok=True)
                 self._arrays = [

@@ -5,7 +5,7 @@ from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.bracing import bracing_drawing
 from rodshell.output.drawings.final import elevations_drawing, erection_drawing
 from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, parts, room, table, tiled
+from rodshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, parts, room, table
 from rodshell.output.drawings.strips import per_sheet, strips_drawing
 from rodshell.output.drawings.supports import supports_drawing
 from rodshell.output.drawings.titleblock import title_block, with_title
@@ -30,9 +30,12 @@ def drawing_set(archive: Archive, plan: FlatPlan) -> dict[str, Drawing]:
 def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[float, float]]:
     """All sheets in mm of paper, and the paper's size."""
     paper = PAPERS[(archive.result.get("drawings") or {}).get("paper", "A3")]
-    flat = fitted(lambda text: flat_drawing(plan, text), paper)
-    true_size = list(tiled(lambda text: flat_drawing(plan, text), paper))
-    sheets = [flat, *(true_size or parts(lambda text: flat_drawing(plan, text), paper, flat))]
+
+    def flat(text: float) -> Drawing:
+        return flat_drawing(plan, text)
+
+    whole = fitted(flat, paper)
+    sheets = [whole, *parts(flat, paper, whole, true_size=True)]
     sheets += _strips(plan, paper)
     for name, make in _of_the_shell(archive, plan).items():
         whole = fitted(make, paper)

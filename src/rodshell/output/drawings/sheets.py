@@ -52,35 +52,38 @@ def fitted(compose: Compose, paper: tuple[float, float]) -> Sheet:
     return Sheet(drawing.title, drawing.placed(1 / scale, shift), scale)
 
 
-def parts(compose: Compose, paper: tuple[float, float], whole: Sheet) -> Iterator[Sheet]:
+def parts(compose: Compose, paper: tuple[float, float], whole: Sheet, *, true_size: bool = False) -> Iterator[Sheet]:
     """What a drawing's one sheet leaves out, on several: at the smallest scale that shows all, or the largest there is.
 
-    whole : its one sheet. Nothing is yielded where that leaves nothing out.
+    whole : its one sheet; nothing is yielded where that leaves nothing out.
+    true_size : at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """
-    if not whole.content.left_out:
+    bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
+    possible = [one for one in SCALES if one < whole.scale and _tiles(bare / one, paper).prod() <= MOST_TILES]
+    if true_size and 1 in possible:
+        possible = [1]
+    elif not whole.content.left_out:
         return
     best: list[Sheet] = []
-    for scale in (one for one in reversed(SCALES) if one < whole.scale):
-        sheets = list(tiled(compose, paper, scale))
-        if not sheets and best:
-            break
-        best = sheets
-        if sheets and not sheets[0].content.left_out:
+    for scale in reversed(possible):
+        best = list(tiled(compose, paper, scale)) or best
+        if best and not best[0].content.left_out:
             break
     yield from best
+
+
+def _tiles(extent: Floats, paper: tuple[float, float]) -> NDArray[np.intp]:
+    """Sheets (2,) across and down that an extent (2,) of a drawing takes [mm of paper]."""
+    low, high = room(paper)
+    return np.maximum(np.ceil(extent / (high - low - 2 * OVERLAP)), 1).astype(np.intp)
 
 
 def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
     """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where those are too many."""
     low, high = room(paper)
-    size = high - low - 2 * OVERLAP
-    least = np.ceil(np.subtract(*compose(0.01).box()[::-1]) / scale / size).astype(int)
-    if np.maximum(least, 1).prod() > MOST_TILES:
-        return
-    whole = compose(TEXT * scale)
-    drawing = whole.placed(1 / scale, np.zeros(2))
+    drawing = compose(TEXT * scale).placed(1 / scale, np.zeros(2))
     bottom, top = drawing.box()
-    count = np.maximum(np.ceil((top - bottom) / size).astype(int), 1)
+    size, count = high - low - 2 * OVERLAP, _tiles(top - bottom, paper)
     if not 1 < count.prod() <= MOST_TILES:
         return
     origin = 0.5 * (bottom + top) - 0.5 * count * size  # the tiles' common corner

@@ -1,0 +1,207 @@
+"""Other stable shapes of the same shell on the same supports.
+
+A shell that was bent into its shape may have several. They are looked for from starts at some distance: popped
+through, each node mirrored in the surface that the supports span, and kicked along the softest modes of the tangent
+stiffness, one by one and mixed. From each start the energy is gone down to the next stable equilibrium. What is found
+is a shape of the shell; that nothing is found proves nothing, so the search says how far it looked.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import splu
+
+from rodshell.checks.deployment import SAME, Deployment
+from rodshell.layout import GridMesh
+from rodshell.model import Shell
+from rodshell.solve.constraint import Supports
+from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
+from rodshell.solve.modes import softest_modes
+from rodshell.solve.path import potential
+from rodshell.solve.problem import Problem
+
+Floats = NDArray[np.float64]
+
+MODES = 4
+KICKS = (0.2, 0.4)  # of the shell's size: how far the node goes that goes farthest
+MIXTURES = 12  # kicks along mixtures of the modes, which are the same at every run
+MOST_A_START = 40  # iterations
+FEWEST_A_START = 2
+MODES_COST = 5  # factorisations that take as long as finding the modes, with those that they need
+EACH = 4  # factorisations of an iteration at most, where the tangent stiffness is indefinite
+COPLANAR = 1e-3  # of the size: how far supports may lie off their plane for the shell to have a mirror image,
+MIRRORED = 0.02  # and the image off the reflection: trimmed ends lie off the plane by some 1e-4
+
+
+@dataclass(frozen=True)
+class OtherShape:
+    """Another stable shape.
+
+    Parameters
+    ----------
+    distance : of the farthest node from its place in the shell's own shape, over half the shell's width.
+    energy : over that of the shell's own shape.
+    from_flat : whether a deployment ends in it, that of this shell or its mirror image; None where none is known to.
+    mirror : whether it is the reflection in the plane of the supports.
+    positions : (n, 3) of the mesh's nodes [m].
+    """
+
+    distance: float
+    energy: float
+    from_flat: bool | None
+    mirror: bool
+    positions: Floats
+
+
+@dataclass(frozen=True)
+class OtherShapes:
+    """What a search found, and how far it looked.
+
+    Parameters
+    ----------
+    tried : number of starts.
+    popped_through : whether popping through was among them.
+    largest_kick : over half the shell's width.
+    found : each shape once.
+    factorizations : that it took.
+    """
+
+    tried: int
+    popped_through: bool
+    largest_kick: float
+    found: tuple[OtherShape, ...]
+    factorizations: int = 0
+
+    @property
+    def searched(self) -> str:
+        """How far the search looked, in a sentence."""
+        if not self.tried:
+            return "not looked for: the form was found with too little work for a search that takes half of it"
+        ways = ["popped through"] if self.popped_through else []
+        if self.largest_kick:
+            kick = f"{100 * self.largest_kick:.0f} % of half its width"
+            ways.append(f"kicked by up to {kick} along its {MODES} softest modes or mixtures of them")
+        starts = f"{self.tried} start{'s' if self.tried > 1 else ''}"
+        return f"looked for from {starts} ({' and '.join(ways)}); others are not excluded"
+
+
+def other_shapes(
+    shell: Shell, found: Equilibrium, *, most_factorizations: int, deployment: Deployment | None = None,
+    told: Callable[[int], None] = lambda start: None,
+) -> OtherShapes:  # fmt: skip
+    """Look for other stable equilibria of a shell, its supports being held where they are.
+
+    Parameters
+    ----------
+    found : its stable equilibrium, the shell's source frames being there.
+    most_factorizations : the search ends before they are used up; kicks that are small come first.
+    deployment : of this shell; the shape that it ended in, if that was another one, is among those found.
+    told : called with the number of each start before it.
+    """
+    search = _Search(shell, found, deployment)
+    kicks = list[float]()
+    for kick, start in search.starts(most_factorizations):
+        each = 2 if kick == 0 and search.image is not None else EACH  # next to its image the stiffness is definite
+        most = min(MOST_A_START, (most_factorizations - search.factorizations) // each)
+        if most < FEWEST_A_START:
+            break
+        told(len(kicks) + 1)
+        search.go(start, kick, most)
+        kicks.append(kick)
+    return OtherShapes(len(kicks), 0.0 in kicks, max(kicks, default=0.0), tuple(search.shapes), search.factorizations)
+
+
+class _Search:
+    def __init__(self, shell: Shell, found: Equilibrium, deployment: Deployment | None) -> None:
+        self.shell, self.own, self.factorizations = shell, found, 0
+        self.positions = shell.positions(found.state)
+        self.length = 0.5 * float(np.ptp(self.positions, axis=0).max())
+        self.problem = Problem(
+            found.elements, shell.stretch, Supports(shell.held_ends()), self.length,
+            places=shell.places, pattern=found.pattern,
+        )  # fmt: skip
+        self.energy = potential(self.problem, found)
+        self.normal, middle, off = _plane(self.positions[shell.mesh.ends.ravel()])
+        self.reached = None if deployment is None else deployment.reached_from_flat
+        height = (self.positions - middle) @ self.normal
+        plane = off < COPLANAR * self.length and not len(shell.ghosts)  # a clamp's direction has no image
+        self.image = self.positions - 2 * height[:, None] * self.normal if plane else None
+        self.shapes = list[OtherShape]()
+        if deployment is not None and (there := deployment.elsewhere) is not None:
+            self.shapes.append(OtherShape(there.distance, there.energy, True, False, there.positions))
+
+    def starts(self, most_factorizations: int) -> Iterator[tuple[float, Floats]]:
+        """The kick's size over the shell's, and the state; zero for popping through, which comes first where the
+        supports lie in a plane, since it leads straight to the mirror image."""
+        if self.image is not None:
+            yield 0.0, self._through()
+        if self.factorizations + MODES_COST + EACH * FEWEST_A_START > most_factorizations:
+            return
+        modes, nodes = self._modes(), self.shell.stretch.blocks
+        random = np.random.default_rng(0)
+        for size in KICKS:
+            for mode in modes:
+                for side in (1.0, -1.0):
+                    yield size, self.own.state + side * size * self.length * mode
+            if self.image is None and size == KICKS[0]:
+                yield 0.0, self._through()
+        for _ in range(MIXTURES):
+            mixture = np.tensordot(random.standard_normal(len(modes)), modes, 1)
+            mixture /= np.linalg.norm(mixture[nodes], axis=2).max()
+            yield KICKS[-1], self.own.state + KICKS[-1] * self.length * mixture
+
+    def go(self, start: Floats, kick: float, most: int) -> None:
+        """Down from a start; keeps a shape that is new. The mirror image has the same axial forces."""
+        forces = self.own.forces if kick == 0 else np.zeros_like(self.own.forces)
+        there = find_equilibrium(self.problem, start, forces, descend=True, cut=True, most_iterations=most)
+        self.factorizations += there.report.factorizations
+        positions = self.shell.positions(there.state)
+        known = (self.positions, *(one.positions for one in self.shapes))
+        if there.report.stable and all(self._apart(positions, one) > SAME for one in known):
+            mirror = self.image is not None and self._apart(positions, self.image) < MIRRORED
+            from_flat = True if mirror and self.reached else None  # lifted to the other side it goes to its image
+            energy = potential(self.problem, there) / self.energy
+            self.shapes.append(OtherShape(self._apart(positions, self.positions), energy, from_flat, mirror, positions))
+
+    def _modes(self) -> list[Floats]:
+        """The softest modes, the farthest node going by 1."""
+        own = find_equilibrium(self.problem, self.own.state, self.own.forces)  # for its factors
+        modes = softest_modes(own.pattern.solver, self.shell.held_ends(), self.shell.mass, MODES)
+        self.factorizations += MODES_COST
+        return [mode / np.linalg.norm(mode[self.shell.stretch.blocks], axis=2).max() for mode in modes]
+
+    def _through(self) -> Floats:
+        """Each node mirrored in the surface that the supports span, across their plane; the supports stay."""
+        nodes = np.flatnonzero(self.shell.like < self.shell.mesh.node_count)
+        above = (self.positions - spanned(self.shell.mesh, self.positions)) @ self.normal
+        state = self.own.state.copy()
+        state[nodes] -= 2 * above[self.shell.like[nodes], None] * self.normal
+        held = np.append(self.shell.ends, self.shell.ghosts)
+        state[held] = self.own.state[held]
+        return state
+
+    def _apart(self, one: Floats, two: Floats) -> float:
+        return float(np.linalg.norm(one - two, axis=1).max()) / self.length
+
+
+def spanned(mesh: GridMesh, positions: Floats) -> Floats:
+    """(n, 3) nodes on the surface that the rod ends span like a net of soft springs along the edges."""
+    ends = np.unique(mesh.ends)
+    inner = np.setdiff1d(np.arange(mesh.node_count), ends)
+    stiffness, (i, j) = 1 / mesh.edge_lengths, mesh.edges.T
+    size = (mesh.node_count, mesh.node_count)
+    pulls = coo_matrix((np.tile(stiffness, 2), (np.append(i, j), np.append(j, i))), shape=size).tocsr()
+    whole = (diags(np.asarray(pulls.sum(axis=1)).ravel()) - pulls).tocsr()
+    result = positions.copy()
+    result[inner] = splu(whole[inner][:, inner].tocsc()).solve(np.asarray(-(whole[inner][:, ends] @ positions[ends])))
+    return result
+
+
+def _plane(points: Floats) -> tuple[Floats, Floats, float]:
+    """Normal and middle of the plane nearest to points (m, 3), and how far the farthest lies off it."""
+    middle = points.mean(axis=0)
+    normal = np.linalg.svd(points - middle)[2][2]
+    return normal, middle, float(np.abs((points - middle) @ normal).max())
