@@ -11,7 +11,10 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+
+from rodshell.output import Archive
 
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
@@ -20,6 +23,9 @@ needs_browser = pytest.mark.skipif(
     CHROMIUM is None and os.environ.get("RODSHELL_BROWSER") != "required",
     reason="no browser: install Chromium (Debian: apt-get install chromium)",
 )
+
+UNITS = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0, "mm": 1e-3, "m": 1.0}
+
 
 PROBE = """
 <script>
@@ -92,3 +98,43 @@ def open_report(page: Path, folder: Path) -> tuple[dict[str, Any], list[str]]:
     from html import unescape
 
     return json.loads(unescape(match[1])), console
+
+
+def coloured(made: Archive) -> dict[str, list[np.ndarray | None]]:
+    """By colour, what each frame of the view shows [Pa or m] at each entry of `rod_nodes`, where it is known."""
+    states, nodes = made.states, made.states["rod_nodes"]
+    ends = [end for end in ("pinned", "clamped") if f"popped_{end}" in states]
+    between = len(states["history"]) - 2 if "history" in states else 0
+    stress = [*states.get("history_stress", [])[1 : between + 1], *(states.get(f"stress_{end}") for end in ends)]
+    if not made.result.get("target"):
+        return {"gap": [None, *(states[f"popped_{end}"][nodes, 2] for end in ends)]}
+    gap = [*[None] * between, *(states[f"gap_{end}"][nodes] for end in ends)]
+    return {"stress": [None, *stress], "gap": [None, *gap]}
+
+
+def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
+    """Every caption or tick at the colour bar that is not true of the frame that is shown."""
+    strength, wrong = (made.result.get("bending") or {}).get("strength"), []
+    for kind, k, caption, ticks in found["legends"]:
+        shown = coloured(made)[kind][k] if kind != "none" else None
+        if shown is None or not caption:
+            wrong += [f"{kind}, frame {k}: {caption!r}"] if (shown is None) != (not caption) else []
+            continue
+        what, unit = re.match(r"([a-z ]+) in ([A-Za-z%]+)", caption).groups()  # type: ignore[union-attr]
+        values = shown / (strength / 100 if unit == "%" else UNITS[unit])
+        named = re.search(r"here up to ([0-9.e+-]+)$", caption)
+        (share, least), (stop, most) = [
+            (at, float(text.replace("\N{MINUS SIGN}", "-"))) for at, text in ticks[:: len(ticks) - 1]
+        ]
+        low, high = (least + (end - share) * (most - least) / (stop - share) for end in (0, 1))
+        true = {
+            "word": what
+            == {"gap": "gap to target" if made.result.get("target") else "height"}.get(
+                kind, "utilisation" if strength else "stress"
+            ),
+            "choice": found["kinds"][kind] == what,
+            "largest": kind == "gap" or (named and float(named[1]) == pytest.approx(values.max(), rel=6e-3)),
+            "range": low <= values.min() + 1e-3 * (high - low) and values.max() <= high + 1e-3 * (high - low),
+        }
+        wrong += [f"{kind}, frame {k}: {caption!r}, {ticks} ({name})" for name, right in true.items() if not right]
+    return wrong

@@ -1,5 +1,6 @@
 """Real results that the tests of files share, found once: a dome, an oval turned by 45 degrees, a ridge, and others."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -36,6 +37,14 @@ def wished() -> Archive:
     style = DrawingStyle(project="Pavilion", revision="B", tolerance=5e-4, layers={"CUT": "LASER"})
     making = Fabrication(end_allowance=0.012, stock_length=0.4, kerf=0.003)
     return form("dome").archive(takeaway=Takeaway(strength=2e4, stages=4, fabrication=making, drawings=style))
+
+
+def breaking() -> Archive:
+    """A dome whose rods use 169 % of their strength halfway up, and little of it before and after."""
+    made = wished()
+    history = made.states["history_stress"].copy()
+    history[2] *= 1.69 * made.result["bending"]["strength"] / history[2].max()
+    return replace(made, states={**made.states, "history_stress": history})
 
 
 LATH = rs.Rod(

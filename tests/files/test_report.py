@@ -4,12 +4,11 @@ import base64
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from browser import needs_browser, open_report
-from forms import TARGETS, archive, wished
+from browser import coloured, needs_browser, open_report, wrong_legends
+from forms import TARGETS, archive, breaking, wished
 from sample_archive import sample_archive, table_archive, with_way_up
 
 import rodshell as rs
@@ -28,58 +27,7 @@ def page_of(made: object, folder: Path) -> Path:
     return folder / "report.html"
 
 
-UNITS = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0, "mm": 1e-3, "m": 1.0}
-
-
-def breaking() -> Archive:
-    """A dome whose rods use 169 % of their strength halfway up, and little of it before and after."""
-    made = wished()
-    history = made.states["history_stress"].copy()
-    history[2] *= 1.69 * made.result["bending"]["strength"] / history[2].max()
-    return replace(made, states={**made.states, "history_stress": history})
-
-
 REPORTS = {**{name: lambda name=name: archive(name) for name in TARGETS}, "table": table_archive, "breaking": breaking}
-
-
-def coloured(made: Archive) -> dict[str, list[np.ndarray | None]]:
-    """By colour, what each frame of the view shows [Pa or m] at each entry of `rod_nodes`, where it is known."""
-    states, nodes = made.states, made.states["rod_nodes"]
-    ends = [end for end in ("pinned", "clamped") if f"popped_{end}" in states]
-    between = len(states["history"]) - 2 if "history" in states else 0
-    stress = [*states.get("history_stress", [])[1 : between + 1], *(states.get(f"stress_{end}") for end in ends)]
-    if not made.result.get("target"):
-        return {"gap": [None, *(states[f"popped_{end}"][nodes, 2] for end in ends)]}
-    gap = [*[None] * between, *(states[f"gap_{end}"][nodes] for end in ends)]
-    return {"stress": [None, *stress], "gap": [None, *gap]}
-
-
-def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
-    """Every caption or tick at the colour bar that is not true of the frame that is shown."""
-    strength, wrong = (made.result.get("bending") or {}).get("strength"), []
-    for kind, k, caption, ticks in found["legends"]:
-        shown = coloured(made)[kind][k] if kind != "none" else None
-        if shown is None or not caption:
-            wrong += [f"{kind}, frame {k}: {caption!r}"] if (shown is None) != (not caption) else []
-            continue
-        what, unit = re.match(r"([a-z ]+) in ([A-Za-z%]+)", caption).groups()  # type: ignore[union-attr]
-        values = shown / (strength / 100 if unit == "%" else UNITS[unit])
-        named = re.search(r"here up to ([0-9.e+-]+)$", caption)
-        (share, least), (stop, most) = [
-            (at, float(text.replace("\N{MINUS SIGN}", "-"))) for at, text in ticks[:: len(ticks) - 1]
-        ]
-        low, high = (least + (end - share) * (most - least) / (stop - share) for end in (0, 1))
-        true = {
-            "word": what
-            == {"gap": "gap to target" if made.result.get("target") else "height"}.get(
-                kind, "utilisation" if strength else "stress"
-            ),
-            "choice": found["kinds"][kind] == what,
-            "largest": kind == "gap" or (named and float(named[1]) == pytest.approx(values.max(), rel=6e-3)),
-            "range": low <= values.min() + 1e-3 * (high - low) and values.max() <= high + 1e-3 * (high - low),
-        }
-        wrong += [f"{kind}, frame {k}: {caption!r}, {ticks} ({name})" for name, right in true.items() if not right]
-    return wrong
 
 
 @needs_browser

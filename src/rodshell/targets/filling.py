@@ -1,4 +1,4 @@
-"""The smoothest surface across an opening: the net goes on there, although no rod will."""
+"""The smoothest surface across an opening or a door: the net goes on there, although no rod will."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +12,53 @@ Floats = NDArray[np.float64]
 STEEPEST = 0.35  # cosine between the opening's axis and the normals around it: past that no cap fits, as on a tube
 BAND = 0.6  # of the opening's radius: width of the surface around it that decides
 MOST = 1500  # points that decide
+DEEP, WIDEST = 0.3, 0.5  # a door is so deep at least, in its widths, and so wide at most, in the surface's extents
 PITCH = 0.5  # spacings between the points that fill
 
 
 def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Samples:
-    """The samples, with more across every loop but the longest whose surroundings stand over its plane.
+    """The samples, with more across every opening and every door in the outer edge, where a smooth cap fits.
+
+    Without them the surface would go on into a door from three sides, and meet itself there in a crease.
 
     A cap is the interpolant of |r|^3 through the surface around the opening: it bends least [Duchon 1977].
     """
     points, normals = [samples.points], [samples.normals]
-    for loop in mesh.loops[1:]:
-        cap = _cap(mesh.vertices[loop], samples, spacing)
+    outer, *openings = [mesh.vertices[loop] for loop in mesh.loops] or [np.empty((0, 3))]
+    for rim in (*openings, *_doors(outer, spacing)):
+        cap = _cap(rim, samples, spacing)
         if cap is not None:
             points.append(cap[0])
             normals.append(cap[1])
     added = sum(map(len, points[1:]))
     areas = np.append(samples.areas, np.full(added, (PITCH * spacing) ** 2))
     return Samples(np.vstack(points), np.vstack(normals), areas)
+
+
+def _doors(rim: Floats, spacing: float) -> list[Floats]:
+    """Deep bays of a closed polyline (n, 3): what lies inside its convex hull, seen against the plane that fits it."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(rim) < 4:
+        return []
+    centred = rim - rim.mean(axis=0)
+    plane = np.linalg.svd(centred, full_matrices=False)[2][:2]
+    try:
+        corners = np.sort(ConvexHull(centred @ plane.T).vertices)
+    except QhullError:  # a line
+        return []
+    extent, doors = float(np.ptp(rim, axis=0).max()), list[Floats]()
+    for first, stop in zip(corners, np.append(corners[1:], corners[0] + len(rim)), strict=True):
+        x = rim[np.arange(first, stop + 1) % len(rim)]
+        along = unit(x[-1:] - x[:1])
+        off = np.linalg.norm(cross(x - x[:1], np.broadcast_to(along, x.shape)), axis=1)
+        inside = np.flatnonzero(np.diff(np.concatenate([[False], off > spacing, [False]]).astype(int)))
+        for begin, end in inside.reshape(-1, 2):
+            door = x[max(begin - 1, 0) : end + 1]
+            wide, deep = float(np.linalg.norm(door[-1] - door[0])), float(off[begin:end].max())
+            if deep > max(DEEP * wide, 2 * spacing) and wide < WIDEST * extent:
+                doors.append(door)
+    return doors
 
 
 def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats] | None:
