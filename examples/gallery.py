@@ -61,7 +61,7 @@ def gallery() -> dict[str, Piece]:
         "freeform, OBJ": Piece(rs.surface_from(DATA / "freeform.obj", unit=MM), tube(20, 2.5), 0.9, 0.0012, 0.0009),
         "freeform, 3dm": Piece(rs.surface_from(DATA / "freeform.3dm"), tube(20, 2.5), 0.9, 0.0012, 0.0009),
         "ball below its equator": Piece(
-            rs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), tube(16, 2.5), 0.6, 0.0145, 0.0003
+            rs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), tube(25, 3), 0.6, 0.0145, 0.0003
         ),
         "torus": Piece(rs.surface_from(DATA / "torus.obj", unit=MM), tube(16, 2.5), 0.7, 0.002, 0.0002),
         "tent with an oculus": Piece(

@@ -9,6 +9,7 @@ from rodshell.checks import Deployment, OtherShapes, check, deploy, other_shapes
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import find_stable
 from rodshell.solve.problem import Problem
+from rodshell.solve.relax import relax
 from tests.acceptance.cases import AUTO
 from tests.acceptance.rows import Row, form_of
 from tests.acceptance.targets_random import REASONS, ROD, random_case
@@ -40,7 +41,7 @@ def square_cap() -> rs.Form:
 def walked(form: rs.Form, way: Deployment) -> float:
     """From the first stage in many small steps of equal length: how far from the final shape that ends, over the size.
 
-    Each step ends in what Newton's method finds from the last, or in a stable equilibrium beside it.
+    Each step ends in what Newton's method finds from the last, or where the energy leads down to.
     """
     shell, state = way.shells[0]
     elements, stretch, places = shell.elements, shell.stretch, shell.places
@@ -49,7 +50,12 @@ def walked(form: rs.Form, way: Deployment) -> float:
     for share in np.linspace(begin, 1.0, FINE + 1)[1:]:
         goals = first + (share - begin) / (1 - begin) * (final.state[shell.ends] - first)
         supports = Supports(shell.held_ends(), shell.ends, goals)
-        found = find_stable(Problem(elements, stretch, supports, 0.2, places=places, pattern=pattern), state, forces)
+        problem = Problem(elements, stretch, supports, 0.2, places=places, pattern=pattern)
+        found = find_stable(problem, state, forces)
+        if not found.report.stable:  # a limit point, at which too little energy is released to be called a snap
+            start = state.copy()
+            start[shell.ends] = goals
+            found = relax(problem, start)
         if not found.report.stable:
             return np.inf
         state, forces, elements, pattern = found.state, found.forces, found.elements, found.pattern
@@ -80,7 +86,7 @@ def deployment_rows() -> Iterator[Row]:
     yield Row(case, "neither reached from flat nor said not to be", known[None], 0, note=note)
     yield Row(case, "said to need a push", pushed, 0)
     yield Row(case, "said not to be reached, but it is", refuted, 0, note="from flat by arches")
-    yield Row(case, "said to be reached smoothly, but it is not", elsewhere, 0, note=f"{smooth} in {FINE} equal steps")
+    yield Row(case, "said to be reached without a snap, but not", elsewhere, 0, note=f"{smooth} in {FINE} equal steps")
 
 
 def shape_rows(name: str, form: rs.Form, most_factorizations: int) -> Iterator[Row]:

@@ -168,3 +168,20 @@ def test_two_shapes_of_a_search_are_never_the_same() -> None:
     for k, one in enumerate(everyone):
         for two in everyone[:k]:
             assert np.linalg.norm(one - two, axis=1).max() > 1e-3 * size
+
+
+def test_result_and_summary_say_what_was_found() -> None:
+    archive = square_cap().archive()
+    way, searched = archive.result["deployment"], archive.result["other_shapes"]["pinned"]
+    assert way["reached_from_flat"] is True
+    assert way["elsewhere"] is None
+    assert way["snaps"] == way["snapped_by"] == []
+    assert searched["tried"] > 0
+    assert searched["searched"].startswith("looked for from ")
+    for one in searched["found"]:
+        assert set(one) == {"distance", "energy", "from_flat", "mirror"}
+    lines = archive.summary().splitlines()
+    assert "  from flat pinned  reached" in lines
+    (shapes,) = [line for line in lines if line.startswith("  shapes")]
+    assert shapes.endswith(searched["searched"])
+    assert ("no other stable shape found" in shapes) == (not searched["found"])

@@ -180,3 +180,18 @@ def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
 def test_a_table_whose_rods_bend_to_rings_still_has_a_size() -> None:
     fit = Fit.between(np.array([2.0]), np.zeros((1, 2, 3)))
     assert 0 < depth(fit.section(rs.Material.preset("petg"))) < 0.01
+
+
+def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
+    """On a barrel rods bend least at 45 degrees: half as sharply as across it, so that twice as thick ones fit."""
+    options = ["--formula", "sqrt(25 - x^2) - 4", "--target.domain", "rectangle", "--target.size", "6 m, 6 m"]
+    options += ["--spacing", "1.5 m", "--rotate", "auto", "--objective", "curvature", "--pop_up.ends", "clamped"]
+    options += ["--rod.material.preset", "larch"]
+    out = tmp_path / "barrel"
+    assert main(["form", "heightfield", *options, "--only", "csv", "--quiet", "--out", str(out)]) == 0
+    case = load_case(out / "case.toml")
+    target, layout, rod, _ = case.build()
+    assert layout.rotate == pytest.approx(np.pi / 4)
+    assert rod.section == Fit.on(target, layout, anchor=case.drape.anchor).section(rs.Material.preset("larch"))
+    across = rs.GridLayout.orthogonal(spacing=1.5)
+    assert depth(rod.section) > depth(Fit.on(target, across).section(rs.Material.preset("larch")))

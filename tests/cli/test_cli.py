@@ -9,9 +9,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import numba
 import numpy as np
@@ -49,10 +50,13 @@ class FakeArchive:
 
 
 class FakeForm:
+    told: ClassVar = list[dict[str, Any]]()
+
     def __init__(self, status: str, level: str) -> None:
         self.status, self.level = status, level
 
     def archive(self, case_toml: str = "", **options: Any) -> FakeArchive:
+        self.told.append(options)
         return FakeArchive(self.status, case_toml, self.level)
 
 
@@ -445,6 +449,28 @@ def test_a_table_takes_the_rod_that_is_asked_for(finder: FakeFinder) -> None:
     tube = rod("--rod.section.kind", "tube", "--rod.section.thickness", "0.1 mm").section
     assert isinstance(tube, Tube)
     assert tube.thickness == 0.0001
+
+
+def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dome: Path) -> None:
+    wishes = {"checks.stages": "3", "checks.strength": "30 MPa", "fabrication.kerf": "2 mm", "drawings.author": "Ada"}
+    wishes |= {"fabrication.stock_length": "6 m", "drawings.date": "2026-11-22", "drawings.tolerance": "2 mm"}
+    options = [word for key, value in wishes.items() for word in (f"--{key}", value)]
+    for source in (["dome"], [write_table(Path("rods.csv"), CROSS), "--unit", "m"]):
+        assert main(["popup", *source, *options]) == 0
+        told = FakeForm.told[-1]["takeaway"]
+        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).takeaway()
+
+
+def test_popup_writes_only_the_kinds_that_are_asked_for(
+    finder: FakeFinder, dome: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kinds = list[object]()
+    save = FakeArchive.save
+    monkeypatch.setattr(FakeArchive, "save", lambda self, to, only, **more: (kinds.append(only), save(self, to)))
+    assert main(["popup", "dome", "--only", "csv, dxf"]) == 0
+    assert kinds == [["csv", "dxf"]]
+    capsys.readouterr()
+    assert '"docx" is no kind of file' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
 
 
 def test_a_result_takes_the_rod_that_is_asked_for_in_place_of_its_own(finder: FakeFinder, dome: Path) -> None:

@@ -304,7 +304,7 @@ def test_strengths_of_a_preset_are_shown_with_what_they_mean_and_their_source() 
     assert rows["source"].startswith("EN 338")
     table = checks_table(result)
     assert table is not None
-    assert ("Utilisation of larch's bending strength", ["40 %"]) in table["rows"]
+    assert ("Utilisation of larch's strength", ["40 %"]) in table["rows"]
 
 
 def test_lengths_with_allowances_are_told_from_those_without() -> None:

@@ -96,9 +96,7 @@ class DrapeTable(Table):
     duration: Duration | None = Field(default=None, description="longest fall; default 6 s at a size of 0.2 m")
     friction: Share = Field(default=0.0, description="Coulomb's coefficient between falling rods and target")
     drag: Share = Field(default=0.0, description="rate in 1/s at which falling rods lose velocity to the air")
-    frames: str | None = Field(
-        default=None, description="folder in the result's own for the frames of a fall; default: none are kept"
-    )
+    frames: str | None = Field(default=None, description="folder below --out for the frames of a fall; default: none")
 
     @field_validator("frames")
     @classmethod

@@ -8,6 +8,7 @@ from math import inf
 import numpy as np
 
 from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
+from rodshell.checks.clamping import reached_by_turning
 from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
@@ -41,6 +42,8 @@ class Checks:
     self_weight : by end condition, what share of its own weight the shell bears.
     contact : by end condition; `contact_on_the_way` of the deployment's stages.
     other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
+    clamped_from_flat : whether the pinned shell, reached from flat, comes to the clamped shape when its ends are
+        turned into their clamps; None where that is not known.
     out_of_time : a sentence on when that was and which checks are missing, or "".
     """
 
@@ -53,6 +56,7 @@ class Checks:
     contact: dict[Ends, Contact] = field(default_factory=dict)
     contact_on_the_way: tuple[Contact, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
+    clamped_from_flat: bool | None = None
     out_of_time: str = ""
 
     @property
@@ -60,7 +64,10 @@ class Checks:
         """Sentences that a user should read."""
         way = () if self.deployment is None else self.deployment.warnings
         late = (self.out_of_time,) if self.out_of_time else ()
-        return (*late, *way, *unknown_weights(self.self_weight), *self.tight)
+        turned: tuple[str, ...] = ()
+        if self.clamped_from_flat is False:
+            turned = ("turned into their clamps after deployment, the ends lead to another than the clamped shape",)
+        return (*late, *way, *turned, *unknown_weights(self.self_weight), *self.tight)
 
     @property
     def before_the_end(self) -> tuple[tuple[float, Bending], ...]:
@@ -130,7 +137,7 @@ def check(
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     weighed = dict[Ends, SelfWeight]()
     follow = "pinned" in done and stages > 0
-    deployment, others, late = None, dict[Ends, OtherShapes](), ""
+    deployment, turned, others, late = None, None, dict[Ends, OtherShapes](), ""
     missing = [f"self-weight with {ends} ends" for ends in settled]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:
@@ -139,6 +146,9 @@ def check(
             missing.pop(0)
         if follow:
             deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
+            if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
+                progress("deployment", "turning the ends into their clamps", 0.0)
+                turned = reached_by_turning(done["pinned"], done["clamped"])
             missing.pop(0)
         for ends, one in _other_shapes(popped, settled, deployment, progress):
             others[ends] = one
@@ -151,7 +161,7 @@ def check(
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, late)
+    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, late)
 
 
 def _other_shapes(

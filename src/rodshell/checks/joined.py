@@ -61,18 +61,17 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
     bent = tuple(
         _stacked([part.on_the_way[row[k]] for part, row in zip(parts, rows, strict=True)]) for k in range(len(shared))
     )
-    way = _joined_ways(ways, rows)
+    way, turned = _joined_ways(ways, rows), _all([part.clamped_from_flat for part in parts])
     found = {
         name: [part.contact_on_the_way[k] for k in row] for (name, part), row in zip(named.items(), rows, strict=True)
     }
     met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
-    return JoinedChecks(bending, held, joints, way, bent, weighed, contact, met, others, late, named=named)
+    return JoinedChecks(bending, held, joints, way, bent, weighed, contact, met, others, turned, late, named=named)
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
     """The ways up of several shells at the shares that all reached, their `rows`."""
     lost = [one.lost_at for one in ways if one.lost_at is not None]
-    reached = [one.reached_from_flat for one in ways]
     elsewhere = [one.elsewhere for one in ways if one.elsewhere is not None]
     return Deployment(
         ways[0].share[rows[0]],
@@ -80,11 +79,16 @@ def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deplo
         (),
         tuple(sorted({snap for one in ways for snap in one.snaps}, key=lambda snap: snap.start)),
         max(lost, default=None),
-        False if False in reached else None if None in reached else True,
+        _all([one.reached_from_flat for one in ways]),
         max(elsewhere, key=lambda one: one.distance, default=None),
         max((one.guided for one in ways if one.guided is not None), default=None),
         sum(one.factorizations for one in ways),
     )
+
+
+def _all(answers: Sequence[bool | None]) -> bool | None:
+    """Whether all are true; None where that is not known."""
+    return False if False in answers else None if None in answers else True
 
 
 def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:

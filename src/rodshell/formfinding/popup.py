@@ -18,6 +18,7 @@ from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.vectors import dot, unit
 from rodshell.joints import Ball, Joint, require_joint
+from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
 from rodshell.solve.constraint import Supports
@@ -242,15 +243,11 @@ class _PopUp:
         """From the pinned state, turn the end directions to those of the boundary."""
         mesh, outward = self.footprint.mesh, self.boundary.tangents
         shell, positions = self.shell("clamped"), free.positions(pinned.state)
-        inner = np.column_stack([mesh.rod_nodes[mesh.rod_start + 1], mesh.rod_nodes[mesh.rod_stop - 2]]).ravel()
-        now = unit(positions[mesh.ends.ravel()] - positions[inner])
-        angle = np.arccos(np.clip(dot(now, outward), -1, 1))[:, None]
-        sine = np.maximum(np.sin(angle), 1e-12)
+        now = end_directions(mesh, positions)
         start = self.upright(shell, positions, now)
 
         def goals(t: float) -> Floats:
-            turned = np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * outward) / sine, now)
-            there = shell.state(positions, unit(turned))[shell.ghosts] - positions[mesh.ends.ravel()]
+            there = shell.state(positions, turned(now, outward, t))[shell.ghosts] - positions[mesh.ends.ravel()]
             return np.vstack([start[shell.ends], start[shell.ends] + there])
 
         found = follow(
@@ -263,6 +260,19 @@ class _PopUp:
             ),
         )
         return shell, replace(found, report=found.report.after(pinned.report))
+
+
+def end_directions(mesh: GridMesh, positions: Floats) -> Floats:
+    """(2m, 3) unit vectors in which the rods' ends point out of the shell at these node positions (n, 3)."""
+    inner = np.column_stack([mesh.rod_nodes[mesh.rod_start + 1], mesh.rod_nodes[mesh.rod_stop - 2]]).ravel()
+    return unit(positions[mesh.ends.ravel()] - positions[inner])
+
+
+def turned(now: Floats, goal: Floats, t: float) -> Floats:
+    """Unit vectors (k, 3) turned by the share t of the angle from `now` to `goal`, each in its own plane."""
+    angle = np.arccos(np.clip(dot(now, goal), -1, 1))[:, None]
+    sine = np.maximum(np.sin(angle), 1e-12)
+    return unit(np.where(angle > 1e-9, (np.sin((1 - t) * angle) * now + np.sin(t * angle) * goal) / sine, now))
 
 
 def aligned(flat: Floats, ends: Floats, points: Floats) -> Floats:

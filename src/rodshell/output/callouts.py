@@ -15,7 +15,7 @@ SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names, over the usual one: the largest
 OFF = 1.3  # from a place to where its name may begin
 GAPS = (1.1, 1.7, np.inf)  # from name to name, or what there is all around; at the wider ones their ways turn evenly
 EVENED = 6  # times
-MANY = 0.25  # share of the names: where more find no room, the drawing needs a larger scale, not another place
+MANY = 24  # names: where more find no room, the drawing needs a larger scale, not other places for them
 FARTHEST = 8.0  # from a place to where its name's own line begins
 
 
@@ -44,7 +44,7 @@ def callouts(
     Each stands on a line of its own, side by side with its neighbours', and a little farther along it where it would
     cover a text or one of `lines` (m, 2, 2). Where not all find room, in an opening, they are written smaller,
     or spaced wider; one that finds none yet stands wherever there is some next to its place, and is left out where
-    there is none.
+    there is none, or where it is one of more than MANY.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def callouts(
     for size, gap in ((text * share, gap) for gap in GAPS for share in SIZES):
         tried = _tried(names, places, away, size, gap, room, lines)
         best = tried if best is None or tried.missing < best.missing else best
-        if not best.missing or (size <= text * SMALL and best.missing > MANY * len(names)):
+        if not best.missing or (size <= text * SMALL and best.missing > MANY):
             break
     assert best is not None
     room.join(best.room)
@@ -63,7 +63,7 @@ def callouts(
     for label, name, place, way in zip(best.labels, names, places, away, strict=True):
         if label is not None:
             found.append(Callout(label.written(best.size), np.vstack([place, label.leader(best.size)])))
-        elif best.missing <= MANY * len(names):
+        elif best.missing <= MANY:
             found += _elsewhere(name, place, way, sizes, room, lines)
     return found
 

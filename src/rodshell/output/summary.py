@@ -45,6 +45,7 @@ def summary_text(result: dict[str, Any]) -> str:
             line += f"rms {mm(gap['rms'])} ({percent(gap['rms_relative'])})"
         lines.append(line)
     lines += _checked(result)
+    lines += _paths(result)
     lines += [f"  dropped   {rod['id']}: {rod['reason']}" for rod in result["dropped"][:6]]
     if len(result["dropped"]) > 6:
         lines.append(f"            and {len(result['dropped']) - 6} more, named in result.json")
@@ -165,3 +166,26 @@ def _lengths(result: dict[str, Any]) -> Callable[[float], str]:
         return millimetres(metres, rounding=rounding) if abs(metres) >= 1e-9 else "0 mm"
 
     return shown
+
+
+def _paths(result: dict[str, Any]) -> Iterator[str]:
+    """Whether the shell is reached from flat, and what other shapes it has."""
+    way = result.get("deployment") or {}
+    if "reached_from_flat" in way:
+        snaps = f", snapping at {', '.join(stage(low) for low, _ in way['snaps'])}" if way["snaps"] else ""
+        words = {True: f"reached{snaps}", False: "ends in another shape", None: "not known whether it is reached"}
+        yield f"  from flat {way['ends']:<8}{words[way['reached_from_flat']]}"
+        if way.get("clamped", {}).get("reached_from_flat"):
+            yield "  from flat clamped reached: the ends are turned into their clamps after the deployment"
+    for ends, searched in (result.get("other_shapes") or {}).items():
+        others = [one for one in searched["found"] if not one["mirror"]]
+        found = ["its mirror image"] if len(others) < len(searched["found"]) else []
+        if others:
+            near = min(others, key=lambda one: float(one["distance"]))
+            found.append(
+                f"{len(others)} other stable shape{'s' if len(others) > 1 else ''}, the nearest "
+                f"{percent(near['distance'])} of half its width away at {rounded(near['energy'])} times the energy"
+            )
+        elif searched["tried"]:
+            found.append("no other stable shape found")
+        yield f"  shapes    {ends:<8}{'; '.join([*found, searched['searched']])}"

@@ -205,6 +205,7 @@ def _deployment(checks: Checks) -> dict[str, Any]:
         "reached_from_flat": way.reached_from_flat,
         "elsewhere": None if way.elsewhere is None else _figures(way.elsewhere),
         "guided": None if way.guided is None else list(way.guided),
+        "clamped": {"reached_from_flat": checks.clamped_from_flat},
     }
 
 
@@ -214,7 +215,9 @@ def _figures(shape: Elsewhere | OtherShape) -> dict[str, Any]:
 
 
 def _other_shapes(searched: OtherShapes) -> dict[str, Any]:
-    return {"tried": searched.tried, "searched": searched.searched, "found": [_figures(one) for one in searched.found]}
+    found = [_figures(one) for one in searched.found]
+    looked = {"popped_through": searched.popped_through, "largest_kick": searched.largest_kick}
+    return {"tried": searched.tried, "searched": searched.searched, **looked, "found": found}
 
 
 def _fabrication(result: Mapping[str, Any], mesh: GridMesh, made: Fabricated) -> dict[str, Any]:
