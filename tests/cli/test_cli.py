@@ -24,6 +24,7 @@ from rodshell.cli import main
 from rodshell.cli.options import ALIASES
 from rodshell.cli.rodends import COLUMNS
 from rodshell.errors import NetLimitError
+from rodshell.output import folder as folder_module
 from rodshell.output.folder import ResultFolder
 
 CROSS = [
@@ -286,6 +287,21 @@ def test_not_converged_saves_says_so_and_ends_with_3(finder: FakeFinder, capsys:
 def test_an_error_of_the_library_is_one_line(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     finder.fault = NetLimitError("no net beyond\n(0.1, 0.2) m")
     assert "no net beyond (0.1, 0.2) m" in refused(capsys, "form", "hemisphere", "--quiet")
+
+
+def test_an_interrupt_while_files_are_moved_says_that_the_result_is_complete(
+    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    apply = folder_module._apply
+
+    def interrupted(*arguments: Any) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        apply(*arguments)
+
+    monkeypatch.setattr(folder_module, "_apply", interrupted)
+    assert main(["form", "hemisphere", "--out", "dome", "-q"]) == 143
+    assert capsys.readouterr().err == f"rodshell: interrupted: the new result in {Path('dome').resolve()} is complete\n"
+    assert sorted(os.listdir("dome")) == ["case.toml", "manifest.json"]
 
 
 def test_a_bug_shows_its_traceback(finder: FakeFinder) -> None:

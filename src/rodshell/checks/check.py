@@ -146,6 +146,7 @@ def check(
             missing.pop(0)
         if follow:
             deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
+            missing[0] = "whether the clamped shell is reached from flat"
             if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
                 turned = reached_by_turning(done["pinned"], done["clamped"])

@@ -1,6 +1,7 @@
 """`rodshell form`: the main job. Its options are the keys of the case file."""
 
 from dataclasses import replace
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,7 +95,7 @@ def run(
     inputs = read_inputs(case.to_toml())
     copies = kept_case(case.to_toml(), inputs, Path())[1]
     names = [*ARCHIVE, *copies, *reserved(kinds), *([SEARCH] if case.undecided else [])]
-    names += [f"{case.drape.frames}/{name}.npy" for name in NAMES] if case.drape.frames else []
+    names += [f"{escape(case.drape.frames)}/{name}.npy" for name in NAMES] if case.drape.frames else []
     with output_folder(out, name, names, force=force) as place:
         work = _sew if case.seams.lines else _form
         announce_compilation(quiet=quiet)

@@ -164,6 +164,10 @@ def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> P
         for name in place.kept:
             click.echo(f"rodshell: kept {place.path / name}: it was changed since an earlier run wrote it", err=True)
         return place.path
+    except KeyboardInterrupt:
+        if not place.committed:
+            raise
+        raise KeyboardInterrupt(f"the new result in {place.path} is complete") from None
     except ForeignFileError as error:
         names = (place.path.with_name(f"{place.path.name}-{k}") for k in count(2))
         free = next(path for path in names if not path.exists())

@@ -47,12 +47,14 @@ class ResultFolder:
     path : of the folder, absolute; stage : the hidden folder inside it, which is removed in the end.
     force : whether files that rodshell did not write may be replaced where it has to write.
     kept : after `commit`, files of an earlier result that somebody has changed since: they stay.
+    committed : whether the new result is in its place, also if the process was interrupted meanwhile.
     """
 
     path: Path
     stage: Path
     force: bool = False
     kept: tuple[str, ...] = field(default=(), init=False)
+    committed: bool = field(default=False, init=False)
 
     @property
     def new(self) -> Path:
@@ -118,6 +120,7 @@ class ResultFolder:
                 with _uninterrupted():
                     (self.stage / "record").replace(self.stage / RECORD)  # from here on the new result counts
                     _apply(self.path, self.stage)
+                    self.committed = True
         except OSError as error:
             if isinstance(error, OutputError):
                 raise
@@ -320,7 +323,10 @@ def _lock(path: Path, *, shared: bool = False, wait: bool = True) -> int | None:
     """
     if fcntl is None or not path.is_dir():
         return None
-    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:  # who may not list it will hear so from what needs it
+        return None
     try:
         fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB))
     except BaseException as error:
