@@ -64,6 +64,14 @@ def test_the_axes_are_geodesics_of_their_layers(name):
         assert np.abs(within).max() < 1e-9 * np.linalg.norm(turn, axis=1).max()
 
 
+def test_eccentricities_beyond_the_spacing_or_the_radius_are_refused():
+    with pytest.raises(rs.InputError, match="eccentricity 60 mm is larger than the spacing 30 mm"):
+        rs.chebyshev_net(rs.Hemisphere(R), LAYOUT, eccentricity=0.06)
+    dimple = rs.HeightField(formula=".2 - .5*(x^2 + y^2) - .01*exp(-(x^2 + y^2)/(2*.015^2))", domain=rs.Disc(R))
+    with pytest.raises(rs.InputError, match="radius of curvature is 23 mm, and half of the joints' eccentricity 25 mm"):
+        rs.chebyshev_net(dimple, rs.GridLayout.orthogonal(spacing=0.05, edge=0.005), eccentricity=0.05)
+
+
 def test_a_layered_net_is_found_alike_near_another_and_from_nothing():
     target = SURFACES["height field"]
     first = rs.chebyshev_net(target, TURNED)

@@ -26,7 +26,10 @@ def good() -> dict[str, Any]:
             **{key: {"utilisation": 0.4, "max_bending_strain": 0.004} for key in (*both, "pop_up", "deployment")},
         },
         "contact": {key: {"clearance": 0.2, "pairs": 0, "rods": ["U1", "U2"], "where": [0, 0, 0]} for key in both},
-        "self_weight": {"pinned": {"load_factor": 3.0, "deflection": 0.01}, "clamped": {"load_factor": None}},
+        "self_weight": {
+            "pinned": {"load_factor": 3.0, "deflection": 0.01, "limit": "bifurcation"},
+            "clamped": {"load_factor": None, "deflection": 0.001, "limit": "none"},
+        },
         "other_shapes": {"pinned": {"tried": 4, "found": []}, "clamped": {"tried": 4, "found": []}},
         "deployment": {"stages": [{"share": 0.0}, {"share": 0.5}, {"share": 1.0}], "snaps": [], "lost_at": None},
     }

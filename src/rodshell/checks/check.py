@@ -151,7 +151,8 @@ def check(
                 progress("deployment", "turning the ends into their clamps", 0.0)
                 turned = reached_by_turning(done["pinned"], done["clamped"])
             missing.pop(0)
-        for ends, one in _other_shapes(popped, settled, deployment, progress):
+        done_before = sum(one.factorizations for one in weighed.values())
+        for ends, one in _other_shapes(popped, settled, deployment, done_before, progress):
             others[ends] = one
     except OutOfTimeError as error:
         late = f"{error}; not checked: {', '.join(missing)}"
@@ -167,13 +168,13 @@ def check(
 
 def _other_shapes(
     popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None,
-    progress: Progress,
+    weighing: int, progress: Progress,
 ) -> Iterator[tuple[Ends, OtherShapes]]:  # fmt: skip
-    """Other stable shapes, with half of the factorisations that the shells and the deployment took.
+    """Other stable shapes, with half of the factorisations that the shells, their deployment and their `weighing` took.
 
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
-    done = sum(one.report.factorizations for one in popped.values())
+    done = weighing + sum(one.report.factorizations for one in popped.values())
     left = (done + (0 if deployment is None else deployment.factorizations)) // 2
     stable = [ends for ends, (_, at) in settled.items() if at.report.stable]
     for ends in stable:

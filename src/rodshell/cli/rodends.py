@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError
-from rodshell.units import parse_quantity, read_unit
+from rodshell.units import length_text, parse_quantity, read_unit
 
 COLUMNS = (
     "flat_x0", "flat_y0", "flat_x1", "flat_y1",
@@ -105,7 +105,7 @@ def read_result(folder: Path) -> RodEnds:
     Raises
     ------
     OutputError : the folder holds no result that can be read.
-    InputError : the result has no rods, or no shell in space.
+    InputError : the result has no rods, or no shell in space; its rods lie in two layers.
     """
     from rodshell.output.archive import SHELLS, read
     from rodshell.output.rods import rods_of
@@ -114,6 +114,12 @@ def read_result(folder: Path) -> RodEnds:
     if archive.result.get("patches"):
         raise InputError(
             f"{folder} holds patches, whose flat grids lie side by side: pop up a table of one patch's rods"
+        )
+    apart = (archive.result.get("drape") or {}).get("eccentricity")
+    if apart:
+        raise InputError(
+            f"{folder} holds rods in two layers {length_text(apart)} apart, and popup joins its rods at one point: "
+            "see the result's own deployment"
         )
     try:
         rods = rods_of(archive)

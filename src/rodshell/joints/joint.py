@@ -126,10 +126,10 @@ class Spring:
                 )
         _check_rest_angle(self.rest_angle)
         _check_eccentricity(self.eccentricity)
-        if self.eccentricity and not (self.out_of_plane and self.twist):
+        if self.eccentricity and not self.out_of_plane + self.twist > 0:
             raise InputError(
                 "rods that lie one above the other roll over each other where a spring resists neither: give an "
-                'eccentric spring an out-of-plane and a twist stiffness, or use kind = "pin", which is rigid in both'
+                'eccentric spring an out-of-plane or a twist stiffness, or use kind = "pin", which is rigid in both'
             )
         _check_mass(self.mass)
 

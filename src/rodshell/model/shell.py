@@ -88,11 +88,11 @@ class Shell:
 
         Parameters
         ----------
+        mesh : where joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
         rod : one for all, or one for each rod of the grid.
         clamped : each rod goes on to a ghost node past its end that holds its direction there. The end's
             Voronoi length is half its last edge, so that the clamp acts exactly at the end (second order). A rod
             may spin in its clamp.
-        mesh : where joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
         joint : one for all, or one for each crossing of the grid; ball joints without.
         coupling : shared DOFs without. Eccentric joints are tied by springs with any coupling.
         twist : carry twist angles; None: where any energy depends on them.

@@ -24,6 +24,7 @@ from rodshell.nets.cuts import Cut, Lines, cut_lines, extrapolated
 from rodshell.nets.lines import LatticeLines, find_lines, march_lines
 from rodshell.nets.reach import Covering
 from rodshell.targets import Target
+from rodshell.units import length_text
 
 Floats = NDArray[np.float64]
 
@@ -100,6 +101,11 @@ def chebyshev_net(
             f"the spacing {max(layout.spacing):g} m is larger than the target, which is {2 * target.size:g} m wide: "
             "use a smaller spacing"
         )
+    if eccentricity > min(layout.spacing):
+        raise InputError(
+            f"the joints' eccentricity {length_text(eccentricity)} is larger than the spacing "
+            f"{length_text(min(layout.spacing))}: check its unit"
+        )
     heights = (-0.5 * eccentricity, 0.5 * eccentricity) if eccentricity else ON_SURFACE
     for parts in SEARCHES:
         lines, rough = find_lines(target, layout, start, heading, near.net if near else None, parts, heights)
@@ -111,6 +117,8 @@ def chebyshev_net(
         raise InputError(
             f"the target bends too sharply for a spacing of {max(layout.spacing):g} m: use a smaller spacing"
         )
+    if eccentricity:
+        _require_room(target, fine, 0.5 * eccentricity)
     angle, where = _smallest_angle(fine)
     if degrees(angle) < SMALLEST_ANGLE:
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
@@ -146,6 +154,19 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
     n = target.on_surface(point).normal[0]
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])
     return point[0], np.array([*plan * n[2], -plan @ n[:2]])
+
+
+def _require_room(target: Target, net: Covering, height: float) -> None:
+    """Refuse layers beyond a centre of the target's curvature."""
+    points = net.points[net.inside]
+    curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
+    k = int(np.argmax(curvature))
+    if height * curvature[k] >= 1.0:
+        x, y, z = np.where(np.abs(points[k]) < 1e-6 * target.size, 0.0, points[k])
+        raise InputError(
+            f"near ({x:.4g}, {y:.4g}, {z:.4g}) m the target's radius of curvature is {length_text(1 / curvature[k])}, "
+            f"and half of the joints' eccentricity {length_text(height)}: use a smaller eccentricity or a larger target"
+        )
 
 
 def _hole(net: Covering) -> NetLimitError:

@@ -121,8 +121,8 @@ def _checked(result: dict[str, Any]) -> list[str]:
     of = (result.get("bending") or {}).get("strength_of")
     strength = f"{of}'s bending strength" if of else "the strength"
     for place, bent in result.get("bending", {}).items():
-        if place == "pop_up" and unknown >= 1:
-            continue
+        if place == "deployment" or (place == "pop_up" and unknown >= 1):
+            continue  # the first is part of the second
         if isinstance(bent, dict) and bent.get("min_radius") is not None:
             name = "way up" if place == "pop_up" else place
             line = f"  bending   {name:<8}smallest radius {mm(bent['min_radius'])}{_curved(bent, mm)}"

@@ -198,11 +198,12 @@ def _open_points(result: Result, usable: list[str]) -> Iterator[str]:
 
 
 def _weight(result: Result, usable: list[str]) -> Iterator[str]:
-    """Shells that cannot stand; `load_factor` is null above 100."""
-    borne = {ends: entry["load_factor"] for ends, entry in entries(result, "self_weight").items() if ends in usable}
+    """Shells that cannot stand; what is not known of them is among a result's warnings."""
+    borne = {ends: entry for ends, entry in entries(result, "self_weight").items() if ends in usable}
     if set(borne) != set(usable):
         yield "whether it bears its own weight was not checked"
-    weak = {ends: factor for ends, factor in borne.items() if factor is not None and factor < 1}
+    factors = {ends: entry["load_factor"] for ends, entry in borne.items()}
+    weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
     if weak:
         each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
         yield f"it bears only {each}: it does not stand unless it is held, braced or made of stiffer rods"
@@ -240,7 +241,7 @@ def _width(result: Result) -> float:
 
 def _merits(result: Result, usable: list[str]) -> Iterator[str]:
     """Why a result is good."""
-    borne = [entry["load_factor"] for key, entry in entries(result, "self_weight").items() if key in usable]
+    borne = [entries(result, "self_weight")[ends]["load_factor"] for ends in usable]
     least = min((factor for factor in borne if factor is not None), default=None)
     weight = "over 100" if least is None else f"{'at least ' if len(usable) > 1 else ''}{rounded(least)}"
     best = _best(result, usable)

@@ -27,7 +27,7 @@ _SENTENCES = {
     Status.DIVERGED: "the iteration diverged; reduce the spacing, or choose another anchor or heading",
     Status.SLID_OFF: "the grid slid off the target (nothing holds it there without friction); use method = bound",
     Status.BUCKLED: "was given up at its start: released from the target, the rods would buckle between their joints "
-    "in very many places; rods with less of a strong axis, a smaller spacing or a flatter target may do",
+    "in very many places; a smaller spacing, a flatter target or, of laths, narrower ones may do",
     Status.OUT_OF_TIME: "was out of time",
     Status.MOVING: "was not at rest when its time was over; give it a longer duration, or drag",
 }
