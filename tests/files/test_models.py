@@ -169,8 +169,8 @@ def test_rhino_model_has_layers_names_and_user_text(tmp_path: Path) -> None:
     for item, rod in zip(by_layer["CUT"], plan.rods, strict=True):
         length = float(item.Attributes.GetUserString("cut_length_mm"))
         ends = item.Geometry.PointAtStart, item.Geometry.PointAtEnd
-        assert ends[0].DistanceTo(ends[1]) == pytest.approx(length, abs=1e-3)
-        assert length == pytest.approx(1e3 * rod.cut_length, abs=1e-3)
+        assert ends[0].DistanceTo(ends[1]) == pytest.approx(1e3 * rod.cut_length, abs=1e-6)
+        assert length == pytest.approx(1e3 * rod.cut_length, abs=0.501 * plan.rounding.step)
     assert len(by_layer["MARK"]) == 2 * len(plan.joints)
 
 

@@ -13,7 +13,7 @@ Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
 CLOSE = 5  # places that are tried on a label's own line
-STEPS, TURNS = 16, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # beside it
+STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # beside it
 THIN = 0.1  # what a line takes, over the size of its text
 
 

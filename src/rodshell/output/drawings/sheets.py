@@ -22,7 +22,7 @@ FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the
 MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
 LEADING = 1.9 * FINE  # from line to line of a table
 OVERLAP = 10.0  # mm of paper that a sheet shows beyond its match lines
-MOST_TILES = 12  # sheets that a true-size plan may take
+MOST_TILES = 12  # sheets that the parts of one drawing may take
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,10 @@ def parts(compose: Compose, paper: tuple[float, float], whole: Sheet, *, true_si
     """
     bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
     possible = [one for one in SCALES if one < whole.scale and _tiles(bare / one, paper).prod() <= MOST_TILES]
-    if true_size and 1 in possible:
-        possible = [1]
-    elif not whole.content.left_out:
+    best = list(tiled(compose, paper)) if true_size and 1 in possible else []
+    if best or not whole.content.left_out:
+        yield from best
         return
-    best: list[Sheet] = []
     for scale in reversed(possible):
         best = list(tiled(compose, paper, scale)) or best
         if best and not best[0].content.left_out:
