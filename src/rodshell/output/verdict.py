@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from rodshell.output.rounding import rounding_of
 from rodshell.output.wording import millimetres, percent, place, rounded, stage
 
 Level = Literal["good", "check", "unbuildable"]
@@ -133,8 +134,8 @@ def _contact_faults(result: Result, shape: str) -> Iterator[str]:
     who = f"{first} and {second} overlap" if first != second else f"{first} runs into itself"
     worst = f"{touching['pairs']} pairs of rods touch or cross, worst: " if touching["pairs"] > 1 else "rods touch: "
     yield (
-        f"{_shape(shape, touching)} {worst}{who} by {millimetres(-touching['clearance'])} near "
-        f"({place(touching['where'])}): use thinner rods (rod.section) or a larger spacing"
+        f"{_shape(shape, touching)} {worst}{who} by {_mm(result, -touching['clearance'])} near "
+        f"({place(touching['where'], rounding_of(result))}): use thinner rods (rod.section) or a larger spacing"
     )
 
 
@@ -142,7 +143,7 @@ def _fibre_faults(result: Result, shape: str) -> Iterator[str]:
     """Stress above the strength, strain beyond thin rods."""
     bent = entries(result, "bending").get(shape) or {}
     used, strain = bent.get("utilisation"), bent.get("max_bending_strain")
-    where = f" in {bent['rod']}, {millimetres(bent['at'])} from its start" if bent.get("rod") else ""
+    where = f" in {bent['rod']}, {_mm(result, bent['at'])} from its start" if bent.get("rod") else ""
     if used is not None and used > 1:
         share = f"{max(101, round(100 * used))} % of their strength"  # never 100 % of what breaks
         yield f"{_shape(shape, bent)} the rods would break: {share}{where}"
@@ -171,13 +172,13 @@ def _best(result: Result, usable: list[str]) -> tuple[str, Mapping[str, Any]] | 
 def _off_words(result: Result, best: tuple[str, Mapping[str, Any]]) -> str:
     """How far off the best shell is; with clamped ends a convex shell keeps to the target, and dips are the cause."""
     ends, gap = best
-    where = f", near ({place(gap['where'])})" if gap.get("where") else ""
+    where = f", near ({place(gap['where'], rounding_of(result))})" if gap.get("where") else ""
     drape = result.get("drape") or {}
     known = drape.get("method") != "bound" or (drape.get("strong_bending") or {}).get("beyond", 0.0) > 0
     dips = ends == "clamped" and not known
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
     return (
-        f"with {ends} ends, the best that was asked for, the shell is off the target by {millimetres(gap['max'])} "
+        f"with {ends} ends, the best that was asked for, the shell is off the target by {_mm(result, gap['max'])} "
         f"({percent(gap['max_relative'])} of its size){where}{advice}"
     )
 
@@ -251,7 +252,12 @@ def _merits(result: Result, usable: list[str]) -> Iterator[str]:
         else ""
     )
     yield f"with {' and '.join(usable)} ends the shell is stable and bears {weight} times its own weight{near}"
-    yield "no other load than its own weight was checked: neither snow, wind nor people"
+    yield "no other load than its own weight was checked, neither snow, wind nor people; nor were imperfections"
+
+
+def _mm(result: Result, metres: float) -> str:
+    """A length as fine as on the drawings."""
+    return millimetres(metres, rounding=rounding_of(result))
 
 
 def _gaps(result: Result) -> Iterator[str]:
@@ -267,7 +273,7 @@ def _gaps(result: Result) -> Iterator[str]:
     for ends in known:
         size = gaps[ends].get("max_relative")
         share = "" if size is None else f" ({percent(size)} of its size)"
-        yield f"With {ends} ends the shell stays within {millimetres(gaps[ends]['max'])} of the target{share}."
+        yield f"With {ends} ends the shell stays within {_mm(result, gaps[ends]['max'])} of the target{share}."
     if set(known) == set(ENDS) and not any(faults.values()):
         yield from _advice(gaps["clamped"], gaps["pinned"])
     elif faults and not result.get("target"):
