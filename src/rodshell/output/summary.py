@@ -120,7 +120,8 @@ def _checked(result: dict[str, Any]) -> list[str]:
     lines, unknown, mm = [], unknown_below(result), _lengths(result)
     of = (result.get("bending") or {}).get("strength_of")
     strength = f"{of}'s bending strength" if of else "the strength"
-    for place, bent in result.get("bending", {}).items():
+    flat = (result.get("target") or {}).get("flat")
+    for place, bent in ({} if flat else result.get("bending", {})).items():
         if place == "deployment" or (place == "pop_up" and unknown >= 1):
             continue  # the first is part of the second
         if isinstance(bent, dict) and bent.get("min_radius") is not None:

@@ -20,6 +20,7 @@ WORDS: dict[Level, str] = {"good": "Good", "check": "Check", "unbuildable": "Not
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
+FLAT = "the target is flat, nothing pops up"
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
 LARGE = 1.0  # m; a wider shell is built by people who have to know whether the rods hold
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
@@ -68,7 +69,8 @@ def verdict(result: Result) -> Verdict:
     deployment = [*_fibre_faults(result, "deployment"), *_contact_faults(result, "deployment")]
     grave = [sentence for found in faults.values() for sentence in found] + deployment
     if (result.get("target") or {}).get("flat"):
-        return Verdict("unbuildable", ("the target is flat, nothing pops up",))
+        said = [str(word) for word in result.get("warnings") or [] if str(word).startswith(FLAT)]
+        return Verdict("unbuildable", (*(said or [FLAT]),))
     if not shells:
         status = result.get("status", "unknown")
         why = "there is no pop-up in this result" if status == "converged" else f"it did not converge: {status}"

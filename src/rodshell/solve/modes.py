@@ -61,9 +61,11 @@ def softest_modes(solver: LinearSolver, free: Freedom, mass: Floats, count: int)
 
     By subspace iteration, which is enough for directions to look in: the last one's s may be a quarter too high.
 
-    mass : (n, 3) lumped mass of each component.
+    mass : (n, 3) lumped mass of each component, which may be 0; where all are, modes are those of equal masses.
     """
     root = np.sqrt(free.reduce_diagonal(mass))
+    if not root.any():
+        root = np.ones(free.size)
     count = min(count, free.size)
     basis = np.random.default_rng(0).standard_normal((free.size, min(count + 2, free.size)))
     for _ in range(SWEEPS):
@@ -71,4 +73,5 @@ def softest_modes(solver: LinearSolver, free: Freedom, mass: Floats, count: int)
         image = np.column_stack([root * solver.solve(root * column) for column in basis.T])
         softness, turn = np.linalg.eigh(basis.T @ image)
         basis = image @ turn[:, np.argsort(-softness)]
-    return [free.expand(column / root) for column in basis.T[:count]]
+    # the same as column / root, up to a factor, where there is mass
+    return [free.expand(solver.solve(root * column)) for column in basis.T[:count]]
