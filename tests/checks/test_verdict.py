@@ -31,7 +31,14 @@ def good() -> dict[str, Any]:
             "clamped": {"load_factor": None, "deflection": 0.001, "limit": "none"},
         },
         "other_shapes": {"pinned": {"tried": 4, "found": []}, "clamped": {"tried": 4, "found": []}},
-        "deployment": {"stages": [{"share": 0.0}, {"share": 0.5}, {"share": 1.0}], "snaps": [], "lost_at": None},
+        "deployment": {
+            "stages": [{"share": 0.0}, {"share": 0.5}, {"share": 1.0}],
+            "snaps": [],
+            "lost_at": None,
+            "guided": None,
+            "reached_from_flat": True,
+            "clamped": {"reached_from_flat": True},
+        },
     }
 
 
@@ -110,7 +117,14 @@ def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]]
      ([("deployment", MISSING)], "reached from flat was not checked: "),
      ([("other_shapes.clamped.found", [{"distance": 0.49, "energy": 1.16, "mirror": False}])],
       "another stable shape, 49 % of its size away at 1.16 times the energy"),
-     ([("bending", {})], "no strength was given"),
+     ([("bending.strength", None)], "no strength was given"),
+     ([("contact", MISSING)], "whether rods touch and are thin enough for their bends was not checked"),
+     ([("bending.clamped.max_bending_strain", None)], "rod.section.fibre_distances"),
+     ([("agreement.pinned", MISSING)], "how near the shell comes to the target was not checked"),
+     ([("deployment.clamped.reached_from_flat", None)], "whether the clamped shape is reached from the pinned one"),
+     ([("bending.strength_of", "larch"), ("bending.pinned.utilisation", 0.99)], "permanently use 99 %"),
+     ([("deployment", MISSING), ("status", "out of time after 3 s: not checked: the deployment from flat"),
+       ("warnings", ["out of time after 3 s: not checked: the deployment from flat"])], "was not checked"),
      ([("pop_up.pinned.stable", None)], "stable was not checked"),
      ([("status", "out of time after 10 s: checks are missing")], "not complete: out of time"),
      ([("warnings", ["the smallest angle is 14 degrees"])], "the smallest angle is 14 degrees")],
@@ -126,7 +140,9 @@ def test_what_has_to_be_looked_at_first(changes: list[tuple[str, Any]], words: s
     [[("other_shapes.clamped.found", [{"distance": 0.7, "energy": 1.1, "mirror": False}])],
      [("other_shapes.clamped.found", [{"distance": 0.3, "energy": 1.6, "mirror": False}])],
      [("other_shapes.clamped.found", [{"distance": 0.3, "energy": 1.0, "mirror": True}])],
-     [("bending", {}), ("boundary", [[0.0, 0.0, 0.0], [0.9, 0.9, 0.0]])],
+     [("bending.strength", None), ("boundary", [[0.0, 0.0, 0.0], [0.9, 0.9, 0.0]])],
+     [("bending.strength_of", "larch"), ("bending.deployment.utilisation", 0.99)],
+     [("bending.pinned.utilisation", 0.99)],
      [("agreement.pinned.max_relative", 0.5)],
      [("bending.pinned.utilisation", 1.0)]],
 )  # fmt: skip
@@ -148,11 +164,44 @@ def test_the_verdict_of_a_result_is_the_one_that_it_holds() -> None:
 
 
 def test_supports_are_recommended_only_where_both_can_be_used() -> None:
-    advice = "gains little here: pinned supports will do"
+    advice = "gain little here: pinned ones will do"
     near = changed(("agreement.pinned", {"max": 0.003, "max_relative": 0.0015}))
     assert any(advice in fact for fact in facts(near))
     far = changed(("agreement.pinned", {"max": 0.531, "max_relative": 0.26}),
                   ("agreement.clamped", {"max": 0.53, "max_relative": 0.26}))  # fmt: skip
     assert not any(advice in fact for fact in facts(far))
     near["pop_up"]["pinned"]["stable"] = False
-    assert not any(advice in fact or "worth it" in fact for fact in facts(near))
+    assert not any(advice in fact or "of the gap that" in fact for fact in facts(near))
+
+
+def test_what_was_not_reached_in_time_is_said_once_and_without_advice() -> None:
+    late = "out of time after 3 s in stage deployment; not checked: the deployment from flat"
+    found = verdict(changed(("deployment", MISSING), ("status", late), ("warnings", [late])))
+    assert found.level == "check"
+    assert sum(late in reason for reason in found.reasons) == 1
+    assert not any("checks.stages" in reason for reason in found.reasons)
+
+
+def test_without_a_pinned_shell_the_deployment_is_not_blamed_on_options() -> None:
+    found = verdict(changed(("deployment", MISSING), ("pop_up.pinned.status", "stalled")))
+    assert any("not checked, since the pinned shell was not found" in reason for reason in found.reasons)
+    assert not any("checks.stages" in reason or "no strength" in reason for reason in found.reasons)
+
+
+def test_no_more_than_a_lower_bound_is_made_of_a_path_that_was_lost() -> None:
+    lost = {"load_factor": 0.12, "deflection": None, "limit": "not followed"}
+    words = "with pinned ends the shell bears at least 12 % of its own weight; above, its path could not be followed"
+    found = verdict(changed(("self_weight.pinned", lost), ("warnings", [words])))
+    assert found.reasons == (words,)
+
+
+def test_dips_are_no_cause_where_joints_hold_the_net() -> None:
+    gaps = {ends: {"max": 2 * off, "max_relative": off} for ends, off in (("pinned", 0.04), ("clamped", 0.03))}
+    bound = ("drape", {"method": "bound"})
+    off = [verdict(changed(("agreement", gaps), bound, ("joint", {"kind": kind}))) for kind in ("pin", "rigid")]
+    assert ["dips and ridges" in found.headline for found in off] == [True, False]
+
+
+def test_guiding_is_no_part_of_what_is_known_of_the_strength() -> None:
+    (said,) = [fact for fact in facts(changed(("deployment.guided", [0.77, 1.0]))) if "strength" in fact]
+    assert said.endswith("what guiding the shell from 77 % to 100 % of the way asks of them is not known.")

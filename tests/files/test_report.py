@@ -187,7 +187,7 @@ def test_no_more_is_said_of_the_way_up_than_was_followed(
     page = page_of(made, tmp_path).read_text()
     assert f"<figcaption>{note}" in page
     assert re.findall(r">(on the way up[^<]*)</th>", page) == ([head] if head else [])
-    lines = [line for line in made.summary().splitlines() if line.startswith("  bending   way up")]
+    lines = [line for line in made.summary().splitlines() if line.startswith("  bending   stages")]
     assert len(lines) == (head is not None)
     assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)  # as the warning has it
 
@@ -195,9 +195,10 @@ def test_no_more_is_said_of_the_way_up_than_was_followed(
 def test_a_way_up_that_nobody_followed_is_not_included() -> None:
     made = with_way(0.32, None, [])
     result = {key: value for key, value in made.result.items() if key != "deployment"}
-    del result["bending"]["pop_up"]
+    for stages in ("pop_up", "deployment"):
+        del result["bending"][stages]
     assert facts(result)[-1].endswith("in the final shape; the deployment from flat was not followed.")
-    assert "way up" not in replace(made, result=result).summary()
+    assert "bending   stages" not in replace(made, result=result).summary()
 
 
 @pytest.mark.parametrize(
@@ -273,7 +274,7 @@ def test_the_page_says_that_the_fewest_bars_are_a_bound(tmp_path: Path) -> None:
 
 def test_a_grid_that_rests_on_its_target_tells_depth_and_not_gap() -> None:
     made = archive("dome")
-    assert "s, gap 0 mm, " in made.summary()
+    assert "factorisations, gap 0 mm, " in made.summary()
     assert ("largest gap", "0.00 mm") not in _drape_rows(made, "gravity")
     for method, word in (("bound", "largest gap"), ("gravity", "deepest inside the target")):
         assert word in [title for title, _ in _drape_rows(made, method)]

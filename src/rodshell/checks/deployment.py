@@ -105,9 +105,12 @@ class Deployment:
                 "it has to be guided into its final shape"
             )
         if self.lost_at is not None:
+            below = (
+                "at all" if len(self.shells) <= 1 else f"below {_percent(self.lost_at)} of the way: stages are missing"
+            )
             words.append(
-                f"the way from flat could not be followed below {_percent(self.lost_at)}: stages are missing, and "
-                "whether the shell reaches its final shape from flat is not known"
+                f"the deployment from flat could not be followed {below}, and whether the shell reaches its final "
+                "shape from flat is not known"
             )
         return tuple(words)
 

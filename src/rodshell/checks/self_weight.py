@@ -94,8 +94,8 @@ def unknown_weights(found: Mapping[Ends, SelfWeight]) -> tuple[str, ...]:
             "give rod.section.mass",
         )
     return tuple(
-        f"with {ends} ends the shell bears at least {one.load_factor:.2g} of its own weight; above, its path could not "
-        "be followed, and nothing is known"
+        f"with {ends} ends the shell bears at least {_share(one.load_factor or 0.0)} its own weight; above, its path "
+        "could not be followed, and nothing is known"
         for ends, one in found.items()
         if one.limit == "not followed"
     )
@@ -107,3 +107,7 @@ def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
     sunk = [one.deflection for one in parts]
     deflection = None if None in sunk else max(one for one in sunk if one is not None)
     return SelfWeight(least.load_factor, deflection, least.limit, sum(one.factorizations for one in parts))
+
+
+def _share(factor: float) -> str:
+    return f"{100 * factor:.2g} % of" if factor < 1 else f"{factor:.3g} times"

@@ -118,7 +118,8 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
     """What was checked, for each kind of ends and on the way up: `columns` and `rows` of (title, values)."""
     bent, held = result.get("bending") or {}, result.get("reactions") or {}
     unknown = unknown_below(result)
-    columns = [key for key in (*ENDS, "pop_up") if key in bent and (key in ENDS or unknown < 1)]
+    stages = "deployment" if "deployment" in bent else "pop_up"  # the second with the final shape
+    columns = [key for key in (*ENDS, stages) if key in bent and (key in ENDS or unknown < 1)]
     rows, rounding = list[tuple[str, list[str]]](), rounding_of(result)
     of = bent.get("strength_of")
     for title, key, show in _BENDING:
@@ -127,7 +128,7 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
             title = f"Utilisation of {of}'s strength" if of and key == "utilisation" else title
             rows.append((title, [_shown(show, value, rounding) for value in values]))
     met = result.get("contact") or {}
-    near = [(met.get("deployment" if column == "pop_up" else column) or {}).get("clearance") for column in columns]
+    near = [(met.get("deployment" if column == stages else column) or {}).get("clearance") for column in columns]
     if any(clear is not None for clear in near):
         shown = [_shown(wording.millimetres, clear, rounding) for clear in near]
         rows.append(("Clearance of the nearest rods", shown))
@@ -136,7 +137,7 @@ def checks_table(result: Mapping[str, Any]) -> dict[str, Any] | None:
         if any(value is not None for value in values):
             rows.append((title, [_shown(show, value, rounding) for value in values]))
     way = f"on the way up above {wording.stage(unknown)}" if unknown else "on the way up"
-    heads = [way if column == "pop_up" else column for column in columns]
+    heads = [way if column == stages else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None
 
 

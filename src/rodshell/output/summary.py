@@ -10,6 +10,7 @@ from rodshell.output.wording import NAMES, case_rows, millimetres, percent, roun
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
 
+STAGES = ("pop_up", "deployment")  # of the deployment: with the final shape, and without
 STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
 
 
@@ -31,7 +32,6 @@ def summary_text(result: dict[str, Any]) -> str:
     if drape := result.get("drape"):
         work = sum(level["factorizations"] for level in drape["levels"])
         line = f"  drape     {drape['method']}: {drape['dofs']} unknowns, {work} factorisations, "
-        line += f"{drape['seconds']:.2f} s, "
         gap = "gap" if drape["method"] == "bound" else "deepest node inside by"
         line += f"{gap} {mm(drape['max_gap'])}, strain {drape['max_strain']:.1e}, "
         lines.append(line + f"negative modes {drape['negative_modes']}")
@@ -39,7 +39,7 @@ def summary_text(result: dict[str, Any]) -> str:
             lines.append(f"            drape against net, rod ends: max {mm(own['max'])}, median {mm(own['median'])}")
     for ends, shell in result.get("pop_up", {}).items():
         state = "stable, unloaded" if shell["stable"] else shell["status"] + ", NOT STABLE"
-        line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations, {shell['seconds']:.2f} s"
+        line = f"  pop-up    {ends:<8}{state}, {shell['factorizations']} factorisations"
         if gap := result.get("agreement", {}).get(ends):
             line += f"; gap max {mm(gap['max'])} ({percent(gap['max_relative'])}), "
             line += f"rms {mm(gap['rms'])} ({percent(gap['rms_relative'])})"
@@ -122,10 +122,12 @@ def _checked(result: dict[str, Any]) -> list[str]:
     strength = f"{of}'s bending strength" if of else "the strength"
     flat = (result.get("target") or {}).get("flat")
     for place, bent in ({} if flat else result.get("bending", {})).items():
-        if place == "deployment" or (place == "pop_up" and unknown >= 1):
-            continue  # the first is part of the second
+        if place == "pop_up" and "deployment" in result["bending"]:
+            continue  # the same with the final shape
+        if place in STAGES and unknown >= 1:
+            continue
         if isinstance(bent, dict) and bent.get("min_radius") is not None:
-            name = "way up" if place == "pop_up" else place
+            name = "stages" if place in STAGES else place
             line = f"  bending   {name:<8}smallest radius {mm(bent['min_radius'])}{_curved(bent, mm)}"
             if bent.get("max_stress") is not None:
                 line += f", largest stress {stress(bent['max_stress'])}"
@@ -133,7 +135,7 @@ def _checked(result: dict[str, Any]) -> list[str]:
                 line += f" (torsion alone {stress(bent['torsion_stress'])})"
             if bent.get("utilisation") is not None:
                 line += f", {percent(bent['utilisation'])} of {strength}"
-            if place == "pop_up" and unknown:
+            if place in STAGES and unknown:
                 line += f"; unknown below {stage(unknown)} of it"
             lines.append(line)
     least = " (weakest patch, its seam held)" if result.get("patches") else ""

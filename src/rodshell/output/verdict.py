@@ -20,6 +20,7 @@ WORDS: dict[Level, str] = {"good": "Good", "check": "Check", "unbuildable": "Not
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
+RESERVED = 0.5  # share of a preset's strength, characteristic and short-term, that a shell may use for good
 FLAT = "the target is flat, nothing pops up"
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
 LARGE = 1.0  # m; a wider shell is built by people who have to know whether the rods hold
@@ -176,28 +177,52 @@ def _off_words(result: Result, best: tuple[str, Mapping[str, Any]]) -> str:
     ends, gap = best
     where = f", near ({place(gap['where'], rounding_of(result))})" if gap.get("where") else ""
     drape = result.get("drape") or {}
-    known = drape.get("method") != "bound" or (drape.get("strong_bending") or {}).get("beyond", 0.0) > 0
-    dips = ends == "clamped" and not known
+    buckles = (drape.get("strong_bending") or {}).get("beyond", 0.0) > 0
+    holds = (result.get("joint") or {}).get("kind", "ball") not in ("ball", "pin")  # against the net's shear
+    dips = ends == "clamped" and drape.get("method") == "bound" and not buckles and not holds
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
     return (
-        f"with {ends} ends, the best that was asked for, the shell is off the target by {_mm(result, gap['max'])} "
+        f"with {ends} ends, the best that can be used, the shell is off the target by {_mm(result, gap['max'])} "
         f"({percent(gap['max_relative'])} of its size){where}{advice}"
     )
 
 
 def _open_points(result: Result, usable: list[str]) -> Iterator[str]:
-    """What has to be looked at although the shell can be built."""
-    if result.get("status", "converged") != "converged" and all(
-        shell.get("status", "converged") == "converged" for shell in entries(result, "pop_up").values()
-    ):
-        yield f"the job is not complete: {result['status']}"
-    if any(result["pop_up"][ends].get("stable") is None for ends in usable):
+    """What has to be looked at although the shell can be built, and what is not known; more is among the warnings."""
+    shells, warnings = entries(result, "pop_up"), [str(word) for word in result.get("warnings") or []]
+    status = str(result.get("status", "converged"))
+    stopped = any(shell.get("status", "converged") != "converged" for shell in shells.values())
+    if status != "converged" and not stopped and not any(word in status for word in warnings):
+        yield f"the job is not complete: {status}"
+    if any(shells[ends].get("stable") is None for ends in usable):
         yield "whether the shell is stable was not checked"
     yield from _weight(result, usable)
-    yield from _from_flat(result)
+    yield from _from_flat(result, usable, late=status != "converged")
     yield from _other_shapes(result, usable)
-    if utilisation(result) is None and _width(result) > LARGE:
-        yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
+    yield from _rods(result, usable)
+    if result.get("target") and not set(usable) <= set(entries(result, "agreement")):
+        yield "how near the shell comes to the target was not checked"
+
+
+def _rods(result: Result, usable: list[str]) -> Iterator[str]:
+    """Whether rods hold and pass each other."""
+    bent, met = result.get("bending") or {}, entries(result, "contact")
+    if any(ends not in met or (bent.get(ends) or {}).get("max_bending_strain") is None for ends in usable):
+        yield (
+            "whether rods touch and are thin enough for their bends was not checked; a given section needs "
+            "rod.section.fibre_distances for that"
+        )
+    if bent.get("strength") is None:
+        if _width(result) > LARGE:
+            yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
+        return
+    name = bent.get("strength_of")
+    used = max(((bent.get(ends) or {}).get("utilisation") or 0.0 for ends in usable), default=0.0)
+    if name and used > RESERVED:
+        yield (
+            f"the rods permanently use {percent(used)} of {name}'s strength, which is characteristic and short-term: "
+            "reduce it for duration and moisture and give what is left as checks.strength, or use thinner rods"
+        )
 
 
 def _weight(result: Result, usable: list[str]) -> Iterator[str]:
@@ -205,20 +230,27 @@ def _weight(result: Result, usable: list[str]) -> Iterator[str]:
     borne = {ends: entry for ends, entry in entries(result, "self_weight").items() if ends in usable}
     if set(borne) != set(usable):
         yield "whether it bears its own weight was not checked"
-    factors = {ends: entry["load_factor"] for ends, entry in borne.items()}
+    factors = {ends: one["load_factor"] for ends, one in borne.items() if one.get("limit") != "not followed"}
     weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
     if weak:
         each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
         yield f"it bears only {each}: it does not stand unless it is held, braced or made of stiffer rods"
 
 
-def _from_flat(result: Result) -> Iterator[str]:
-    """What its deployment leaves open is among a result's warnings."""
-    if not result.get("deployment"):
-        yield (
-            "whether the shell is reached from flat was not checked: that takes pinned ends (pop_up.ends) and "
-            "checks.stages above 0"
-        )
+def _from_flat(result: Result, usable: list[str], *, late: bool) -> Iterator[str]:
+    """Whether it was looked at; what was found there is among a result's warnings."""
+    shells, way = entries(result, "pop_up"), result.get("deployment")
+    if not way:
+        remedy = "" if late else ": that takes pinned ends (pop_up.ends) and checks.stages above 0"
+        failed = shells.get("pinned", {}).get("status", "converged") != "converged"
+        why = ", since the pinned shell was not found" if failed else remedy
+        yield f"whether the shell is reached from flat was not checked{why}"
+    elif (
+        "clamped" in usable
+        and way.get("reached_from_flat")
+        and (way.get("clamped") or {}).get("reached_from_flat") is None
+    ):
+        yield "whether the clamped shape is reached from the pinned one by turning the ends is not known"
 
 
 def _other_shapes(result: Result, usable: list[str]) -> Iterator[str]:
@@ -275,7 +307,7 @@ def _gaps(result: Result) -> Iterator[str]:
     for ends in known:
         size = gaps[ends].get("max_relative")
         share = "" if size is None else f" ({percent(size)} of its size)"
-        yield f"With {ends} ends the shell stays within {_mm(result, gaps[ends]['max'])} of the target{share}."
+        yield f"With {ends} ends the largest gap to the target is {_mm(result, gaps[ends]['max'])}{share}."
     if set(known) == set(ENDS) and not any(faults.values()):
         yield from _advice(gaps["clamped"], gaps["pinned"])
     elif faults and not result.get("target"):
@@ -286,12 +318,10 @@ def _advice(clamped: Mapping[str, Any], pinned: Mapping[str, Any]) -> Iterator[s
     """Which support is worth it, of two that can both be used."""
     relative = pinned.get("max_relative")
     if clamped["max"] < MUCH_LESS * pinned["max"] and (relative is None or relative > NEGLIGIBLE):
-        yield (
-            "A support that holds the rod's direction (clamped) is worth it: it leaves "
-            f"{percent(clamped['max'] / pinned['max'])} of the gap left by one that is free to turn (pinned)."
-        )
+        share = percent(clamped["max"] / pinned["max"])
+        yield f"Supports that hold the rods' directions (clamped) leave {share} of the gap that pinned ones leave."
     elif relative is None or relative <= OFF:
-        yield "A support that holds the rod's direction (clamped) gains little here: pinned supports will do."
+        yield "Supports that hold the rods' directions (clamped) gain little here: pinned ones will do."
 
 
 def _strength(result: Result) -> Iterator[str]:
@@ -311,6 +341,13 @@ def _known(result: Result, unknown: float) -> str:
         return "in the final shape; nothing is known of the deployment, which could not be followed."
     if unknown:
         return f"in the final shape and above {stage(unknown)} of the deployment; below, nothing is known of it."
-    if (result.get("deployment") or {}).get("snaps"):
+    way = result["deployment"]
+    if way.get("guided"):
+        low, high = (stage(share) for share in way["guided"])
+        return (
+            f"in the final shape and the stages of the deployment; what guiding the shell from {low} to {high} of the "
+            "way asks of them is not known."
+        )
+    if way.get("snaps"):
         return "in the final shape and the stages of the deployment; what a snap asks of them is not known."
     return "deployment included."
