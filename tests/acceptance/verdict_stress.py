@@ -79,7 +79,7 @@ def contact_rows() -> Iterator[Row]:
         assert bent is not None
         expected = radius * _sharpest(form.popped["pinned"])
         off, note = 100 * abs(float(bent.max()) / expected - 1), f"{100 * bent.max():.2g} %"
-        said = any("too thick" in word for word in checks.warnings)
+        said = any("too thick" in word for word in form.verdict.reasons)
         case = f"{2e3 * radius:.0f} mm rods on the hemisphere"
         yield Row(case, "bending strain off r over radius", off, 2, "%", note)
         yield Row(case, "strain beyond thin rods said wrongly", float(said != (expected > THIN)), 0)
@@ -138,7 +138,7 @@ def strength_rows() -> Iterator[Row]:
         used = result["bending"]["pinned"]["utilisation"]
         case = f"laths, strength {share:g} of the stress"
         yield Row(case, "utilisation off", abs(used * share - 1), 1e-6, "", f"{100 * used:.0f} %")
-        words = [word for word in result["warnings"] if "would break" in word]
+        words = [word for word in result["verdict"]["reasons"] if "would break" in word and "ends" in word]
         said = len(words) == 1 and says in words[0] if says else not words
         yield Row(case, "said wrongly", float(not said), 0)
     given = rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=0.7))
