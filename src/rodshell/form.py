@@ -85,7 +85,7 @@ class Form(_Judged, FoundForm):
             case_toml = case_text(
                 self.target, self.layout, self.rod, joint=self.joint,
                 method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
-                fall=draped.fall, takeaway=takeaway,
+                fall=draped.fall, ends=self.ends, takeaway=takeaway,
             )  # fmt: skip
         return _archive(self, form_states(self), case_toml, takeaway, progress, inputs)
 
@@ -151,7 +151,9 @@ class Sewn(_Judged, SewnForm):
         """All patches as one: everything that is kept, checked and made ready to be built; see `Form.archive`."""
         takeaway = takeaway or Takeaway()
         if case_toml is None:
-            case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+            case_toml = case_text(
+                self.target, self.layout, self.rod, joint=self.joint, ends=self.ends, takeaway=takeaway, sewn=self
+            )
         takeaway.require_known_stress(self.rod, self.joint)
         weight = takeaway.judged_by(self.rod).shear_weight
         checks = joined_checks(

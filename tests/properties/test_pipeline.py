@@ -288,6 +288,22 @@ def test_save_and_read_give_back_every_number(form, tmp_path):
     assert kept.case_toml == form.archive().case_toml
 
 
+@pytest.mark.parametrize("ends", [("pinned",), ("clamped",), ("pinned", "clamped")])
+def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
+    from rodshell.case import load_case
+
+    target, layout = rs.Hemisphere(SIZE), rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
+    whole, sewn = (
+        rs.find_form(target, layout, ROD, ends=ends),
+        rs.sew(target, [[(-1, 0), (1, 0)]], layout, ROD, ends=ends),
+    )
+    for form in (whole, sewn):
+        (tmp_path / "case.toml").write_text(form.archive(takeaway=rs.Takeaway(stages=0)).case_toml)
+        case = load_case(tmp_path / "case.toml")
+        built = case.build_sewn() if form is sewn else case.build()
+        assert built.drape_options["ends"] == form.ends == tuple(form.popped) == ends
+
+
 def test_the_kept_case_gives_the_same_form_again(tmp_path):
     from rodshell.case import load_case
 

@@ -49,6 +49,7 @@ class FoundForm:
     Parameters
     ----------
     popped, agreement : by end condition, "pinned" and "clamped".
+    ends : the end conditions asked for.
     """
 
     target: Target
@@ -60,6 +61,7 @@ class FoundForm:
     footprint: Footprint
     popped: dict[Ends, Popped]
     agreement: dict[Ends, Agreement]
+    ends: tuple[Ends, ...]
 
     @property
     def status(self) -> str:
@@ -140,7 +142,7 @@ def find_stages(
         if popped[end].report.status is Status.OUT_OF_TIME:
             break
     compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
-    return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared)
+    return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared, ends)
 
 
 def pop_up_stages(

@@ -66,6 +66,7 @@ class SewnForm:
     laid, found : of each patch by its name: its rods, and every stage of its form.
     meetings : where rods of two patches end at one point.
     moved : of each patch how far rod ends were moved to these points [m]: what its mesh missed them by.
+    ends : the end conditions asked for.
     """
 
     target: Target
@@ -78,6 +79,7 @@ class SewnForm:
     found: dict[str, FoundForm]
     meetings: tuple[Meeting, ...]
     moved: dict[str, float]
+    ends: tuple[Ends, ...]
 
     @property
     def status(self) -> str:
@@ -195,7 +197,7 @@ def find_sewn_stages(
             anchor=one.anchor, joint=joint, ends=ends, cut=partial(cut_with_ends, places=places), progress=told,
         )  # fmt: skip
         moved[name] = _moved(found[name])
-    return SewnForm(target, tuple(seams), layout, rod, joint, own, laid, found, meetings, moved)
+    return SewnForm(target, tuple(seams), layout, rod, joint, own, laid, found, meetings, moved, ends)
 
 
 def best_heading(
