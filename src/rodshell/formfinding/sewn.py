@@ -84,8 +84,10 @@ class SewnForm:
     @property
     def status(self) -> str:
         """ "converged", or which patch stopped and what to do."""
-        stopped = (f"patch {name}: {form.status}" for name, form in self.found.items() if form.status != "converged")
-        return next(stopped, "converged")
+        for name, form in self.found.items():
+            if form.status != "converged":
+                return form.status if "(patch " in form.status else f"{form.status} (patch {name})"
+        return "converged"
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -190,6 +192,8 @@ def find_sewn_stages(
         places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
 
         def told(stage: str, detail: str, residual: float, name: str = name) -> None:
+            if stage == "net":
+                return  # which was laid: marched again, it is no reason to lose what is finished
             progress(stage, f"patch {name}, {detail}", residual)
 
         found[name] = find_stages(
