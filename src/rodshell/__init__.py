@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         ConvergenceError,
         InputError,
         NetLimitError,
+        OutOfTimeError,
         OutputError,
         RodshellError,
         StabilityError,
@@ -86,7 +87,8 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "rodshell.errors": (
-        "ConvergenceError", "RodshellError", "InputError", "NetLimitError", "OutputError", "StabilityError",
+        "ConvergenceError", "RodshellError", "InputError", "NetLimitError", "OutOfTimeError", "OutputError",
+        "StabilityError",
     ),
     "rodshell.fabrication": ("Fabrication",),
     "rodshell.form": ("Form", "PoppedUp", "Sewn", "find_form", "pop_up_table", "sew"),
@@ -124,8 +126,8 @@ __all__ = [
     "Disc", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
     "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity",
     "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
-    "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutputError",
-    "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle",
+    "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutOfTimeError",
+    "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle",
     "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn", "SharedDofs", "Shell",
     "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net",
     "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table",

@@ -21,7 +21,7 @@ from rodshell.formfinding.drape import Method
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, limited, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
-from rodshell.joints import Ball, Joint
+from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output import Archive
 from rodshell.output.inputs import read_inputs
@@ -85,7 +85,7 @@ class Form(_Judged, FoundForm):
             case_toml = case_text(
                 self.target, self.layout, self.rod, joint=self.joint,
                 method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
-                fall=draped.fall, takeaway=takeaway,
+                fall=draped.fall, ends=self.ends, takeaway=takeaway,
             )  # fmt: skip
         return _archive(self, form_states(self), case_toml, takeaway, progress, inputs)
 
@@ -151,7 +151,9 @@ class Sewn(_Judged, SewnForm):
         """All patches as one: everything that is kept, checked and made ready to be built; see `Form.archive`."""
         takeaway = takeaway or Takeaway()
         if case_toml is None:
-            case_toml = case_text(self.target, self.layout, self.rod, joint=self.joint, takeaway=takeaway, sewn=self)
+            case_toml = case_text(
+                self.target, self.layout, self.rod, joint=self.joint, ends=self.ends, takeaway=takeaway, sewn=self
+            )
         takeaway.require_known_stress(self.rod, self.joint)
         weight = takeaway.judged_by(self.rod).shear_weight
         checks = joined_checks(
@@ -191,7 +193,7 @@ def _archive(
     inputs: Mapping[str, bytes] | None = None,
 ) -> Archive:  # fmt: skip
     """A job's result and states with its checks and its fabrication."""
-    takeaway.require_known_stress(job.rod, job.joint if isinstance(job, Form) else Ball())
+    takeaway.require_known_stress(job.rod, job.joint)
     weight = takeaway.judged_by(job.rod).shear_weight
     checks = check(job.popped, job.rod, stages=takeaway.stages, shear_weight=weight, progress=progress)
     shapes = {ends: shell.positions for ends, shell in job.popped.items()}
@@ -317,6 +319,7 @@ def pop_up_table(
     finals: ArrayLike,
     rod: Rod,
     *,
+    joint: Joint | None = None,
     edge: float | None = None,
     progress: Progress = silent,
     time_limit: float | None = None,
@@ -327,12 +330,13 @@ def pop_up_table(
     ----------
     grid : the rods, flat (see `straight_rods`).
     finals : (m, 2, 3) where the ends of each rod go [m].
+    joint : where rods cross, see `pop_up`, without eccentricity; ball joints without.
     edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
     progress, time_limit : as of `find_form`.
 
     Raises
     ------
-    InputError : `finals` does not fit `grid`; no rod has three joints.
+    InputError : `finals` does not fit `grid`; no rod has three joints; the joint is eccentric.
     """
     points = np.asarray(finals, dtype=float)
     if points.shape != (len(grid.rods), 2, 3) or not np.isfinite(points).all():
@@ -344,5 +348,5 @@ def pop_up_table(
                 f"rod {rod_line.name} is {rod_line.length:.4g} m long, but its final ends lie {distance:.4g} m apart: "
                 "move them closer, or give a longer rod"
             )
-    found = pop_up_stages(grid, points, rod, edge=edge, progress=limited(progress, time_limit))
+    found = pop_up_stages(grid, points, rod, joint=joint, edge=edge, progress=limited(progress, time_limit))
     return PoppedUp(**{field.name: getattr(found, field.name) for field in fields(found)})

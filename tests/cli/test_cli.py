@@ -578,6 +578,26 @@ def dome() -> Path:
     return folder
 
 
+def test_popup_keeps_the_joints_and_the_mesh_of_a_result(
+    finder: FakeFinder, dome: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where the result has no case file that knows them, as of a target that was a Python function."""
+    result = json.loads((dome / "result.json").read_text())
+
+    def kept(joint: rs.joints.Joint) -> dict[str, Any]:
+        told = result | {"joint": rs.joints.joint_parameters(joint), "layout": {"edge": 0.004}}
+        (dome / "result.json").write_text(json.dumps(told))
+        assert main(["popup", str(dome), "--force", "-q"]) == 0
+        return finder.calls[-1][1]
+
+    for joint in (rs.Rigid(mass=0.005, rest_angle=1.5), rs.Spring(shear=2.0, twist=float("inf")), rs.Linker(corners=4)):
+        assert kept(joint) == {"joint": joint, "edge": 0.004}
+    (dome / "case.toml").write_text("# the target was a Python function\n")
+    assert kept(rs.Pin(mass=0.1))["joint"] == rs.Pin(mass=0.1)
+    (dome / "result.json").write_text(json.dumps(result | {"joint": {"kind": "linker", "rod": {}}}))
+    assert "linkers of another rod" in refused(capsys, "popup", str(dome), "--out", "x")
+
+
 def test_popup_reads_an_earlier_result(finder: FakeFinder, dome: Path) -> None:
     assert main(["popup", str(dome)]) == 0
     (grid, final, rod), _ = finder.calls[0]

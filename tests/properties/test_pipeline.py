@@ -288,6 +288,22 @@ def test_save_and_read_give_back_every_number(form, tmp_path):
     assert kept.case_toml == form.archive().case_toml
 
 
+@pytest.mark.parametrize("ends", [("pinned",), ("clamped",), ("pinned", "clamped")])
+def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
+    from rodshell.case import load_case
+
+    target, layout = rs.Hemisphere(SIZE), rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
+    whole, sewn = (
+        rs.find_form(target, layout, ROD, ends=ends),
+        rs.sew(target, [[(-1, 0), (1, 0)]], layout, ROD, ends=ends),
+    )
+    for form in (whole, sewn):
+        (tmp_path / "case.toml").write_text(form.archive(takeaway=rs.Takeaway(stages=0)).case_toml)
+        case = load_case(tmp_path / "case.toml")
+        built = case.build_sewn() if form is sewn else case.build()
+        assert built.drape_options["ends"] == form.ends == tuple(form.popped) == ends
+
+
 def test_the_kept_case_gives_the_same_form_again(tmp_path):
     from rodshell.case import load_case
 
@@ -451,6 +467,23 @@ def test_table_of_a_forms_rods_pops_up_to_the_forms_pinned_shell(form):
     # both meshes have edges of one length, but the form's tails keep the nodes of joints that are not made
     apart = max(float(np.abs(ours[pair] - theirs[pair]).max()) for pair in theirs)
     assert apart < 1e-4 * SIZE  # second order: 5e-5 measured at 12.5 mm
+
+
+def test_a_table_with_the_forms_joints_bears_as_much_as_the_form():
+    """Heavy rigid joints: with massless balls in their place it would bear ten times as much."""
+    layout = rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
+    form = rs.find_form(rs.Hemisphere(SIZE), layout, ROD, joint=rs.Rigid(mass=0.005), ends="pinned")
+    table = table_of(form, edge=0.04, joint=form.joint)
+    ours, theirs = (one.archive().result for one in (table, form))
+    assert ours["joint"] == theirs["joint"]
+    assert ours["fabrication"]["total_mass"] == pytest.approx(theirs["fabrication"]["total_mass"], rel=1e-9)
+    borne = [one["self_weight"]["pinned"]["load_factor"] for one in (ours, theirs)]
+    assert borne[0] == pytest.approx(borne[1], rel=0.01)
+
+
+def test_a_table_with_eccentric_joints_is_refused():
+    with pytest.raises(InputError, match="eccentricity 4 mm would lay the rods in two layers"):
+        table_of(hemisphere_form(), joint=rs.Pin(eccentricity=0.004))
 
 
 def test_table_by_default_takes_six_edges_between_joints(tmp_path):

@@ -232,6 +232,17 @@ def test_a_patch_may_have_its_own_spacing_and_anchor() -> None:
     assert len(form.meetings) > 10
 
 
+def test_the_strong_bending_of_patches_is_that_of_the_worst() -> None:
+    """Here not of the patch whose rods meet at the smallest angle."""
+    lath = rs.Rod(rs.RectangularSection(width=1e-3, height=8e-3), rs.Material(youngs_modulus=1e9, density=1e3))
+    target, seams, spacing = CASES["two bumps, in the valley"]
+    result = rs.sew(target, seams, layout_of(spacing), lath, joint=rs.Pin(), ends=()).result()
+    bent = [patch["drape"]["strong_bending"] for patch in result["patches"]]
+    assert bent[0]["beyond"] > 1.1 * bent[1]["beyond"]
+    assert result["patches"][0]["drape"]["min_angle_deg"] > result["patches"][1]["drape"]["min_angle_deg"]
+    assert result["drape"]["strong_bending"] == bent[0]
+
+
 def test_running_a_result_again_gives_the_same(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "seams.obj").write_text("v -300 -300 0\nv 0 -10 0\nv 300 300 0\nl 1 2\nl 2 3\n")

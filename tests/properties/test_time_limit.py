@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.errors import OutOfTimeError
+from rodshell import OutOfTimeError
 from rodshell.formfinding import progress as module
 from rodshell.formfinding.progress import TimeLimit, silent
 from rodshell.solve.report import Status
@@ -98,6 +98,7 @@ def test_a_fall_that_is_cut_short_keeps_its_last_state(clock, method):
     form = rs.find_form(HEMISPHERE, layout, ROD, method=method, time_limit=3)
     assert form.status.startswith("out of time after 3 s in stage drape")
     assert form.popped == {}
+    assert not any("saddle" in word for word in form.warnings)  # of an iterate that is no equilibrium
     assert np.isfinite(form.draped.positions).all()
 
 
@@ -110,15 +111,58 @@ def test_a_path_from_flat_ends_where_it_was(clock):
     assert "from flat" in flat.report.reason
 
 
-def test_seams_end_with_what_all_patches_have_or_with_a_sentence(clock):
+@cache
+def whole_sewn():
+    return sewn_form()
+
+
+def sewn_form(**options):
     layout = rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
-    for seconds in (0.5, 3.5, 10.5):
+    return rs.sew(HEMISPHERE, [[(-1, 0), (1, 0)]], layout, ROD, **options)
+
+
+def test_seams_end_with_the_patches_that_are_finished_or_before_all_have_their_nets(clock):
+    whole, seconds, kinds = whole_sewn(), -1.5, set()
+    while True:
+        seconds += 4
         try:
-            form = rs.sew(HEMISPHERE, [[(-1, 0), (1, 0)]], layout, ROD, time_limit=seconds)
-        except OutOfTimeError:
+            form = sewn_form(time_limit=seconds)
+        except OutOfTimeError as error:
+            kinds.add(str(error).partition(" in stage ")[2])
             continue
-        assert "out of time after" in form.status
-        assert "out of time after" in form.archive().result["status"]
+        if form.status == "converged":
+            break
+        assert form.status.startswith(f"out of time after {seconds:g} s in stage ")
+        assert form.status.count("(patch ") == 1
+        assert form.archive().result["status"] == form.status
+        finished = []
+        for name, one in form.found.items():
+            for ends, shell in one.popped.items():
+                if shell.report.converged:
+                    np.testing.assert_array_equal(shell.positions, whole.found[name].popped[ends].positions)
+                    finished.append(f"{name} {ends}")
+        kinds.add(tuple(finished))
+    nothing = {kind for kind in kinds if isinstance(kind, str)}
+    assert nothing == {"seams (laying patch B)"}
+    assert kinds - nothing >= {(), ("A pinned", "A clamped"), ("A pinned", "A clamped", "B pinned")}
+
+
+def test_checks_that_any_patch_did_not_reach_are_named_and_left_out_of_the_joined_result(clock):
+    form, seconds, kinds = whole_sewn(), -2.5, set()
+    while True:
+        seconds += 7
+        result = form.archive(progress=TimeLimit(silent, seconds)).result
+        if result["status"] == "converged":
+            break
+        assert result["status"] in result["warnings"]
+        missing = result["status"].partition("not checked: ")[2].split(", ")
+        assert len(set(missing)) == len(missing)
+        assert ("the deployment from flat" in missing) == ("deployment" not in result)
+        assert ("other stable shapes" in missing) == (set(result.get("other_shapes", ())) != {"pinned", "clamped"})
+        for ends in ("pinned", "clamped"):
+            assert (f"self-weight with {ends} ends" in missing) == (ends not in result["self_weight"])
+        kinds.add(len(missing))
+    assert kinds >= {4, 3, 2, 1}
 
 
 def test_a_search_that_is_cut_short_says_what_was_best_until_then(clock):

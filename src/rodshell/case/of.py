@@ -1,10 +1,12 @@
 """The case file of objects that were made in Python."""
 
+from collections.abc import Sequence
 from math import fmod, tau
 from typing import Any
 
 from rodshell.case.schema import Case
 from rodshell.formfinding import Fall
+from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.sewn import SewnForm
 from rodshell.joints import Joint, joint_parameters
 from rodshell.layout import GridLayout
@@ -23,10 +25,11 @@ def case_text(
     anchor: tuple[float, float] | None = None,
     gravity: float = 9.81,
     fall: Fall | None = None,
+    ends: Sequence[Ends] = ENDS,
     takeaway: Takeaway | None = None,
     sewn: SewnForm | None = None,
 ) -> str:
-    """A case file that gives these objects again; of a target that is a Python function, a note that says so."""
+    """A case file that gives these objects again, or a note on why none can: its target was a Python function, say."""
     shape: dict[str, Any] = target.parameters()
     if "function" in shape:
         return f"# the target was the Python function {shape['function']}: no case file can give it again\n"
@@ -48,11 +51,13 @@ def case_text(
             "rod": rod.parameters(),
             "joint": joint_parameters(joint),
             "drape": drape,
+            "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
             **({"seams": sewn.parameters()} if sewn else {}),
             **(takeaway or Takeaway()).parameters(),
         }
     )
-    return case.to_toml()
+    note = "" if ends else "# the grid was not popped up; a case file always asks for a pop-up\n"
+    return note + case.to_toml()
 
 
 def _within_a_turn(angle: float) -> float:

@@ -44,7 +44,7 @@ class Checks:
     other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
     clamped_from_flat : whether the pinned shell, reached from flat, comes to the clamped shape when its ends are
         turned into their clamps; None where that is not known.
-    out_of_time : a sentence on when that was and which checks are missing, or "".
+    stopped, missing : when the time limit came, or "", and which checks were not reached.
     """
 
     bending: dict[Ends, Bending]
@@ -57,7 +57,13 @@ class Checks:
     contact_on_the_way: tuple[Contact, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
     clamped_from_flat: bool | None = None
-    out_of_time: str = ""
+    stopped: str = ""
+    missing: tuple[str, ...] = ()
+
+    @property
+    def out_of_time(self) -> str:
+        """A sentence on when that was and which checks are missing, or ""."""
+        return f"{self.stopped}; not checked: {', '.join(self.missing)}" if self.stopped else ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -137,7 +143,7 @@ def check(
     carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
     weighed = dict[Ends, SelfWeight]()
     follow = "pinned" in done and stages > 0
-    deployment, turned, others, late = None, None, dict[Ends, OtherShapes](), ""
+    deployment, turned, others, stopped = None, None, dict[Ends, OtherShapes](), ""
     missing = [f"self-weight with {ends} ends" for ends in settled]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:
@@ -154,16 +160,18 @@ def check(
         done_before = sum(one.factorizations for one in weighed.values())
         for ends, one in _other_shapes(popped, settled, deployment, done_before, progress):
             others[ends] = one
+        missing.pop(0)
     except OutOfTimeError as error:
-        late = f"{error}; not checked: {', '.join(missing)}"
+        stopped = str(error)
+    late = stopped, tuple(missing)
     if deployment is None:
-        return Checks(bent, held, carried, None, (), weighed, met, other_shapes=others, out_of_time=late)
+        return Checks(bent, held, carried, None, (), weighed, met, (), others, None, *late)
     mesh, laid = done["pinned"].footprint.mesh, deployment.positions[0]
     flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, late)
+    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, *late)
 
 
 def _other_shapes(

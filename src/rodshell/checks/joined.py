@@ -26,9 +26,10 @@ class JoinedChecks(Checks):
             f"patch {name}: {word}"
             for name, one in self.named.items()
             for word in one.warnings
-            if word not in one.tight
+            if word not in (one.out_of_time, *one.tight)
         ]
-        return (*words, *self.tight)
+        late = (self.out_of_time,) if self.out_of_time else ()
+        return (*late, *words, *self.tight)
 
 
 def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> JoinedChecks:
@@ -47,14 +48,16 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
 
     both = [end for end in ends if all(end in part.self_weight for part in parts)]
     weighed = {end: weakest([part.self_weight[end] for part in parts]) for end in both}
-    late = next((part.out_of_time for part in parts if part.out_of_time), "")
+    late = next((part.stopped for part in parts if part.stopped), "")
+    missing = tuple(dict.fromkeys(word for part in reversed(parts) for word in part.missing))  # the last lacks the most
     contact = {end: contacts[end] for end in ends}
-    others = {end: _searched([part.other_shapes[end] for part in parts if end in part.other_shapes]) for end in ends}
+    all_searched = [end for end in ends if all(end in part.other_shapes for part in parts)]
+    others = {end: _searched([part.other_shapes[end] for part in parts]) for end in all_searched}
     bending, held, joints = each("bending"), each("reactions"), each("joints")
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
         return JoinedChecks(
-            bending, held, joints, None, (), weighed, contact, other_shapes=others, out_of_time=late, named=named
+            bending, held, joints, None, (), weighed, contact, (), others, None, late, missing, named=named
         )
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
     rows = [[one.share.tolist().index(share) for share in shared] for one in ways]
@@ -66,7 +69,9 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
         name: [part.contact_on_the_way[k] for k in row] for (name, part), row in zip(named.items(), rows, strict=True)
     }
     met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
-    return JoinedChecks(bending, held, joints, way, bent, weighed, contact, met, others, turned, late, named=named)
+    return JoinedChecks(
+        bending, held, joints, way, bent, weighed, contact, met, others, turned, late, missing, named=named
+    )
 
 
 def _joined_ways(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
@@ -96,7 +101,7 @@ def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
     return OtherShapes(
         sum(one.tried for one in parts),
         any(one.popped_through for one in parts),
-        max((one.largest_kick for one in parts), default=0.0),
+        max(one.largest_kick for one in parts),
         tuple(shape for one in parts for shape in one.found),
         sum(one.factorizations for one in parts),
     )

@@ -50,9 +50,9 @@ def command(
     """Pop up rods from flat, their ends pinned: where does the shell go?
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
-    final_z0, final_x1, final_y1, final_z1 and, if you like, id. DIR is an earlier result. The rod is the result's, or
-    for a table one that is chosen to fit; each key of [rod] sets it anew. So do those of [checks], [fabrication] and
-    [drawings] what is checked, made and drawn.
+    final_z0, final_x1, final_y1, final_z1 and, if you like, id. DIR is an earlier result, whose joints are
+    kept; those of a table are balls. The rod is the result's, or for a table one that is chosen to fit; each key of
+    [rod] sets it anew. So do those of [checks], [fabrication] and [drawings] what is checked, made and drawn.
     """
     path, kinds, seconds = Path(source), wanted_kinds(only), seconds_of(time_limit)
     ends, case = _ends_and_case(path, unit, overrides_of(values))
@@ -74,7 +74,7 @@ def command(
         takeaway = case.takeaway()
         with Progress(quiet=quiet) as shown:
             progress = limited(shown, seconds)
-            popped = pop_up_table(grid, ends.final, rod, progress=progress)
+            popped = pop_up_table(grid, ends.final, rod, joint=case.joint.build(), edge=ends.edge, progress=progress)
             kept = Kept(popped.archive(takeaway=takeaway, progress=progress), kinds)
         return deliver(kept, kept.save, place, progress=shown, as_json=as_json, quiet=quiet)
 
@@ -90,7 +90,8 @@ def _ends_and_case(path: Path, unit: str | None, given: dict[str, object]) -> "t
             raise InputError(f'--unit = "{unit}": {path} is a result, which is in SI; leave --unit out')
         ends = read_result(path)
         with reading(path) as file:
-            return ends, load_case(file("case.toml") if file("case.toml").is_file() else None, given)
+            joint = {f"joint.{key}": value for key, value in ends.joint.items()}  # which not every case file knows
+            return ends, load_case(file("case.toml") if file("case.toml").is_file() else None, joint | given)
     if not path.exists():
         raise InputError(f"there is no file named {shown(str(path))}: give a table of rods, or the folder of a result")
     if unit is None:

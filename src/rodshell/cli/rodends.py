@@ -2,9 +2,10 @@
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,15 @@ class RodEnds:
     names : m labels, or None.
     flat : (m, 2, 2), the two ends in the plane [m].
     final : (m, 2, 3), the same two ends of the popped shell [m].
+    joint : what joins them, as in a case file; empty for a table, which does not say.
+    edge : longest edge of their mesh [m]; None where none was given.
     """
 
     names: list[str] | None
     flat: NDArray[np.float64]
     final: NDArray[np.float64]
+    joint: dict[str, Any] = field(default_factory=dict)
+    edge: float | None = None
 
     @property
     def lengths(self) -> NDArray[np.float64]:
@@ -100,12 +105,12 @@ def _labels(path: Path, names: list[str]) -> list[str] | None:
 
 
 def read_result(folder: Path) -> RodEnds:
-    """The rods of an earlier result: their flat ends, and where its shell has them.
+    """The rods of an earlier result: their flat ends, where its shell has them, and their joints.
 
     Raises
     ------
     OutputError : the folder holds no result that can be read.
-    InputError : the result has no rods, or no shell in space; its rods lie in two layers.
+    InputError : the result has no rods, or no shell in space; its rods lie in two layers, or have linkers of their own.
     """
     from rodshell.output.archive import SHELLS, read
     from rodshell.output.rods import rods_of
@@ -121,6 +126,12 @@ def read_result(folder: Path) -> RodEnds:
             f"{folder} holds rods in two layers {length_text(apart)} apart, and popup joins its rods at one point: "
             "see the result's own deployment"
         )
+    joint = archive.result.get("joint") or {}
+    if "rod" in joint:
+        raise InputError(
+            f"the joints in {folder} are linkers of another rod, which popup cannot take over: use "
+            "rodshell.pop_up_table(..., joint=...) in Python"
+        )
     try:
         rods = rods_of(archive)
         shell = archive.states[next(name for name in SHELLS if name in archive.states)]
@@ -130,4 +141,4 @@ def read_result(folder: Path) -> RodEnds:
         raise InputError(f"the result in {folder} lacks its rods or its states: run it again") from None
     if not rods:
         raise InputError(f"the result in {folder} has no rods")
-    return RodEnds([rod.id for rod in rods], flat, final)
+    return RodEnds([rod.id for rod in rods], flat, final, joint, (archive.result.get("layout") or {}).get("edge"))

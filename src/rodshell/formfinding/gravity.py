@@ -71,7 +71,7 @@ def gravity_drape(
     inside = target.margin(state) > 0
     angle, where = smallest_joint_angle(mesh, state, inside)
     warnings = []
-    if levels[-1].negative_modes:
+    if levels[-1].status is Status.CONVERGED and levels[-1].negative_modes:
         warnings.append(
             f"the draped state is a saddle or near one ({levels[-1].negative_modes} negative modes): without friction "
             'the grid would slide off; method "bound" does not depend on this'

@@ -49,6 +49,7 @@ class FoundForm:
     Parameters
     ----------
     popped, agreement : by end condition, "pinned" and "clamped".
+    ends : the end conditions asked for.
     """
 
     target: Target
@@ -60,6 +61,7 @@ class FoundForm:
     footprint: Footprint
     popped: dict[Ends, Popped]
     agreement: dict[Ends, Agreement]
+    ends: tuple[Ends, ...]
 
     @property
     def status(self) -> str:
@@ -86,6 +88,7 @@ class PoppedTable:
     """A table of rods, popped up from flat with pinned ends."""
 
     rod: Rod
+    joint: Joint
     footprint: Footprint
     boundary: Boundary
     popped: dict[Ends, Popped]
@@ -139,23 +142,37 @@ def find_stages(
         if popped[end].report.status is Status.OUT_OF_TIME:
             break
     compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
-    return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared)
+    return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared, ends)
 
 
 def pop_up_stages(
-    grid: FlatGrid, finals: Floats, rod: Rod, *, edge: float | None = None, progress: Progress = silent
+    grid: FlatGrid,
+    finals: Floats,
+    rod: Rod,
+    *,
+    joint: Joint | None = None,
+    edge: float | None = None,
+    progress: Progress = silent,
 ) -> PoppedTable:
     """Pop up rods given by their flat lines and the final places of their ends.
 
     Parameters
     ----------
     finals : (m, 2, 3) where the two ends of each rod of `grid` go [m].
+    joint : where rods cross, without eccentricity; ball joints without.
     edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
 
     Raises
     ------
-    InputError : no rod has three joints.
+    InputError : no rod has three joints; the joint is eccentric.
     """
+    require_joint(joint)
+    joint = joint or Ball()
+    if joint.eccentricity:
+        raise InputError(
+            f"the joints' eccentricity {length_text(joint.eccentricity)} would lay the rods in two layers, and a "
+            "table's rods are joined at one point: leave it out"
+        )
     spans = _spans(grid)
     joined = FlatGrid.of(grid.rods, margin=NEAREST_JOINT * spans)
     kept, swinging = joined.without(lambda some: some.joint_counts() < FEWEST_JOINTS)
@@ -168,9 +185,9 @@ def pop_up_stages(
     footprint = Footprint(mesh_grid(kept, edge or spans / EDGES_A_SPAN))
     points = finals[rows].reshape(-1, 3)
     boundary = Boundary(points, np.zeros_like(points))
-    popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", progress=progress)
+    popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", joint=joint, progress=progress)
     dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
-    return PoppedTable(rod, footprint, boundary, {"pinned": popped}, dropped)
+    return PoppedTable(rod, joint, footprint, boundary, {"pinned": popped}, dropped)
 
 
 def _spans(grid: FlatGrid) -> float:

@@ -66,6 +66,7 @@ class SewnForm:
     laid, found : of each patch by its name: its rods, and every stage of its form.
     meetings : where rods of two patches end at one point.
     moved : of each patch how far rod ends were moved to these points [m]: what its mesh missed them by.
+    ends : the end conditions asked for.
     """
 
     target: Target
@@ -78,12 +79,15 @@ class SewnForm:
     found: dict[str, FoundForm]
     meetings: tuple[Meeting, ...]
     moved: dict[str, float]
+    ends: tuple[Ends, ...]
 
     @property
     def status(self) -> str:
         """ "converged", or which patch stopped and what to do."""
-        stopped = (f"patch {name}: {form.status}" for name, form in self.found.items() if form.status != "converged")
-        return next(stopped, "converged")
+        for name, form in self.found.items():
+            if form.status != "converged":
+                return form.status if "(patch " in form.status else f"{form.status} (patch {name})"
+        return "converged"
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -188,6 +192,8 @@ def find_sewn_stages(
         places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
 
         def told(stage: str, detail: str, residual: float, name: str = name) -> None:
+            if stage == "net":
+                return  # which was laid: marched again, it is no reason to lose what is finished
             progress(stage, f"patch {name}, {detail}", residual)
 
         found[name] = find_stages(
@@ -195,7 +201,7 @@ def find_sewn_stages(
             anchor=one.anchor, joint=joint, ends=ends, cut=partial(cut_with_ends, places=places), progress=told,
         )  # fmt: skip
         moved[name] = _moved(found[name])
-    return SewnForm(target, tuple(seams), layout, rod, joint, own, laid, found, meetings, moved)
+    return SewnForm(target, tuple(seams), layout, rod, joint, own, laid, found, meetings, moved, ends)
 
 
 def best_heading(

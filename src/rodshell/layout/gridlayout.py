@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
+from rodshell.validation import positive
 
 Auto = Literal["auto"]
 
@@ -32,6 +33,10 @@ class GridLayout:
     lines : ascending offsets of some rods of families u and v [m], where these do not lie at equal spacing; beyond the
         first and the last of them the spacing goes on. Empty for a family whose rods all lie at equal spacing.
     left_out : names of rods that are not built; their lines still shape the net.
+
+    Raises
+    ------
+    InputError : a count below 2, a spacing, length or edge that is not positive, an edge above the spacing.
     """
 
     rods: tuple[int, int] | Auto
@@ -42,6 +47,26 @@ class GridLayout:
     offset: tuple[float, float] = (0.0, 0.0)
     lines: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     left_out: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, two in (("spacing", self.spacing), ("offset", self.offset)):
+            _require_two(name, two)
+        for name, value in (("spacing", self.spacing[0]), ("spacing", self.spacing[1]), ("edge", self.edge)):
+            positive(f"layout {name}", value, "m")
+        if self.length != "auto":
+            positive("layout length", self.length, "m")
+        if self.rods != "auto":
+            counts = tuple(self.rods) if isinstance(self.rods, tuple | list) else ()
+            if len(counts) != 2 or not all(isinstance(n, Real) and int(n) == n >= 2 for n in counts):
+                raise InputError(f'layout rods must be "auto" or two counts of at least 2, not {self.rods}')
+            object.__setattr__(self, "rods", (int(counts[0]), int(counts[1])))
+        if self.edge > min(self.spacing):
+            raise InputError(
+                f"layout edge {self.edge} m is longer than the spacing {min(self.spacing)} m: use a shorter edge"
+            )
+        if not all(isfinite(one) for one in (self.rotate, *self.offset)):
+            raise InputError(f"layout rotate and offset must be finite, not {self.rotate} and {self.offset}")
+        object.__setattr__(self, "spacing", (float(self.spacing[0]), float(self.spacing[1])))
 
     @staticmethod
     def orthogonal(
@@ -57,30 +82,11 @@ class GridLayout:
 
         Raises
         ------
-        InputError : a count below 2, a spacing, length or edge that is not positive, an edge above the spacing.
+        InputError : as of the class.
         """
         pair = spacing if isinstance(spacing, tuple | list) else (spacing, spacing)
-        for name, two in (("spacing", pair), ("offset", offset)):
-            if not isinstance(two, tuple | list) or len(two) != 2 or not all(isinstance(one, Real) for one in two):
-                raise InputError(f"layout {name} must be two lengths in m, not {two!r}")
-        for name, value in (("spacing", pair[0]), ("spacing", pair[1]), ("edge", edge), ("length", length)):
-            if value == "auto" and name in ("edge", "length"):
-                continue
-            if not isinstance(value, Real):
-                raise InputError(f"layout {name} must be a length in m, not {value!r}")
-            if not (isfinite(value) and value > 0):
-                raise InputError(f"layout {name} must be positive, not {value} m")
-        if rods != "auto":
-            counts = tuple(rods)
-            if len(counts) != 2 or any(int(n) != n or n < 2 for n in counts):
-                raise InputError(f'layout rods must be "auto" or two counts of at least 2, not {rods}')
-            rods = (int(counts[0]), int(counts[1]))
-        edge = auto_edge(pair) if edge == "auto" else edge
-        if edge > min(pair):
-            raise InputError(f"layout edge {edge} m is longer than the spacing {min(pair)} m: use a shorter edge")
-        if not isfinite(rotate) or not all(isfinite(shift) for shift in offset):
-            raise InputError(f"layout rotate and offset must be finite, not {rotate} and {offset}")
-        return GridLayout(rods, (float(pair[0]), float(pair[1])), length, float(edge), float(rotate), offset)
+        _require_two("spacing", pair)
+        return GridLayout(rods, pair, length, auto_edge(pair) if edge == "auto" else edge, rotate, offset)
 
     def phase(self, family: Family) -> float:
         """Offset [m] of one line of the lattice of this family; the others lie whole spacings away."""
@@ -140,6 +146,12 @@ class GridLayout:
 def auto_edge(spacing: tuple[float, float]) -> float:
     """The edge of the mesh [m] that goes with spacings [m]."""
     return min(spacing) / EDGES_A_SPAN
+
+
+def _require_two(name: str, two: object) -> None:
+    """Refuse what is not a pair of numbers [m]."""
+    if not isinstance(two, tuple | list) or len(two) != 2 or not all(isinstance(one, Real) for one in two):
+        raise InputError(f"layout {name} must be two lengths in m, not {two!r}")
 
 
 def rod_name(family: Family, index: int, count: int) -> str:

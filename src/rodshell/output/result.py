@@ -96,6 +96,7 @@ def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
     return {
         **head(name, table.status, table.warnings),
         "rod": rod_table(table.rod),
+        "joint": joint_parameters(table.joint),
         **grid_table(table.footprint, table.boundary.points, table.dropped),
         "pop_up": {ends: popped_table(shell.report, shell.start) for ends, shell in table.popped.items()},
     }

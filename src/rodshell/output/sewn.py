@@ -113,5 +113,8 @@ def _drape(parts: list[dict[str, Any]]) -> dict[str, Any]:
         joined[key] = sum(one[key] for one in parts)
     for key in ("force_residual", "max_strain", "max_gap"):
         joined[key] = max(one[key] for one in parts)
+    strong = [one["strong_bending"] for one in parts if "strong_bending" in one]
+    if strong:
+        joined["strong_bending"] = max(strong, key=lambda one: (float(one["beyond"]), float(one["moment"])))
     joined["own_ends"] = {key: max(one["own_ends"][key] for one in parts) for key in ("max", "median")}
     return joined
