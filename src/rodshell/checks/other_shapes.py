@@ -14,9 +14,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
+from rodshell.checks.bending import edge_directors, rod_frames
 from rodshell.checks.deployment import SAME, Deployment
+from rodshell.geometry.frames import parallel_transport, signed_angle
+from rodshell.geometry.vectors import unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.rods.bend_twist import BendTwist
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.modes import softest_modes
@@ -174,14 +178,35 @@ class _Search:
         return [mode / np.linalg.norm(mode[self.shell.stretch.blocks], axis=2).max() for mode in modes]
 
     def _through(self) -> Floats:
-        """Each node mirrored in the surface that the supports span, across their plane; the supports stay."""
+        """Each node mirrored in the surface that the supports span, across their plane; the supports stay. So are the
+        sections, whose first directors are kept on the side of the shell where they were."""
         nodes = np.flatnonzero(self.shell.like < self.shell.mesh.node_count)
         above = (self.positions - spanned(self.shell.mesh, self.positions)) @ self.normal
         state = self.own.state.copy()
         state[nodes] -= 2 * above[self.shell.like[nodes], None] * self.normal
         held = np.append(self.shell.ends, self.shell.ghosts)
         state[held] = self.own.state[held]
+        if frames := rod_frames(self.shell):
+            self._turn_sections(frames, state)
         return state
+
+    def _turn_sections(self, frames: BendTwist, state: Floats) -> None:
+        """Set the twist angles of a state whose nodes are mirrored to those of mirrored sections."""
+        shell, own = self.shell, self.own.state
+        before, now = (unit(np.diff(at[shell.stretch.blocks], axis=1)[:, 0]) for at in (own, state))
+        directors = edge_directors(shell, frames, own)
+        wanted = parallel_transport(-self._reflected(directors), self._reflected(before), now)
+        turns = signed_angle(parallel_transport(directors, before, now), wanted, now)
+        shell.turn_edges(state, np.unwrap(turns))  # neighbours less than half a revolution apart: twists keep small
+        if shell.angles > len(turns):  # sections are free to spin in their clamps: no twist there
+            clamps = frames.blocks[-len(shell.ghosts) :]
+            twist = frames.strains(state)[-len(shell.ghosts) :, 2]
+            state[clamps[::2, 1], 0] += twist[::2]  # at a rod's start the ghost edge comes first
+            state[clamps[1::2, 3], 0] -= twist[1::2]
+
+    def _reflected(self, vectors: Floats) -> Floats:
+        """(n, 3) vectors as the plane of the supports reflects them."""
+        return np.asarray(vectors - 2 * (vectors @ self.normal)[:, None] * self.normal)
 
     def _apart(self, one: Floats, two: Floats) -> float:
         return float(np.linalg.norm(one - two, axis=1).max()) / self.length
