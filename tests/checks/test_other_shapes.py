@@ -135,6 +135,30 @@ def test_a_cap_whose_sections_turn_with_the_shell_has_its_reflection_only(joint:
     assert image.mirror
 
 
+def test_a_cap_in_two_layers_is_found_popped_through() -> None:
+    """Its joints are nearly where the reflection has them: the layers are 1 % of half the width apart."""
+    popped = steel_cap(rs.Pin(eccentricity=2e-3)).popped["pinned"]
+    shell, found = settled_shell(popped)
+    search = other_shapes(shell, found, most_factorizations=12)
+    (image,) = search.found
+    assert image.mirror
+    assert search.tried == 1
+    assert image.from_flat is None
+    own, there = (x[shell.mesh.joint_pairs].mean(axis=1) for x in (popped.positions, image.positions))
+    rim = popped.positions[shell.mesh.ends, 2].mean()
+    np.testing.assert_allclose(there[:, :2], own[:, :2], atol=0.01 * half_width(popped.positions))
+    np.testing.assert_allclose(there[:, 2] - rim, rim - own[:, 2], atol=0.01 * half_width(popped.positions))
+
+
+def test_the_supports_of_two_layers_span_the_surface_that_they_do_without_layers() -> None:
+    popped = square_cap().popped["pinned"]
+    mesh = popped.footprint.mesh
+    layered = mesh.in_layers(2e-3)
+    np.testing.assert_allclose(
+        spanned(layered, popped.positions[mesh.rod_nodes]), spanned(mesh, popped.positions)[mesh.rod_nodes], atol=1e-12
+    )
+
+
 def test_the_mirror_image_of_a_shell_that_rises_from_flat_does_so_too() -> None:
     others = check(dome().popped, ROD, stages=8).other_shapes["pinned"]
     assert [one.from_flat for one in others.found if one.mirror] == [True]
