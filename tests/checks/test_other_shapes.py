@@ -10,6 +10,7 @@ from shells import ROD, dome
 import rodshell as rs
 from rodshell.checks import OtherShape, OtherShapes, check, deploy, other_shapes, settled_shell
 from rodshell.checks.other_shapes import spanned
+from rodshell.joints import Joint
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import find_equilibrium
 from rodshell.solve.modes import softest_modes
@@ -111,6 +112,51 @@ def test_a_shell_on_a_plane_has_its_reflection_and_that_is_named_as_such() -> No
     assert image.energy == pytest.approx(1.0, rel=0.01)
     turned_over = popped.positions - 2 * height[:, None] * [0.0, 0.0, 1.0]
     assert np.abs(image.positions - turned_over).max() < 0.02 * half_width(popped.positions)
+
+
+@cache
+def steel_cap(joint: Joint) -> rs.Form:
+    """A cap of 0.6 m of steel rods, whose rim is plane."""
+    rod = rs.Rod(rs.Circle(0.001), rs.Material(2e11, 7800.0))
+    layout = rs.GridLayout(rods=(7, 7), spacing=(0.06, 0.06), length=0.6, edge=0.03)
+    return rs.find_form(rs.Cap(0.4, 0.346), layout, rod, ends="pinned", joint=joint)
+
+
+@pytest.mark.parametrize("joint", [rs.Pin(), rs.Rigid()])
+def test_a_cap_whose_sections_turn_with_the_shell_has_its_reflection_only(joint: Joint) -> None:
+    """The reflection of a stable shape in the plane of its supports is one, whatever the joints are."""
+    popped = steel_cap(joint).popped["pinned"]
+    shell, found = settled_shell(popped)
+    (image,) = other_shapes(shell, found, most_factorizations=20).found
+    height = popped.positions[:, 2] - popped.positions[popped.footprint.mesh.ends, 2].mean()
+    turned_over = popped.positions - 2 * height[:, None] * [0.0, 0.0, 1.0]
+    assert np.abs(image.positions - turned_over).max() < 1e-3 * half_width(popped.positions)
+    assert image.energy == pytest.approx(1.0, rel=0.01)  # its ends lie off their plane by a little
+    assert image.mirror
+
+
+def test_a_cap_in_two_layers_is_found_popped_through() -> None:
+    """Its joints are nearly where the reflection has them: the layers are 1 % of half the width apart."""
+    popped = steel_cap(rs.Pin(eccentricity=2e-3)).popped["pinned"]
+    shell, found = settled_shell(popped)
+    search = other_shapes(shell, found, most_factorizations=12)
+    (image,) = search.found
+    assert image.mirror
+    assert search.tried == 1
+    assert image.from_flat is None
+    own, there = (x[shell.mesh.joint_pairs].mean(axis=1) for x in (popped.positions, image.positions))
+    rim = popped.positions[shell.mesh.ends, 2].mean()
+    np.testing.assert_allclose(there[:, :2], own[:, :2], atol=0.01 * half_width(popped.positions))
+    np.testing.assert_allclose(there[:, 2] - rim, rim - own[:, 2], atol=0.01 * half_width(popped.positions))
+
+
+def test_the_supports_of_two_layers_span_the_surface_that_they_do_without_layers() -> None:
+    popped = square_cap().popped["pinned"]
+    mesh = popped.footprint.mesh
+    layered = mesh.in_layers(2e-3)
+    np.testing.assert_allclose(
+        spanned(layered, popped.positions[mesh.rod_nodes]), spanned(mesh, popped.positions)[mesh.rod_nodes], atol=1e-12
+    )
 
 
 def test_the_mirror_image_of_a_shell_that_rises_from_flat_does_so_too() -> None:

@@ -12,6 +12,7 @@ from forms import TARGETS, archive, breaking, wished
 from sample_archive import sample_archive, table_archive, with_way_up
 
 import rodshell as rs
+from rodshell.checks import Deployment
 from rodshell.output import Archive, wording
 from rodshell.output.archive import export
 from rodshell.output.figures import checks_table, key_figures
@@ -19,6 +20,7 @@ from rodshell.output.plan import flat_plan
 from rodshell.output.result import rod_table
 from rodshell.output.verdict import facts
 from rodshell.output.viewer import viewer_data, viewer_json
+from rodshell.solve.path import Snap
 from tests.acceptance.cases import ROD
 
 
@@ -103,7 +105,7 @@ def test_frames_of_the_view_are_the_archive_s_shapes() -> None:
 def test_without_a_way_up_the_view_says_that_nothing_is_known_between(tmp_path: Path) -> None:
     made = sample_archive()
     page = page_of(made, tmp_path).read_text()
-    assert "The way up from flat was not followed: nothing is known between these shapes." in page
+    assert "The deployment from flat was not followed: nothing is known between these shapes." in page
     assert len((viewer_data(made) or {})["frames"]) == 3  # flat, pinned, clamped, and nothing made up
 
 
@@ -130,7 +132,9 @@ def test_the_verdict_comes_first_with_its_colour_and_all_reasons(level: str, tmp
 
 def test_warnings_are_reasons_and_stand_once(tmp_path: Path) -> None:
     made = archive("dome")
-    words = "between 14 % and 25 % of the way from flat the shell snaps: there it must be pushed"
+    snaps = (Snap(0.14, 0.15, 0.03),)
+    way = Deployment(np.zeros(1), np.zeros((1, 1, 3)), (), snaps, reached_from_flat=True)
+    (words,) = way.warnings
     result = {key: value for key, value in made.result.items() if key != "verdict"} | {"warnings": [words]}
     page = page_of(replace(made, result=result), tmp_path).read_text()
     assert page.count(words) == 1
@@ -174,7 +178,7 @@ def with_way(strength_used: float | None, lost: float | None, snaps: list[list[f
      (0.5625, [], "above 56 % of the deployment; below, nothing is known of it.", "Below 56 %",
       "on the way up above 56 %"),
      (1.0, [], "nothing is known of the deployment, which could not be followed.",
-      "The way up from flat was not followed", None)],
+      "The deployment from flat was not followed", None)],
 )  # fmt: skip
 def test_no_more_is_said_of_the_way_up_than_was_followed(
     lost: float | None, snaps: list[list[float]], words: str, note: str, head: str | None, tmp_path: Path
@@ -190,6 +194,28 @@ def test_no_more_is_said_of_the_way_up_than_was_followed(
     lines = [line for line in made.summary().splitlines() if line.startswith("  bending   stages")]
     assert len(lines) == (head is not None)
     assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)  # as the warning has it
+
+
+@pytest.mark.parametrize(
+    ("lost", "snaps", "guided", "note"),
+    [(None, [], None, "Every stage is an equilibrium of the elastic grid with pinned ends."),
+     (None, [[0.14, 0.15], [0.33, 0.34]], None,
+      "Every stage is an equilibrium of the elastic grid with pinned ends; at 14 %, 33 % of the deployment the shell "
+      "snaps forward."),
+     (None, [], [0.25, 0.5625],
+      "Every stage is an equilibrium of the elastic grid with pinned ends; between 25 % and 56 % of the deployment it "
+      "has to be guided, and nothing is known there."),
+     (0.5625, [], None,
+      "Below 56 % of the deployment no stage could be found: nothing is known there. Above, every one is an "
+      "equilibrium of the elastic grid with pinned ends.")],
+)  # fmt: skip
+def test_under_the_view_stands_where_the_stages_do_not_follow_each_other_smoothly(
+    lost: float | None, snaps: list[list[float]], guided: list[float] | None, note: str, tmp_path: Path
+) -> None:
+    made = with_way(None, lost, snaps)
+    result = {**made.result, "deployment": {**made.result["deployment"], "guided": guided}}
+    page = page_of(replace(made, result=result), tmp_path).read_text()
+    assert f"<figcaption>{note}</figcaption>" in page
 
 
 def test_a_way_up_that_nobody_followed_is_not_included() -> None:

@@ -14,9 +14,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
+from rodshell.checks.bending import edge_directors, rod_frames
 from rodshell.checks.deployment import SAME, Deployment
+from rodshell.formfinding.draped import middle_surface
+from rodshell.geometry.frames import parallel_transport, signed_angle
+from rodshell.geometry.vectors import unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.rods.bend_twist import BendTwist
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.modes import softest_modes
@@ -33,7 +38,7 @@ FEWEST_A_START = 2
 MODES_COST = 5  # factorisations that take as long as finding the modes, with those that they need
 EACH = 4  # factorisations of an iteration at most, where the tangent stiffness is indefinite
 COPLANAR = 1e-3  # of the size: how far supports may lie off their plane for the shell to have a mirror image,
-MIRRORED = 0.02  # and the image off the reflection: trimmed ends lie off the plane by some 1e-4
+MIRRORED = 0.02  # and the image off the reflection: trimmed ends lie some 1e-4 off the plane, layers keep their order
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,8 @@ class OtherShape:
     distance : of the farthest node from its place in the shell's own shape, over half the shell's width.
     energy : over that of the shell's own shape.
     from_flat : whether a deployment ends in it, that of this shell or its mirror image; None where none is known to.
-    mirror : whether it is the reflection in the plane of the supports.
+    mirror : whether it is the reflection in the plane of the supports; of rods in two layers, whose order stays,
+        that of the surface between them.
     positions : (n, 3) of the mesh's nodes [m].
     """
 
@@ -124,11 +130,12 @@ class _Search:
             places=shell.places, pattern=found.pattern,
         )  # fmt: skip
         self.energy = potential(self.problem, found)
-        self.normal, middle, off = _plane(self.positions[shell.mesh.ends.ravel()])
-        self.reached = None if deployment is None else deployment.reached_from_flat
-        height = (self.positions - middle) @ self.normal
+        crossed = (shell.mesh.grid.joint_counts() > 0).all()  # else no normals are known
+        self.middle = middle_surface(shell.mesh, shell.mesh, self.positions) if crossed else self.positions
+        self.normal, origin, off = _plane(self.middle[shell.mesh.ends.ravel()])
+        self.reached = deployment is not None and deployment.reached_from_flat
         plane = off < COPLANAR * self.length and not len(shell.ghosts)  # a clamp's direction has no image
-        self.image = self.positions - 2 * height[:, None] * self.normal if plane else None
+        self.image = self._mirrored((self.middle - origin) @ self.normal) if plane else None
         self.shapes = list[OtherShape]()
         if deployment is not None and (there := deployment.elsewhere) is not None:
             self.shapes.append(OtherShape(there.distance, there.energy, True, False, there.positions))
@@ -162,7 +169,8 @@ class _Search:
         known = (self.positions, *(one.positions for one in self.shapes))
         if there.report.stable and all(self._apart(positions, one) > SAME for one in known):
             mirror = self.image is not None and self._apart(positions, self.image) < MIRRORED
-            from_flat = True if mirror and self.reached else None  # lifted to the other side it goes to its image
+            same = mirror and not self.shell.mesh.layered  # lifted to the other side it goes to its image
+            from_flat = True if same and self.reached else None
             energy = potential(self.problem, there) / self.energy
             self.shapes.append(OtherShape(self._apart(positions, self.positions), energy, from_flat, mirror, positions))
 
@@ -174,30 +182,60 @@ class _Search:
         return [mode / np.linalg.norm(mode[self.shell.stretch.blocks], axis=2).max() for mode in modes]
 
     def _through(self) -> Floats:
-        """Each node mirrored in the surface that the supports span, across their plane; the supports stay."""
+        """Each node mirrored in the surface that the supports span, across their plane; the supports stay. So are the
+        sections, whose first directors are kept on the side of the shell where they were."""
         nodes = np.flatnonzero(self.shell.like < self.shell.mesh.node_count)
-        above = (self.positions - spanned(self.shell.mesh, self.positions)) @ self.normal
+        above = (self.middle - spanned(self.shell.mesh, self.middle)) @ self.normal
         state = self.own.state.copy()
-        state[nodes] -= 2 * above[self.shell.like[nodes], None] * self.normal
+        state[nodes] += (self._mirrored(above) - self.positions)[self.shell.like[nodes]]
         held = np.append(self.shell.ends, self.shell.ghosts)
         state[held] = self.own.state[held]
+        if frames := rod_frames(self.shell):
+            self._turn_sections(frames, state)
         return state
+
+    def _turn_sections(self, frames: BendTwist, state: Floats) -> None:
+        """Set the twist angles of a state whose nodes are mirrored to those of mirrored sections."""
+        shell, own = self.shell, self.own.state
+        before, now = (unit(np.diff(at[shell.stretch.blocks], axis=1)[:, 0]) for at in (own, state))
+        directors = edge_directors(shell, frames, own)
+        wanted = parallel_transport(-self._reflected(directors), self._reflected(before), now)
+        turns = signed_angle(parallel_transport(directors, before, now), wanted, now)
+        shell.turn_edges(state, np.unwrap(turns))  # neighbours less than half a revolution apart: twists keep small
+        if shell.angles > len(turns):  # sections are free to spin in their clamps: no twist there
+            clamps = frames.blocks[-len(shell.ghosts) :]
+            twist = frames.strains(state)[-len(shell.ghosts) :, 2]
+            state[clamps[::2, 1], 0] += twist[::2]  # at a rod's start the ghost edge comes first
+            state[clamps[1::2, 3], 0] -= twist[1::2]
+
+    def _mirrored(self, above: Floats) -> Floats:
+        """(n, 3) the nodes, mirrored in what the surface between layers is `above` (n,); layers keep their order."""
+        return self.middle - 2 * above[:, None] * self.normal - self._reflected(self.positions - self.middle)
+
+    def _reflected(self, vectors: Floats) -> Floats:
+        """(n, 3) vectors as the plane of the supports reflects them."""
+        return np.asarray(vectors - 2 * (vectors @ self.normal)[:, None] * self.normal)
 
     def _apart(self, one: Floats, two: Floats) -> float:
         return float(np.linalg.norm(one - two, axis=1).max()) / self.length
 
 
 def spanned(mesh: GridMesh, positions: Floats) -> Floats:
-    """(n, 3) nodes on the surface that the rod ends span like a net of soft springs along the edges."""
-    ends = np.unique(mesh.ends)
-    inner = np.setdiff1d(np.arange(mesh.node_count), ends)
-    stiffness, (i, j) = 1 / mesh.edge_lengths, mesh.edges.T
+    """(n, 3) nodes on the surface that the rod ends span like a net of soft springs along the edges.
+
+    Rods in two layers, whose nodes lie at `positions` of the surface between them, are joined at their crossings.
+    """
+    joined = np.arange(mesh.node_count)
+    joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]
+    ends = np.unique(joined[mesh.ends])
+    inner = np.setdiff1d(joined, ends)
+    stiffness, (i, j) = 1 / mesh.edge_lengths, joined[mesh.edges].T
     size = (mesh.node_count, mesh.node_count)
     pulls = coo_matrix((np.tile(stiffness, 2), (np.append(i, j), np.append(j, i))), shape=size).tocsr()
     whole = (diags(np.asarray(pulls.sum(axis=1)).ravel()) - pulls).tocsr()
     result = positions.copy()
     result[inner] = splu(whole[inner][:, inner].tocsc()).solve(np.asarray(-(whole[inner][:, ends] @ positions[ends])))
-    return result
+    return np.asarray(result[joined])
 
 
 def _plane(points: Floats) -> tuple[Floats, Floats, float]:

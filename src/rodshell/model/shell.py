@@ -177,12 +177,13 @@ class Shell:
         before, now = (unit(np.diff(ends, axis=1)[:, 0]) for ends in (flat, state[self.stretch.blocks]))
         carried = parallel_transport(adapted(np.broadcast_to(UP, before.shape), before), before, now)
         wanted = adapted(unit(normals[self.mesh.edges].sum(axis=1)), now)
-        turn = np.append(signed_angle(carried, wanted, now), np.zeros(len(self.ghosts)))
-        whole = np.zeros((self.like.max() + 1, 1))
+        self.turn_edges(state, signed_angle(carried, wanted, now))
+
+    def turn_edges(self, state: Floats, turns: Floats) -> None:
+        """Add `turns` (e,) [rad] to the twist angles of the rods' edges, and of the linkers that copy them."""
         first = self.mesh.node_count + len(self.ghosts)
-        whole[first : first + self.angles, 0] = turn[: self.angles]
-        turning = self.like >= first
-        state[turning, 0] = whole[self.like[turning], 0]
+        turning = np.flatnonzero((self.like >= first) & (self.like < first + len(turns)))
+        state[turning, 0] += turns[self.like[turning] - first]
 
 
 class _Builder:

@@ -19,12 +19,14 @@ from rodshell.output.viewer import viewer_data, viewer_json
 from rodshell.output.wording import percent, stage
 
 IN_PAGE = ("supports", "elevations", "erection")
-FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
+FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends{gaps}."
 PARTLY = (
-    "Below {share} of the way up from flat no stage could be found: nothing is known there. Above, every one is an "
+    "Below {share} of the deployment no stage could be found: nothing is known there. Above, every one is an "
+    "equilibrium of the elastic grid with pinned ends{gaps}."
 )
-PARTLY += "equilibrium of the elastic grid with pinned ends, followed back from the popped-up shell."
-NOT_FOLLOWED = "The way up from flat was not followed: nothing is known between these shapes."
+SNAPS = "; at {places} of the deployment the shell snaps forward"
+GUIDED = "; between {start} and {stop} of the deployment it has to be guided, and nothing is known there"
+NOT_FOLLOWED = "The deployment from flat was not followed: nothing is known between these shapes."
 
 
 def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing]) -> str:
@@ -93,7 +95,12 @@ def _note(archive: Archive) -> str:
     unknown = unknown_below(archive.result)
     if "history" not in archive.states or unknown >= 1:
         return NOT_FOLLOWED
-    return PARTLY.format(share=stage(unknown)) if unknown else FOLLOWED
+    way, gaps = archive.result.get("deployment") or {}, ""
+    if snaps := way.get("snaps"):
+        gaps += SNAPS.format(places=", ".join(stage(start) for start, _ in snaps))
+    if guided := way.get("guided"):
+        gaps += GUIDED.format(start=stage(guided[0]), stop=stage(guided[1]))
+    return (PARTLY if unknown else FOLLOWED).format(share=stage(unknown), gaps=gaps)
 
 
 def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
