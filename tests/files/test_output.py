@@ -121,13 +121,14 @@ def test_joint_marks_of_both_rods_coincide(which: str, request: pytest.FixtureRe
     for row, circle in zip(joints, circles, strict=True):
         for side in "ab":
             start, end = lines[row[f"rod_{side}"]]
-            mark = start + float(row[f"at_{side}_mm"]) * (end - start) / np.linalg.norm(end - start)
+            mark = start + float(row[f"at_{side}_from_cut_end_mm"]) * (end - start) / np.linalg.norm(end - start)
             np.testing.assert_allclose(mark, circle, atol=TOLERANCE)
         assert row["id"] in names
     listed = {
-        row["id"]: dict(re.findall(r"([^;]+) (\S+?)(?:; |$)", row["joints_at_mm"])) for row in rows(out, "rods.csv")
+        row["id"]: dict(re.findall(r"([^;]+) (\S+?)(?:; |$)", row["joints_from_cut_end_mm"]))
+        for row in rows(out, "rods.csv")
     }
-    assert all(listed[row["rod_b"]][row["rod_a"]] == row["at_b_mm"] for row in joints)
+    assert all(listed[row["rod_b"]][row["rod_a"]] == row["at_b_from_cut_end_mm"] for row in joints)
     assert sum(map(len, listed.values())) == 2 * len(joints)
 
 
