@@ -46,6 +46,7 @@ def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent
     if name != "table":
         assert found["stress"] == pictures[-1] != found["gap"]
     assert found["turned"] != found["stress"]
+    assert found["over"] == []  # at 1300 and 420 px no cell runs out of its column
     lengths = [float(value) for value in found["up"]]
     assert lengths == sorted(lengths)
     assert [float(value) for value in found["down"]] == lengths[::-1]
