@@ -387,8 +387,12 @@ def test_fine_meshes_do_not_swell_a_picture() -> None:
     assert fine < 1.3 * coarse
 
 
-def test_table_is_coloured_by_height() -> None:
-    assert "height in mm" in picture_svg(table_archive(), "popped_pinned")
+@pytest.mark.parametrize("larger", [1.0, 100.0])
+def test_table_is_coloured_by_height_in_the_unit_of_the_axes(larger: float) -> None:
+    made = table_archive()
+    high = {**made.states, "popped_pinned": larger * made.states["popped_pinned"]}
+    assert np.ptp(high["popped_pinned"][:, 2]) > 1.0 or larger == 1.0
+    assert "height in mm" in picture_svg(replace(made, states=high), "popped_pinned")
 
 
 def test_report_of_60_by_60_rods_stays_below_5_megabytes(tmp_path: Path) -> None:
