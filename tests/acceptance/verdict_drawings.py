@@ -157,8 +157,9 @@ def sum_rows(name: str, archive: Archive) -> Iterator[Row]:
         export(archive, folder, ["csv"])
         rows = csv.DictReader(io.StringIO((Path(folder) / "schedule/rods.csv").read_text(encoding="utf-8")))
         for row, rod in zip(rows, archive.result["rods"], strict=True):
-            shown = [float(word.split()[-1]) for word in row["joints_at_mm"].split("; ") if word]
-            exact = sorted(1e3 * joint["at"] for joint in rod["joints"])
+            shown = [float(word.split()[-1]) for word in row["joints_from_cut_end_mm"].split("; ") if word]
+            before = 0.5 * (rod["cut_length"] - rod["length"])  # the allowance
+            exact = sorted(1e3 * (before + joint["at"]) for joint in rod["joints"])
             worst = max(worst, float(np.abs(np.subtract(shown, exact)).max(initial=0.0)))
     yield Row(name, "joints' distances off the exact ones", worst, 0.5 * step * (1 + 1e-9), "mm")
 

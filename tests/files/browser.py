@@ -70,6 +70,15 @@ addEventListener("load", () => {
     const k = heads.findIndex(head => head.textContent.startsWith("cut length"));
     heads[k].click(); found.up = column(table, k); heads[k].click(); found.down = column(table, k);
     found.ids = column(table, 0);
+    found.over = [];
+    for (const width of [1300, 420]) {
+      Object.assign(document.body.style, { width: width + "px", maxWidth: Math.min(width, 1088) + "px" });
+      for (const part of document.querySelectorAll(".groups *, .narrow *, .notice *, header *")) {
+        const room = part.closest("section, div, header").getBoundingClientRect().right;
+        if (part.getBoundingClientRect().right > room + 1) found.over.push([width, part.textContent.trim()]);
+      }
+    }
+    Object.assign(document.body.style, { width: "", maxWidth: "" });
     const start = performance.now();
     if (view) { slider.dispatchEvent(new Event("input")); await wait(); }
     found.frame = performance.now() - start;

@@ -1,5 +1,6 @@
 """The drawing set: true to scale, on sheets that match, with labels that never cover each other."""
 
+import csv
 import io
 import re
 import zlib
@@ -34,7 +35,6 @@ from rodshell.output.labels import boxes_meet, lines_meet, spread
 from rodshell.output.plan import flat_plan
 from rodshell.output.rods import joint_places, rods_of
 from rodshell.output.rounding import rounding_of
-from rodshell.output.schedules import rods_table
 from rodshell.output.takeaway import DrawingStyle, Takeaway
 
 PAPER = (420.0, 297.0)  # A3
@@ -287,24 +287,42 @@ def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[st
     assert elevations_drawing(replace(made, states=longer), plan.text).texts[0].text != spans[0]
 
 
-def test_strips_show_the_schedule(tmp_path: Path) -> None:
-    """Marks of the strips lie at the distances of the schedule, plus the allowance; splices have theirs."""
-    export(wished(), tmp_path, ["dxf"])
+def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:
+    """Strips, both schedules, the PDF's tables and the pieces of stock: 12 mm of allowance before the rod's start."""
+    made = wished()
+    half = 0.501 * rounding_of(made.result).step
+    export(made, tmp_path, ["dxf", "csv"])
+    rods, joints, stock = (rows_of(tmp_path / f"schedule/{name}.csv") for name in ("rods", "joints", "stock"))
+    pieces = dict(words.split() for row in stock for words in row["pieces_mm"].split("; "))
+    tables = [one for one in sheet_set(made, flat_plan(made))[0] if re.match("(Rods|Joints)(,|$)", one.title)]
+    printed = {word for sheet in tables for text in sheet.texts for word in text.text.split("; ")}
     entities = read_dxf(tmp_path / "drawings/strips.dxf")
-    (columns, rows), half = rods_table(wished()), 0.501 * rounding_of(wished().result).step
     lines = sorted((one.points for one in entities if one.layer == "LASER"), key=lambda points: -points[0, 1])
-    marks = np.array([one.points[0] for one in entities if one.kind == "CIRCLE" and one.layer == "MARK"])
-    assert len(lines) == len(rows)
-    for row, line in zip(rows, lines, strict=True):
-        cells = dict(zip(columns, row, strict=True))
-        assert line[1, 0] - line[0, 0] == pytest.approx(float(cells["cut_length_mm"]), abs=half)
-        at = sorted(float(word.split()[-1]) for word in cells["joints_at_mm"].split("; "))
-        mine = np.sort(marks[np.abs(marks[:, 1] - line[0, 1]) < 1e-6, 0])
-        np.testing.assert_allclose(mine, np.array(at) + 12.0, atol=half)
-        ticks = [one.points for one in entities if one.kind == "LINE" and one.layer == "MARK"]
-        splices = [tick[0, 0] for tick in ticks if abs(tick.mean(axis=0)[1] - line[0, 1]) < 1e-6]
-        wanted = [float(word) for word in cells["splices_at_mm"].split("; ") if word]
-        np.testing.assert_allclose(sorted(splices), np.array(wanted) + 12.0, atol=half)
+    holes, saws = (
+        np.array([one.points.mean(axis=0) for one in entities if one.layer == "MARK" and one.kind == kind])
+        for kind in ("CIRCLE", "LINE")
+    )
+    for rod, row, line in zip(made.result["rods"], rods, lines, strict=True):
+        assert line[1, 0] - line[0, 0] == pytest.approx(float(row["cut_length_mm"]), abs=half)
+        met = {joint["with"]: 1e3 * joint["at"] + 12.0 for joint in rod["joints"]}
+        cuts = 1e3 * np.array(rod["splices"]) + 12.0
+        for marks, wanted in ((holes, sorted(met.values())), (saws, cuts)):
+            np.testing.assert_allclose(np.sort(marks[np.abs(marks[:, 1] - line[0, 1]) < 1e-6, 0]), wanted, atol=half)
+        listed = dict(word.split() for word in row["joints_from_cut_end_mm"].split("; "))
+        assert {name: float(at) for name, at in listed.items()} == pytest.approx(met, abs=half)
+        shown = [word for word in row["splices_from_cut_end_mm"].split("; ") if word]
+        np.testing.assert_allclose([float(word) for word in shown], cuts, atol=half)
+        lengths = [float(pieces[f"{rod['id']}.{k + 1}"]) for k in range(len(cuts) + 1)]
+        np.testing.assert_allclose(np.cumsum(lengths)[:-1], cuts, atol=len(lengths) * half)
+        ends = [(joint[f"rod_{b}"], joint[f"at_{a}_from_cut_end_mm"])
+                for joint in joints for a, b in ("ab", "ba") if joint[f"rod_{a}"] == rod["id"]]  # fmt: skip
+        assert {name: float(at) for name, at in ends} == pytest.approx(met, abs=half)
+        assert {*shown, *(at for _, at in ends)} <= printed
+    assert any(rod["splices"] for rod in made.result["rods"])
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
 
 
 def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> None:

@@ -121,13 +121,14 @@ def test_joint_marks_of_both_rods_coincide(which: str, request: pytest.FixtureRe
     for row, circle in zip(joints, circles, strict=True):
         for side in "ab":
             start, end = lines[row[f"rod_{side}"]]
-            mark = start + float(row[f"at_{side}_mm"]) * (end - start) / np.linalg.norm(end - start)
+            mark = start + float(row[f"at_{side}_from_cut_end_mm"]) * (end - start) / np.linalg.norm(end - start)
             np.testing.assert_allclose(mark, circle, atol=TOLERANCE)
         assert row["id"] in names
     listed = {
-        row["id"]: dict(re.findall(r"([^;]+) (\S+?)(?:; |$)", row["joints_at_mm"])) for row in rows(out, "rods.csv")
+        row["id"]: dict(re.findall(r"([^;]+) (\S+?)(?:; |$)", row["joints_from_cut_end_mm"]))
+        for row in rows(out, "rods.csv")
     }
-    assert all(listed[row["rod_b"]][row["rod_a"]] == row["at_b_mm"] for row in joints)
+    assert all(listed[row["rod_b"]][row["rod_a"]] == row["at_b_from_cut_end_mm"] for row in joints)
     assert sum(map(len, listed.values())) == 2 * len(joints)
 
 
@@ -386,8 +387,12 @@ def test_fine_meshes_do_not_swell_a_picture() -> None:
     assert fine < 1.3 * coarse
 
 
-def test_table_is_coloured_by_height() -> None:
-    assert "height in mm" in picture_svg(table_archive(), "popped_pinned")
+@pytest.mark.parametrize("larger", [1.0, 100.0])
+def test_table_is_coloured_by_height_in_the_unit_of_the_axes(larger: float) -> None:
+    made = table_archive()
+    high = {**made.states, "popped_pinned": larger * made.states["popped_pinned"]}
+    assert np.ptp(high["popped_pinned"][:, 2]) > 1.0 or larger == 1.0
+    assert "height in mm" in picture_svg(replace(made, states=high), "popped_pinned")
 
 
 def test_report_of_60_by_60_rods_stays_below_5_megabytes(tmp_path: Path) -> None:

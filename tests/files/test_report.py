@@ -16,8 +16,10 @@ from rodshell.checks import Deployment
 from rodshell.output import Archive, wording
 from rodshell.output.archive import export
 from rodshell.output.figures import checks_table, key_figures
+from rodshell.output.inputs import shown_case
 from rodshell.output.plan import flat_plan
 from rodshell.output.result import rod_table
+from rodshell.output.rounding import Rounding
 from rodshell.output.verdict import facts
 from rodshell.output.viewer import viewer_data, viewer_json
 from rodshell.solve.path import Snap
@@ -48,6 +50,7 @@ def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent
     if name != "table":
         assert found["stress"] == pictures[-1] != found["gap"]
     assert found["turned"] != found["stress"]
+    assert found["over"] == []  # at 1300 and 420 px no cell runs out of its column
     lengths = [float(value) for value in found["up"]]
     assert lengths == sorted(lengths)
     assert [float(value) for value in found["down"]] == lengths[::-1]
@@ -245,6 +248,22 @@ def test_every_number_of_a_material_has_its_unit() -> None:
         "density": "470 kg/m\N{SUPERSCRIPT THREE}",
         "shear modulus": "0.69 GPa",
     }
+
+
+def test_a_page_for_others_names_files_and_no_folders() -> None:
+    target = {"kind": "mesh", "file": "/home/ann/roof.obj", "boundary": "C:\\ann\\rim.dxf", "unit": 0.001}
+    assert wording.case_rows(target) == [("kind", "mesh"), ("file", "roof.obj"), ("boundary", "rim.dxf")]
+    case = '[target]\nfile = "/home/ann/roof.obj"\nboundary = "/home/ann/rim.dxf"\n'
+    assert (
+        shown_case(case, {"/home/ann/roof.obj": b"v"}) == '[target]\nfile = "inputs/roof.obj"\nboundary = "rim.dxf"\n'
+    )
+
+
+def test_lengths_of_the_case_follow_the_rounding() -> None:
+    layout = {"spacing": [0.5, 0.5], "edge": 0.5 / 6, "offset": [0.0, -0.0125]}
+    assert [value for _, value in wording.case_rows(layout, Rounding(0.1))] == [
+        "500 mm \N{MULTIPLICATION SIGN} 500 mm", "83.3 mm", "0 mm, \N{MINUS SIGN}12.5 mm",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

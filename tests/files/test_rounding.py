@@ -50,8 +50,16 @@ def test_distances_along_a_rod_do_not_add_up_their_roundings(steps: list[float])
 
 
 def test_heads_of_tables_are_words_with_units() -> None:
-    columns = ("cut_length_mm", "max_stress_pop_up_MPa", "flat_deg", "id", "force_x_N_pinned", "mass_kg", "at_a_mm")
+    columns = (
+        "cut_length_mm",
+        "max_stress_pop_up_MPa",
+        "flat_deg",
+        "id",
+        "force_x_N_pinned",
+        "mass_kg",
+        "at_a_from_cut_end_mm",
+    )
     assert [heading(column) for column in columns] == [
         "cut length [mm]", "max stress pop up [MPa]", "angle flat [\N{DEGREE SIGN}]", "id", "force x pinned [N]",
-        "mass [kg]", "at a [mm]",
+        "mass [kg]", "at a from cut end [mm]",
     ]  # fmt: skip

@@ -119,5 +119,5 @@ def test_without_wishes_there_is_no_stock_and_no_utilisation(tmp_path: Path) -> 
     names = export(archive("ridge"), tmp_path, ["csv"])
     assert "schedule/stock.csv" not in names
     rows = list(csv.DictReader(io.StringIO((tmp_path / "schedule/rods.csv").read_text())))
-    assert all(row["utilisation_pop_up"] == row["splices_at_mm"] == "" for row in rows)
+    assert all(row["utilisation_pop_up"] == row["splices_from_cut_end_mm"] == "" for row in rows)
     assert all(row["cut_length_mm"] == row["length_mm"] for row in rows)

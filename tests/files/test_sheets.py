@@ -9,7 +9,9 @@ from forms import archive, wished
 from hostile import hostile_archive
 from sample_archive import sample_archive, table_archive
 
+import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.joints import Joint, joint_parameters
 from rodshell.output import Archive
 from rodshell.output.drawing import LETTER, Drawing
 from rodshell.output.drawings import sheet_set
@@ -82,6 +84,21 @@ def test_the_title_block_names_rods_joints_author_and_date() -> None:
         texts = {text.text for text in sheet.texts}
         assert set(entries) | {"A. Nyone", "circle, radius 1 mm"} <= texts
         assert any(text.startswith("Pavilion roof: ") for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("joint", "words"),
+    [
+        (rs.Pin(eccentricity=0.008), "pin, eccentricity 8 mm"),
+        (rs.Ball(), "ball"),
+        (rs.Ball(mass=0.12), "ball, mass 0.12 kg"),
+        (rs.Spring(shear=0.5, out_of_plane=float("inf")), "spring, shear 0.5 N m/rad, out of plane rigid"),
+    ],
+)
+def test_joints_stand_in_the_title_block_with_their_units(joint: Joint, words: str) -> None:
+    made = wished()
+    made = replace(made, result={**made.result, "joint": joint_parameters(joint)})
+    assert dict(title_block(made, "").entries)["Joints"] == words
 
 
 def test_the_date_is_that_of_source_date_epoch_or_today(monkeypatch: pytest.MonkeyPatch) -> None:

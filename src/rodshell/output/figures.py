@@ -146,8 +146,8 @@ def key_figures(result: Mapping[str, Any], plan: FlatPlan) -> list[tuple[str, li
     drape, rod = result.get("drape") or {}, result.get("rod") or {}
     parts = [rod.get("section"), rod.get("material"), rod]
     groups = [
-        ("Target", wording.case_rows(result.get("target"))),
-        ("Layout", wording.case_rows(result.get("layout"))),
+        ("Target", wording.case_rows(result.get("target"), plan.rounding)),
+        ("Layout", wording.case_rows(result.get("layout"), plan.rounding)),
         ("Cut list", _cut_list(plan)),
         (
             "Rod",

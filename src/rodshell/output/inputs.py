@@ -42,6 +42,12 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
     return _renamed(case_toml, places), copies
 
 
+def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
+    """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone."""
+    kept, copies = kept_case(case_toml, inputs, Path.cwd())
+    return _renamed(kept, {name: Path(name).name for name in _names(kept) if name not in copies})
+
+
 def opened_case(case_toml: str, where: Callable[[str], Path]) -> tuple[str, dict[str, bytes]]:
     """The case of a result folder and the contents of its inputs; files that were not copied are named absolutely.
 

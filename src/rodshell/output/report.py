@@ -7,6 +7,7 @@ from typing import Any
 from rodshell.output.archive import SHELLS, Archive
 from rodshell.output.drawing import Drawing
 from rodshell.output.figures import checks_table, key_figures, levels_table, supports_table
+from rodshell.output.inputs import shown_case
 from rodshell.output.pictures import picture_svg
 from rodshell.output.plan import NOTE, FlatPlan
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
@@ -66,7 +67,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         tables=[
             (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
         ],
-        case=archive.case_toml,
+        case=shown_case(archive.case_toml, archive.inputs),
         version=str(result.get("version_rodshell") or "unknown"),
         versions=", ".join(f"{name} {number}" for name, number in (result.get("versions") or {}).items()),
         format_version=str(result.get("version") or "unknown"),

@@ -47,6 +47,15 @@ class RodRecord:
         """By which it goes on past each end [m]."""
         return 0.5 * (self.cut_length - self.length)
 
+    def from_cut_end(self, at: float) -> float:
+        """As the workshop measures what lies at the distance `at` from the start: its allowance comes before [m]."""
+        return at + self.allowance
+
+    @property
+    def splices(self) -> tuple[float, ...]:
+        """Distances of its splices from the start [m]."""
+        return tuple(self.more.get("splices") or ())
+
     @property
     def layer(self) -> int | None:
         """1 the lowest; None where it is not known."""

@@ -64,10 +64,9 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
         return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
     if shape.flat or archive.result.get("target"):
         return None
-    heights = 1e3 * shape.positions[nodes, 2]
-    factor, unit = length_unit(float(np.abs(heights).max()))
-    low, high = float(heights.min()) / factor, float(heights.max()) / factor
-    return Scale(heights / factor, low, max(high, low + FINEST), HEIGHT, f"height in {unit}")
+    heights = 1e3 * shape.positions[nodes, 2]  # mm, as at the axes of the picture
+    low, high = float(heights.min()), float(heights.max())
+    return Scale(heights, low, max(high, low + FINEST), HEIGHT, "height in mm")
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:

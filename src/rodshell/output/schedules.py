@@ -34,7 +34,9 @@ def heading(column: str) -> str:
 
 
 def rods_table(archive: Archive, *, brief: bool = False) -> Table:
-    """One row a rod; `joints_at_mm` lists every joint at its distance from the rod's start (ends: 0, 1).
+    """One row a rod; `joints_from_cut_end_mm` lists every joint (ends: 0, 1).
+
+    Splices and joints are measured from the cut end of the rod's start, as on the strips.
 
     Bending is that of the final shape; where a column is named `pop_up`, the worst of all shapes, the way up included.
     """
@@ -59,13 +61,13 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
         ("max_torsion_stress_MPa", False, lambda rod: _mpa(rod.more.get("torsion_stress"))),
         ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
         ("utilisation_pop_up", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
-        ("splices_at_mm", True, lambda rod: "; ".join(mm(at) for at in rod.more.get("splices") or ())),
+        ("splices_from_cut_end_mm", True, lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.splices)),
         *_ends(mm, "flat", 2, lambda rod: rod.flat),
         ("final_state", False, lambda rod: final or "" if len(rod.nodes) else ""),
         *_ends(
             mm, "final", 3, lambda rod: archive.states[final][rod.nodes[[0, -1]]] if final and len(rod.nodes) else None
         ),
-        ("joints_at_mm", False, lambda rod: _joints_at(rod, mm)),
+        ("joints_from_cut_end_mm", False, lambda rod: _joints_at(rod, mm)),
     ]
     chosen = [column for column in columns if column[1] or not brief]
     rows = [[cell(rod) for _, _, cell in chosen] for rod in rods_of(archive)]
@@ -90,8 +92,8 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
         columns = {
             "id": joint.id,
             **({} if brief else {"rod_a": a.id, "rod_b": b.id}),
-            "at_a_mm": mm(joint.at[0]),
-            "at_b_mm": mm(joint.at[1]),
+            "at_a_from_cut_end_mm": mm(a.from_cut_end(joint.at[0])),
+            "at_b_from_cut_end_mm": mm(b.from_cut_end(joint.at[1])),
             "over": joint.over(rods),
             **({} if brief else {"flat_x_mm": mm(x), "flat_y_mm": mm(y)}),
             **({} if brief else {"final_state": (final or "") if on_a else ""}),
@@ -205,7 +207,9 @@ def end_paths_table(archive: Archive) -> Table:
 
 
 def _joints_at(rod: RodRecord, mm: Show) -> str:
-    return "; ".join(f"{other} {mm(at)}" for other, at in sorted(rod.joints, key=lambda joint: joint[1]))
+    return "; ".join(
+        f"{other} {mm(rod.from_cut_end(at))}" for other, at in sorted(rod.joints, key=lambda joint: joint[1])
+    )
 
 
 def _ends(

@@ -1,5 +1,6 @@
 """Numbers as they stand in a report, with their units."""
 
+import re
 from collections.abc import Mapping, Sequence
 from math import isfinite, pi
 from typing import Any
@@ -15,7 +16,7 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     **dict.fromkeys(
         ("radius", "height", "base", "size", "reference_size", "a", "b", "c", "spacing", "length"), (1e3, "mm")
     ),
-    **dict.fromkeys(("edge", "offset", "thickness", "width"), (1e3, "mm")),
+    **dict.fromkeys(("edge", "offset", "move", "thickness", "width"), (1e3, "mm")),
     **dict.fromkeys(("EI", "EI1", "EI2", "GJ"), (1.0, "N m\N{SUPERSCRIPT TWO}")),
     **dict.fromkeys(("mass", "mass_per_length"), (1.0, "kg/m")),
     "EA": (1.0, "N"),
@@ -23,7 +24,14 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     "fibre_distances": (1e3, "mm"),
     "torsion_modulus": (1e6, "cm\N{SUPERSCRIPT THREE}"),
     "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
-    "rotate": (180 / pi, "\N{DEGREE SIGN}"),
+    **dict.fromkeys(("rotate", "turn"), (180 / pi, "\N{DEGREE SIGN}")),
+}
+TURNING = (1.0, "N m/rad")
+JOINT_UNITS = {
+    "eccentricity": (1e3, "mm"),
+    "mass": (1.0, "kg"),
+    **dict.fromkeys(("shear", "out_of_plane", "twist"), TURNING),
+    "rest_angle": (180 / pi, "\N{DEGREE SIGN}"),
 }
 NAMES = {
     "youngs_modulus": "Young's modulus",
@@ -125,27 +133,46 @@ def plain(value: object) -> str:
     return UNKNOWN if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def case_rows(table: object) -> list[tuple[str, str]]:
-    """The entries of a table of the case, in the units of a drawing."""
+def case_rows(table: object, rounding: Rounding = EXACT) -> list[tuple[str, str]]:
+    """The entries of a table of the case, in the units of a drawing, files by their names.
+
+    rounding : how finely lengths are shown at most.
+    """
     if not isinstance(table, dict):
         return []
     return [
-        (NAMES.get(key, key.replace("_", " ")), _case_value(key, value))
+        (NAMES.get(key, key.replace("_", " ")), _case_value(key, value, CASE_UNITS, rounding))
         for key, value in table.items()
-        if value is not None and not isinstance(value, dict)
+        if value is not None and key != "unit" and not isinstance(value, dict)  # all is shown in units of its own
     ]
 
 
-def _case_value(key: str, value: Any) -> str:
+def joint_rows(joint: object) -> list[tuple[str, str]]:
+    """The same of the joints, without what they do not have: "pin", eccentricity, mass, stiffnesses."""
+    if not isinstance(joint, dict):
+        return []
+    return [
+        (key.replace("_", " "), _case_value(key, value, JOINT_UNITS, EXACT))
+        for key, value in joint.items()
+        if value and not isinstance(value, dict)
+    ]
+
+
+def _case_value(key: str, value: Any, units: Mapping[str, tuple[float, str]], rounding: Rounding) -> str:
     if isinstance(value, list | tuple):
-        between = ", " if key == "offset" else " \N{MULTIPLICATION SIGN} "
-        return between.join(_case_value(key, item) for item in value)
+        between = ", " if key in ("offset", "move", "turn") else " \N{MULTIPLICATION SIGN} "
+        return between.join(_case_value(key, item, units, rounding) for item in value)
+    if key in ("file", "boundary"):
+        return re.split(r"[/\\]", str(value))[-1]
     if isinstance(value, bool):
         return "yes" if value else "no"
     if not isinstance(value, int | float):
         return str(value)
-    factor, unit = CASE_UNITS.get(key, (1.0, ""))
+    factor, unit = units.get(key, (1.0, ""))
     if unit == "MPa" and value >= 1e8:
         factor, unit = 1e-9, "GPa"
-    shown = rounded(factor * value, 5).replace("-", MINUS)
+    number = factor * value
+    if unit == "mm":
+        number = round(number, rounding.digits) or number
+    shown = rounded(number, 5).replace("-", MINUS)
     return f"{shown}{unit}" if unit == "\N{DEGREE SIGN}" else f"{shown} {unit}".strip()

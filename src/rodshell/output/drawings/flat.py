@@ -42,11 +42,11 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
 
 
 def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
-    """Each rod as cut; a dot at the end from which its joints are measured, a tick where it is held."""
+    """Each rod as cut; a dot at the cut end from which its joints are measured, a tick where it is held."""
     for rod, cut, line in zip(plan.rods, plan.cuts, plan.lines, strict=True):
         pen = Pen(FAMILY.get(rod.family, INK), ROD * text)
         pencil.line(cut, "CUT", pen=pen, name=rod.id, note=f"{rod.id}: {plan.rounding.mm(rod.cut_length)} mm")
-        pencil.mark(line[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))
+        pencil.mark(cut[0], min(0.2 * text, 0.08 * plan.spacing), "DIM", pen=Pen(INK, 0.0, fill=INK))
         if rod.allowance > 0:
             along = line[1] - line[0]
             across = 0.3 * text * np.array([-along[1], along[0]]) / np.linalg.norm(along)
@@ -66,7 +66,8 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
     for written in pencil.texts:
         room.take(written.box())
     for joint, mark in zip(plan.joints, plan.marks, strict=True):
-        a, b = (f"{plan.rods[k].id} at {plan.rounding.mm(at)} mm" for k, at in zip(joint.rods, joint.at, strict=True))
+        pair = zip((plan.rods[k] for k in joint.rods), joint.at, strict=True)
+        a, b = (f"{rod.id} at {plan.rounding.mm(rod.from_cut_end(at))} mm" for rod, at in pair)
         pencil.mark(mark, radius, "MARK", note=f"{joint.id}: {a}, {b}")
         size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
         for clear_of, corner in product((both, lines), CORNERS if size >= SMALL * text else ()):

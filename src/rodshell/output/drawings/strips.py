@@ -10,8 +10,11 @@ from rodshell.output.plan import FlatPlan
 from rodshell.output.rods import RodRecord
 from rodshell.output.schedules import Show
 
-TITLE = "Rod strips, distances from the datum end in mm"
-LEGEND = "Datum: left end. Full mark: the other rod lies over this one. S: splice. Open triangle: support."
+TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
+LEGEND = (
+    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice. "
+    "Open triangle: support."
+)
 TALL = 15.0  # text sizes from strip to strip
 
 
@@ -33,14 +36,15 @@ def per_sheet(height: float, text: float) -> int:
 
 def _strip(pencil: Pencil, rod: RodRecord, y: float, text: float, layer: dict[str, int | None], mm: Show) -> None:
     """One rod: above it the distances, below it the rods that are met."""
-    cut, start = 1e3 * rod.cut_length, 1e3 * rod.allowance
+    cut, start = 1e3 * rod.cut_length, 1e3 * rod.from_cut_end(0.0)
     pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=f"{rod.id}: {mm(rod.cut_length)} mm")
     words = [rod.id, f"cut {mm(rod.cut_length)}", f"layer {rod.layer}" if rod.layer is not None else ""]
     if start > 0:
         words.append(f"with {mm(rod.allowance)} at each end for the supports")
     pencil.write("   ".join(filter(None, words)), (0.0, y + 7.2 * text), 1.1 * text, "LABEL", bold=True)
-    stops = [(0.0, "", ""), *((start + 1e3 * at, other, "joint") for other, at in rod.joints), (cut, "", "")]
-    stops += [(start + 1e3 * at, "S", "splice") for at in rod.more.get("splices") or ()]
+    joints = ((1e3 * rod.from_cut_end(at), other, "joint") for other, at in rod.joints)
+    stops = [(0.0, "", ""), *joints, (cut, "", "")]
+    stops += [(1e3 * rod.from_cut_end(at), "S", "splice") for at in rod.splices]
     if start > 0:
         stops += [(start, "", "support"), (cut - start, "", "support")]
     stops.sort(key=lambda stop: stop[0])

@@ -13,7 +13,7 @@ from rodshell.output.drawing import INK, LETTER, PAPER, SOFT, Drawing, Pen, Penc
 from rodshell.output.inputs import input_hash
 from rodshell.output.plan import NOTE, nice_step
 from rodshell.output.rounding import rounding_of
-from rodshell.output.wording import case_rows, rounded, stress
+from rodshell.output.wording import case_rows, joint_rows, rounded, stress
 
 NOT_GIVEN = "not given"
 COLUMNS = 4  # of entries, side by side
@@ -91,8 +91,7 @@ def _material(material: object) -> str:
 
 def _joint(joint: object) -> str:
     """ "pin, eccentricity 42 mm"; without a word about them, joints are balls, free to turn."""
-    rows = case_rows(joint)
-    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in rows) or "ball"
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in joint_rows(joint)) or "ball"
 
 
 def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:

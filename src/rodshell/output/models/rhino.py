@@ -50,7 +50,8 @@ def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
     mm = plan.rounding.mm
     for rod, cut in zip(plan.rods, plan.cuts, strict=True):
         figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}
-        figures |= {"layer": str(rod.layer), "joints": " ".join(f"{other}:{mm(at)}" for other, at in rod.joints)}
+        joints = " ".join(f"{other}:{mm(rod.from_cut_end(at))}" for other, at in rod.joints)
+        figures |= {"layer": str(rod.layer), "joints_from_cut_end_mm": joints}
         (x0, y0), (x1, y1) = cut.tolist()
         model.Objects.AddLine(r.Point3d(x0, y0, 0.0), r.Point3d(x1, y1, 0.0), about("CUT", rod.id, figures))
         if archive.final and len(rod.nodes) > 1:
