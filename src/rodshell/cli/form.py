@@ -125,7 +125,7 @@ def _form(
         layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
         case = case.decided(found.best.anchor, found.best.heading)
         rod = case.rod_on(target, layout, anchor=found.best.anchor)
-    announce_rod(case, rod, quiet=quiet)
+    announce_rod(case, rod, lambda: case.fit_on(target, layout, anchor=options["anchor"]), quiet=quiet)
     case = case.with_rod(rod)
     form = find_form(target, layout, rod, progress=progress, **options)
     return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), found
@@ -138,7 +138,7 @@ def _sew(
     takeaway = case.takeaway()
     target, layout, rod, options = case.build_sewn()
     _announce_sizes(case, target, layout, quiet=quiet)
-    announce_rod(case, rod, quiet=quiet)
+    announce_rod(case, rod, lambda: case.fit_on(target, layout), quiet=quiet)
     case = case.with_rod(rod)
     from rodshell.form import sew
 
