@@ -156,7 +156,8 @@ def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet
     }
     said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
     if said and not quiet:
-        click.echo(f"rodshell: {target.name}, {length_text(2 * target.size)} wide; {said}", err=True)
+        name = case.drawings.name or target.name
+        click.echo(f"rodshell: {name}, {length_text(2 * target.size)} wide; {said}", err=True)
 
 
 def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: "Calls") -> "Search":
