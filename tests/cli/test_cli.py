@@ -176,6 +176,7 @@ def test_any_words_reach_their_key(key: str, finder: FakeFinder) -> None:
         (["--formula", "x*y"], 'kind "hemisphere" has no formula'),
         (["--radios", "3"], "unknown option --radios: did you mean --radius?"),
         (["--target.radus", "3"], "did you mean --target.radius?"),
+        (["--bogus", "3"], "unknown option --bogus: see --help"),
         (["--radius"], "'--radius' requires an argument"),
         (["--drape.anchor", "--out", "C/y"], "--drape.anchor needs a value, but --out follows"),
         (["-o", "--quiet"], "-o needs a value, but --quiet follows"),
@@ -503,6 +504,8 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     sizes, rod = capsys.readouterr().err.splitlines()[:2]
     assert sizes == "rodshell: hemisphere, 400 m wide; edge 4.17 m"
     assert rod.startswith("rodshell: rod: circle, radius 1000 mm; ")
+    assert main(["form", "empty.toml", "--drawings.name", "bandstand", "--out", "named"]) == 0
+    assert capsys.readouterr().err.startswith("rodshell: bandstand, 400 mm wide; ")
     assert main(["form", "empty.toml", "--quiet", "--out", "quiet"]) == 0
     assert capsys.readouterr().err == ""
 

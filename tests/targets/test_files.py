@@ -51,6 +51,9 @@ def test_gltf_is_in_metres_and_others_must_say_their_unit(bowl, tmp_path):
     (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
     with pytest.raises(rs.InputError, match=r"its unit \(it is 400 x 400 x [0-9.]+ units wide\).* --unit mm"):
         rs.surface_from(tmp_path / "bowl.obj")
+    (tmp_path / "wide.obj").write_bytes(WRITERS["obj"](30 * bowl[0], bowl[1]))
+    with pytest.raises(rs.InputError, match=r"its unit \(it is 12000 x 12000 x [0-9.]+ units wide\)"):
+        rs.surface_from(tmp_path / "wide.obj")
 
 
 def test_of_several_objects_one_is_chosen_by_its_name(bowl, tmp_path):

@@ -179,7 +179,7 @@ class RodTable(Table):
         ------
         InputError : something is left open, and there is nothing to fit.
         """
-        from rodshell.rods.section import Circle, Rod, Tube
+        from rodshell.rods.section import Rod
 
         section = self.section.build()
         if not self.left_open:
@@ -190,8 +190,15 @@ class RodTable(Table):
         material = self.material.build() if self.material else Material.preset(room.preset)
         if "section" not in self.left_open:
             return Rod(section, material)
-        shape = section if isinstance(section, Circle | Tube) and self.section.kind != "auto" else None
-        return Rod(room.section(material, strength=strength, shape=shape), material)
+        return Rod(room.section(material, strength=strength, shape=self.shape), material)
+
+    @property
+    def shape(self) -> "Circle | Tube | None":
+        """The circle or tube of which only the radius is looked for; None: of any shape that is sold."""
+        from rodshell.rods.section import Circle, Tube
+
+        section = self.section.build()
+        return section if isinstance(section, Circle | Tube) and self.section.kind != "auto" else None
 
 
 class JointTable(Table):

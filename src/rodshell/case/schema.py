@@ -271,13 +271,13 @@ class Case(Table):
 
     def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
         """The rod; material and section that were left to the target are chosen by the bends of its net."""
+        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.checks.strength)
 
-        def fit() -> "Fit":
-            from rodshell.checks.sizing import Fit
+    def fit_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Fit":
+        """What a rod that is left to the target has to fit."""
+        from rodshell.checks.sizing import Fit
 
-            return Fit.on(target, layout, anchor=anchor, joint=self.joint.build())
-
-        return self.rod.build(fit, strength=self.checks.strength)
+        return Fit.on(target, layout, anchor=anchor, joint=self.joint.build())
 
     def with_rod(self, rod: "Rod") -> "Case":
         """The same case with this rod spelled out."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rodshell.errors import InputError, NetLimitError
 from rodshell.joints import Ball, Joint
@@ -14,7 +14,7 @@ from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.rods.fibres import fibre_strain
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import Circle, Rod, Section, Tube
-from rodshell.rods.stock import STOCK, depth, scaled
+from rodshell.rods.stock import STOCK, depth, scaled, size_text
 from rodshell.targets import Target
 from rodshell.units import length_text, rounded_down
 
@@ -22,9 +22,12 @@ Floats = NDArray[np.float64]
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
 SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
-# Of the strength, by the bends of the net: the free shell bends up to 1.2 times as sharply (measured on the gallery),
-# which leaves it below a half; on the way up from flat roofs bend 3 times as sharply, those with several waves more.
-OF_NET = 1 / 3
+# Of the strength, by the bends of the net: an estimate, since the free shell bends up to 1.2 times as sharply (measured
+# on the gallery). On the way up from flat roofs bend 3 times as sharply, those with several waves more.
+AIM = 1 / 2
+# Rods of a table bend the more sharply the more others they are joined to, which lie low near their own ends: 1.3 to
+# 1.4 times the root of the joints along one, measured on square tables of 4, 8 and 12 rods each way.
+JOINED = 1.4
 ROOM = 1 / 6  # depth of a rod over the spacing: joints need room
 ANY = Material(1.0, 1.0)  # strains do not depend on it
 PLAN = 41  # points each way at which a target without a net is sampled
@@ -51,12 +54,14 @@ class Fit:
     slender : radius of a rod as slender as the paper's [m].
     thickest : largest depth of a rod between its joints [m].
     bends : called if they are needed.
+    thickest_of : what that depth is a share of, in words.
     """
 
     width: float
     slender: float
     thickest: float
     bends: Callable[[], Bends]
+    thickest_of: str = "a hundredth of half the shell's width"
 
     @classmethod
     def on(
@@ -72,23 +77,26 @@ class Fit:
         joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
         """
         slender = SLENDER * target.size
-        thickest = min(2 * slender, ROOM * min(layout.spacing))
+        room = ROOM * min(layout.spacing)
 
         def bends() -> Bends:
             found = bends_of(target, layout, anchor)
             return found if (joint or Ball()).holds_normals else found.rolled()
 
-        return cls(2 * target.size, slender, thickest, bends)
+        crowded = {"thickest_of": "a sixth of the spacing"} if room < 2 * slender else {}
+        return cls(2 * target.size, slender, min(2 * slender, room), bends, **crowded)
 
     @classmethod
-    def between(cls, lengths: Floats, ends: Floats) -> Self:
-        """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m], as if each bent like a sine."""
+    def between(cls, lengths: Floats, ends: Floats, joints: ArrayLike) -> Self:
+        """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m]: each bends like a sine, and more
+        sharply by the number of `joints` (m,) along it."""
         chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         ring = float(lengths.max()) / np.pi  # of a rod whose ends meet
         width = max(float(np.ptp(ends[:, :, :2], axis=(0, 1)).max()), ring)
         rise = 2 * np.sqrt(np.clip(1 - chords / lengths, 0.0, 1.0))  # amplitude of the tangent's angle [rad]
         slender = SLENDER * width / 2
-        return cls(width, slender, 2 * slender, lambda: Bends(np.pi * rise / lengths, np.zeros(len(lengths))))
+        sharper = np.maximum(1.0, JOINED * np.sqrt(joints))
+        return cls(width, slender, 2 * slender, lambda: Bends(sharper * np.pi * rise / lengths, np.zeros(len(lengths))))
 
     @property
     def preset(self) -> PresetName:
@@ -99,11 +107,11 @@ class Fit:
     def section(
         self, material: Material, *, strength: float | None = None, shape: Circle | Tube | None = None
     ) -> Section:
-        """The thickest section whose bends use at most a third of the strength: half, when the free shell bends more.
+        """The thickest section that by these bends uses at most half of the strength.
 
-        Of the sizes in which a preset material is sold; thinner than those, or of a material without a name, in steps
-        of 1, 1.5, 2, 3, 5, 7. Without a known strength the section is as slender as the paper's rods on its hemisphere,
-        and with one no thicker than that.
+        Of the sizes in which a preset material is sold; where none of those fits, or for a material without a name, in
+        steps of 1, 1.5, 2, 3, 5, 7. Without a known strength the section is as slender as the paper's rods on its
+        hemisphere, and with one no thicker than that.
 
         Parameters
         ----------
@@ -117,8 +125,8 @@ class Fit:
         strength = strength or material.bending_strength
         if strength is None:
             return Tube(self.slender, shape.thickness) if isinstance(shape, Tube) else Circle(self.slender)
-        bends, allowed = self.bends(), OF_NET * strength / material.youngs_modulus
-        stock = () if shape is not None or material.name is None else STOCK[material.name]
+        bends, allowed = self.bends(), AIM * strength / material.youngs_modulus
+        stock = _sold(material, shape)
         fitting = [one for one in stock if depth(one) <= self.thickest and largest_strain(one, bends) <= allowed]
         if fitting:
             return fitting[-1]
@@ -126,6 +134,44 @@ class Fit:
         strain = largest_strain(like, bends)
         most = self.thickest if strain == 0 else min(self.thickest, depth(like) * allowed / strain)
         return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
+
+    def reason(
+        self,
+        section: Section,
+        material: Material,
+        *,
+        strength: float | None = None,
+        shape: Circle | Tube | None = None,
+    ) -> str:
+        """Why `section` was chosen, in words: by what, the share of the strength expected, and what keeps it thin.
+
+        Other parameters as for `section`, which chose it.
+        """
+        strength = strength or material.bending_strength
+        if strength is None:
+            return "as slender as the paper's rods, since no strength is known"
+        bends, bears = self.bends(), strength / material.youngs_modulus
+
+        def kept_out(other: Section) -> str:
+            used = largest_strain(other, bends) / bears
+            if used <= AIM:
+                return f"{size_text(other)}, is wider than {self.thickest_of}, {length_text(self.thickest)}"
+            rolls = largest_strain(other, bends.rolled()) / bears <= AIM
+            edgewise = ", since the joints keep it from rolling and bend it edgewise too" if rolls else ""
+            return f"{size_text(other)}, would use {_share(used)} at the sharpest bend{edgewise}"
+
+        stock = _sold(material, shape)
+        share = _share(largest_strain(section, bends) / bears)
+        said = f"by an estimate of the bends, which aims at half of the bending strength at most and comes to {share}; "
+        if (section,) == stock[-1:]:
+            return said + "no thicker one is sold"
+        if section in stock:
+            return f"{said}the next size that is sold, {kept_out(stock[stock.index(section) + 1])}"
+        if stock:
+            return f"{said}no size that is sold fits: the thinnest, {kept_out(stock[0])}"
+        if largest_strain(scaled(section, self.thickest / depth(section)), bends) > AIM * bears:
+            return said + "a thicker one would use more than half at the sharpest bend"
+        return f"{said}the next step would be wider than {self.thickest_of}, {length_text(self.thickest)}"
 
 
 def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
@@ -155,6 +201,15 @@ def net_bends(net: ChebyshevNet) -> Bends:
 def largest_strain(section: Section, bends: Bends) -> float:
     """Largest bending strain of the section by such bends [-]."""
     return float(np.max(fibre_strain(Rod(section, ANY), bends.normal, bends.geodesic), initial=0.0))
+
+
+def _sold(material: Material, shape: Circle | Tube | None) -> tuple[Section, ...]:
+    """The sizes to choose from; none where only a radius is looked for, or for a material without a name."""
+    return () if shape is not None or material.name is None else STOCK[material.name]
+
+
+def _share(used: float) -> str:
+    return f"{100 * used:.0f} %" if used >= 0.01 else "under 1 %"
 
 
 def _of_depth(section: Section, deep: float, *, wall_stays: bool) -> Section:

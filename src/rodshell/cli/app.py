@@ -81,8 +81,10 @@ def failed(error: BaseException) -> int:
     if isinstance(error, RodshellError):
         return _fail(str(error), error.exit_code)
     if isinstance(error, click.NoSuchOption):
-        near = f": did you mean {error.possibilities[0]}?" if error.possibilities else ": see --help"
-        return _fail(f"unknown option {error.option_name}{near}", 2)
+        names = {name.lstrip("-"): name for name in error.possibilities or ()}  # dashes alone make none alike
+        near = get_close_matches(error.option_name.lstrip("-"), names, n=1)
+        hint = f": did you mean {names[near[0]]}?" if near else ": see --help"
+        return _fail(f"unknown option {error.option_name}{hint}", 2)
     if isinstance(error, click.UsageError):
         where = error.ctx.command_path if error.ctx else "rodshell"
         return _fail(f"{error.format_message().rstrip('.')}: see {where} --help", 2)

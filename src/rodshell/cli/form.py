@@ -125,7 +125,7 @@ def _form(
         layout, options["anchor"] = replace(layout, rotate=found.best.heading), found.best.anchor
         case = case.decided(found.best.anchor, found.best.heading)
         rod = case.rod_on(target, layout, anchor=found.best.anchor)
-    announce_rod(case, rod, quiet=quiet)
+    announce_rod(case, rod, lambda: case.fit_on(target, layout, anchor=options["anchor"]), quiet=quiet)
     case = case.with_rod(rod)
     form = find_form(target, layout, rod, progress=progress, **options)
     return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), found
@@ -138,7 +138,7 @@ def _sew(
     takeaway = case.takeaway()
     target, layout, rod, options = case.build_sewn()
     _announce_sizes(case, target, layout, quiet=quiet)
-    announce_rod(case, rod, quiet=quiet)
+    announce_rod(case, rod, lambda: case.fit_on(target, layout), quiet=quiet)
     case = case.with_rod(rod)
     from rodshell.form import sew
 
@@ -156,7 +156,8 @@ def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet
     }
     said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
     if said and not quiet:
-        click.echo(f"rodshell: {target.name}, {length_text(2 * target.size)} wide; {said}", err=True)
+        name = case.drawings.name or target.name
+        click.echo(f"rodshell: {name}, {length_text(2 * target.size)} wide; {said}", err=True)
 
 
 def _search(case: Case, target: "Target", layout: "GridLayout", rod: "Rod", progress: "Calls") -> "Search":

@@ -17,6 +17,7 @@ from rodshell.errors import InputError
 
 if TYPE_CHECKING:
     from rodshell.case import Case
+    from rodshell.checks.sizing import Fit
     from rodshell.output import Archive
     from rodshell.output.folder import ResultFolder
     from rodshell.rods.section import Rod
@@ -94,14 +95,18 @@ def wanted_kinds(only: str | None) -> list[str] | None:
     return None if only is None else read_kinds(only)
 
 
-def announce_rod(case: "Case", rod: "Rod", *, quiet: bool) -> None:
-    """Name a rod of which the case left something open, before the job runs."""
+def announce_rod(case: "Case", rod: "Rod", fit: "Callable[[], Fit]", *, quiet: bool) -> None:
+    """Name a rod of which the case left something open, and what decided its size, before the job runs."""
     if case.rod.left_open and not quiet:
         from rodshell.output.result import rod_table
         from rodshell.output.summary import chosen, rod_text
+        from rodshell.rods.section import GivenSection
 
-        strength = case.checks.strength or (rod.material.bending_strength if rod.material else None)
-        click.echo(f"rodshell: rod: {rod_text(rod_table(rod))}; {chosen(case.rod.left_open, strength)}", err=True)
+        said = f"rodshell: rod: {rod_text(rod_table(rod))}; {chosen(case.rod.left_open)}"
+        if "section" in case.rod.left_open and rod.material and not isinstance(rod.section, GivenSection):
+            why = fit().reason(rod.section, rod.material, strength=case.checks.strength, shape=case.rod.shape)
+            said += f", {why}"
+        click.echo(said, err=True)
 
 
 def time_limit_option(command: Callable[..., Any]) -> Callable[..., Any]:

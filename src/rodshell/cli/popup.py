@@ -1,5 +1,6 @@
 """`rodshell popup`: rods from a table or an earlier result, popped up from flat with pinned ends."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,8 +70,9 @@ def command(
         from rodshell.layout import straight_rods
 
         grid = straight_rods(ends.flat, names=ends.names)
-        rod = case.rod.build(lambda: Fit.between(ends.lengths, ends.final))
-        announce_rod(case, rod, quiet=quiet)
+        fit = partial(Fit.between, ends.lengths, ends.final, grid.joint_counts())
+        rod = case.rod.build(fit, strength=case.checks.strength)
+        announce_rod(case, rod, fit, quiet=quiet)
         takeaway = case.takeaway()
         with Progress(quiet=quiet) as shown:
             progress = limited(shown, seconds)

@@ -22,7 +22,7 @@ def summary_text(result: dict[str, Any]) -> str:
     lines = [f"{result['name']}: {verdict.headline}"]
     lines += [f"            {reason}" for reason in verdict.reasons[1:]]
     lines.append(f"  grid      {len(rods)} rods, {joints} joints")
-    lines += _rod(result["rod"], (result.get("bending") or {}).get("strength"))
+    lines += _rod(result["rod"], result.get("bending") or {})
     lines += _sewn(result)
     if net := result.get("net"):
         lines.append(
@@ -52,11 +52,12 @@ def summary_text(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _rod(rod: dict[str, Any], strength: float | None) -> Iterator[str]:
+def _rod(rod: dict[str, Any], bending: Mapping[str, Any]) -> Iterator[str]:
     """Section and material in a line; what is known of a preset, and what the program chose, in lines of their own."""
     yield f"  rod       {rod_text(rod)}"
     if chosen_here := rod.get("chosen"):
-        yield f"            {chosen(chosen_here, strength)}"
+        reached = _reached(bending) if "section" in chosen_here else ""
+        yield f"            {chosen(chosen_here)}{reached}"
     if known := rod.get("preset"):
         line = f"            {known['name']}: {known['grade']}"
         if known["bending_strength"] is not None:
@@ -64,18 +65,20 @@ def _rod(rod: dict[str, Any], strength: float | None) -> Iterator[str]:
         yield line
 
 
-def chosen(what: Iterable[str], strength: float | None) -> str:
-    """That the program chose a rod's material, section or both, and by what.
-
-    strength : by which the rods are judged [Pa], or None.
-    """
+def chosen(what: Iterable[str]) -> str:
+    """That the program chose a rod's material, section or both."""
     parts = list(what)
-    line = f"{' and '.join(parts)} {'were' if len(parts) > 1 else 'was'} not given: chosen to fit"
-    if "section" not in parts:
-        return line
-    if strength is None:
-        return line + ", as slender as the paper's rods, since no strength is known"
-    return line + ", for bends that use at most half of the bending strength in the final shape"
+    return f"{' and '.join(parts)} {'were' if len(parts) > 1 else 'was'} not given: chosen to fit"
+
+
+def _reached(bending: Mapping[str, Any]) -> str:
+    """By what a section was chosen, and what the final shapes use of the strength."""
+    if bending.get("strength") is None:
+        return ", as slender as the paper's rods, since no strength is known"
+    final = [(bending.get(ends) or {}).get("utilisation") for ends in ("pinned", "clamped")]
+    known = [used for used in final if used is not None]
+    reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
+    return f", aiming at half of the bending strength at most by an estimate of the bends; {reached}"
 
 
 def rod_text(rod: Mapping[str, Any]) -> str:

@@ -45,6 +45,15 @@ def scaled(section: Section, factor: float) -> Section:
     return type(section)(**{key: factor * value for key, value in vars(section).items()})
 
 
+def size_text(section: Section) -> str:
+    """A size in stock as a supplier names it [mm]: 8 x 20 mm, a rod of 12 mm, a tube of 20 x 3 mm."""
+    if isinstance(section, RectangularSection):
+        return f"{section.width / MM:g} x {section.height / MM:g} mm"
+    if isinstance(section, Tube):
+        return f"a tube of {2 * section.radius / MM:g} x {section.thickness / MM:g} mm"
+    return f"a rod of {depth(section) / MM:g} mm"
+
+
 def depth(section: Section) -> float:
     """The largest side or diameter [m]."""
     if isinstance(section, Circle | Tube):

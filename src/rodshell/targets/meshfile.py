@@ -82,7 +82,7 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
     """The vertices scaled by the unit, if the result can be a shell."""
     used = vertices[np.unique(faces)] if len(faces) else vertices
     extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)
-    size = " x ".join(f"{side:.4g}" for side in extent)
+    size = " x ".join(f"{float(f'{side:.4g}'):.10g}" for side in extent)
     if unit is None:
         if path.suffix.lower() not in IN_METRES:
             raise InputError(f"{path} does not say its unit (it is {size} units wide): give it, such as --unit mm")
