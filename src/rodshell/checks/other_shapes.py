@@ -85,7 +85,7 @@ class OtherShapes:
     def searched(self) -> str:
         """How far the search looked, in a sentence."""
         if not self.tried:
-            return "not looked for: the form was found with too little work for a search that takes half of it"
+            return "not looked for: the search may take half of the work that the form took, which is too little here"
         ways = ["popped through"] if self.popped_through else []
         if self.largest_kick:
             kick = f"{100 * self.largest_kick:.0f} % of half its width"
