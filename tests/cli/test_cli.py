@@ -25,6 +25,8 @@ from rodshell.cli.options import ALIASES
 from rodshell.cli.rodends import COLUMNS
 from rodshell.errors import NetLimitError
 from rodshell.output import folder as folder_module
+from rodshell.output import read
+from rodshell.output.archive import export
 from rodshell.output.folder import ResultFolder
 
 CROSS = [
@@ -411,6 +413,21 @@ def test_popup_reads_a_table_in_its_unit(finder: FakeFinder) -> None:
     assert rod.material == rs.Material.preset("petg")
     assert 0 < rod.section.radius <= 0.08 / 200  # half the width over 200
     assert Path("out/rods-popup").is_dir()
+
+
+def test_popup_reads_the_schedule_of_a_result(
+    finder: FakeFinder, dome: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["popup", str(dome), "--out", "first"]) == 0
+    schedule = str(dome / export(read(dome), dome, ["csv"])[0])
+    assert schedule.endswith("rods.csv")
+    assert main(["popup", schedule]) == main(["popup", schedule, "--unit", "mm", "--out", "again"]) == 0
+    (grid, final, _), (own, its, _) = finder.calls[0][0], finder.calls[1][0]
+    assert [rod.name for rod in own.rods] == [rod.name for rod in grid.rods]
+    np.testing.assert_allclose(its, final, atol=1e-6)  # the schedule's rounding
+    np.testing.assert_allclose(finder.calls[2][0][1], its)
+    capsys.readouterr()
+    assert "are in mm; leave --unit out" in refused(capsys, "popup", schedule, "--unit", "m")
 
 
 def test_a_table_may_be_separated_by_semicolons(finder: FakeFinder) -> None:

@@ -30,7 +30,9 @@ ASIDE = ("checks", "fabrication", "drawings")  # tables of what does not decide 
 
 @click.command(cls=CaseCommand, params=case_options("rod", *ASIDE))
 @click.argument("source", metavar="RODS.csv|DIR")
-@click.option("--unit", metavar="UNIT", help="Of the table's coordinates: m, mm, in, ...; a table needs it.")
+@click.option(
+    "--unit", metavar="UNIT", help="Of the table's coordinates: m, mm, in, ...; columns that end in _mm need none."
+)
 @click.option("--out", "-o", metavar="DIR", help="Folder for the results; default out/NAME-popup.")
 @click.option("--only", metavar="KINDS", help="Files beside the archive, such as dxf,csv; see rodshell export --help.")
 @time_limit_option
@@ -51,9 +53,16 @@ def command(
     """Pop up rods from flat, their ends pinned: where does the shell go?
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
+<<<<<<< HEAD
     final_z0, final_x1, final_y1, final_z1 and, if you like, id. DIR is an earlier result, whose joints are
     kept; those of a table are balls. The rod is the result's, or for a table one that is chosen to fit; each key of
     [rod] sets it anew. So do those of [checks], [fabrication] and [drawings] what is checked, made and drawn.
+=======
+    final_z0, final_x1, final_y1, final_z1 and, if you like, id; or with all coordinates in mm and _mm after each name,
+    as schedule/rods.csv has them. DIR is an earlier result. The rod is the result's, or for a table one that is chosen
+    to fit; each key of [rod] sets it anew. So do those of [checks], [fabrication] and [drawings] what is checked, made
+    and drawn.
+>>>>>>> drawings
     """
     path, kinds, seconds = Path(source), wanted_kinds(only), seconds_of(time_limit)
     ends, case = _ends_and_case(path, unit, overrides_of(values))
@@ -96,6 +105,4 @@ def _ends_and_case(path: Path, unit: str | None, given: dict[str, object]) -> "t
             return ends, load_case(file("case.toml") if file("case.toml").is_file() else None, joint | given)
     if not path.exists():
         raise InputError(f"there is no file named {shown(str(path))}: give a table of rods, or the folder of a result")
-    if unit is None:
-        raise InputError("--unit is missing: give the unit of the table's coordinates, such as --unit m")
     return read_table(path, unit), load_case(None, given)

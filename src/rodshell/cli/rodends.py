@@ -17,6 +17,7 @@ COLUMNS = (
     "flat_x0", "flat_y0", "flat_x1", "flat_y1",
     "final_x0", "final_y0", "final_z0", "final_x1", "final_y1", "final_z1",
 )  # fmt: skip
+MILLIMETRE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -44,17 +45,19 @@ class RodEnds:
         return np.linalg.norm(self.flat[:, 1] - self.flat[:, 0], axis=1)
 
 
-def read_table(path: Path, unit: str) -> RodEnds:
+def read_table(path: Path, unit: str | None) -> RodEnds:
     """The rods of a CSV table with the columns `COLUMNS` and, if it likes, `id`; coordinates in `unit`.
 
-    Cells are parted by commas, semicolons or tabs; unless by commas, a comma is a decimal point.
+    A table whose columns end in _mm, as those of schedule/rods.csv do, says its unit itself. Cells are parted by
+    commas, semicolons or tabs; unless by commas, a comma is a decimal point.
 
     Raises
     ------
-    InputError : no such file, no rods, a missing column, a cell without a finite number, an id used twice.
+    InputError : no such file, no rods, a missing column, a cell without a finite number, an id used twice;
+        no unit, or another than the columns'.
     """
     try:
-        scale = float(read_unit(unit, "length"))
+        scale = None if unit is None else float(read_unit(unit, "length"))
     except ValueError as reason:
         raise InputError(f'--unit = "{unit}": {reason}') from None
     try:
@@ -63,9 +66,19 @@ def read_table(path: Path, unit: str) -> RodEnds:
         raise InputError(f"{path} cannot be read: {reason.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(f"{path} is not text in UTF-8: give a CSV table") from None
+    delimiter = max(",;\t", key=lines[0].count) if lines else ","
+    reader = csv.reader(lines, delimiter=delimiter)
+    header = [name.strip() for name in next(reader, [])]
+    columns = _columns(path, header)
+    if columns != COLUMNS:
+        if scale not in (None, MILLIMETRE):
+            raise InputError(f'--unit = "{unit}": the columns of {path} are in mm; leave --unit out')
+        scale = MILLIMETRE
+    if scale is None:
+        raise InputError("--unit is missing: give the unit of the table's coordinates, such as --unit m")
     names, numbers = list[str](), list[list[float]]()
-    for where, row in _rows(path, lines):
-        numbers.append([parse_quantity(row[column], "number", f"{where}, {column}") for column in COLUMNS])
+    for where, row in _rows(path, [(reader.line_num, cells) for cells in reader], header, delimiter):
+        numbers.append([parse_quantity(row[column], "number", f"{where}, {column}") for column in columns])
         names.append(row.get("id", "").strip())
     if not numbers:
         raise InputError(f"{path} has no rods: give one row for each rod under the header")
@@ -73,18 +86,27 @@ def read_table(path: Path, unit: str) -> RodEnds:
     return RodEnds(_labels(path, names), values[:, :4].reshape(-1, 2, 2), values[:, 4:].reshape(-1, 2, 3))
 
 
-def _rows(path: Path, lines: list[str]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Each row that is not blank, by column, and how to name it in a message."""
-    delimiter = max(",;\t", key=lines[0].count) if lines else ","
-    reader = csv.reader(lines, delimiter=delimiter)
-    header = [name.strip() for name in next(reader, [])]
+def _columns(path: Path, header: list[str]) -> tuple[str, ...]:
+    """The `COLUMNS` as the header has them: all bare, or all with _mm."""
+    in_mm = tuple(f"{column}_mm" for column in COLUMNS)
+    if set(in_mm) <= set(header):
+        return in_mm
     for column in COLUMNS:
         if column not in header:
             near = get_close_matches(column, header, n=1)
             hint = f" ({near[0]} looks like it)" if near and near[0] not in COLUMNS else ""
-            raise InputError(f"{path}: the column {column} is missing{hint}; it needs {', '.join(COLUMNS)}")
-    for cells in reader:
-        where = f"{path} line {reader.line_num}"
+            raise InputError(
+                f"{path}: the column {column} is missing{hint}; it needs {', '.join(COLUMNS)}, or all of them with _mm"
+            )
+    return COLUMNS
+
+
+def _rows(
+    path: Path, lines: list[tuple[int, list[str]]], header: list[str], delimiter: str
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Each row that is not blank, by column, and how to name it in a message."""
+    for number, cells in lines:
+        where = f"{path} line {number}"
         if not any(cell.strip() for cell in cells):
             continue
         if len(cells) != len(header):
