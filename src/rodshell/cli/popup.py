@@ -53,16 +53,10 @@ def command(
     """Pop up rods from flat, their ends pinned: where does the shell go?
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
-<<<<<<< HEAD
-    final_z0, final_x1, final_y1, final_z1 and, if you like, id. DIR is an earlier result, whose joints are
-    kept; those of a table are balls. The rod is the result's, or for a table one that is chosen to fit; each key of
-    [rod] sets it anew. So do those of [checks], [fabrication] and [drawings] what is checked, made and drawn.
-=======
     final_z0, final_x1, final_y1, final_z1 and, if you like, id; or with all coordinates in mm and _mm after each name,
-    as schedule/rods.csv has them. DIR is an earlier result. The rod is the result's, or for a table one that is chosen
-    to fit; each key of [rod] sets it anew. So do those of [checks], [fabrication] and [drawings] what is checked, made
-    and drawn.
->>>>>>> drawings
+    as schedule/rods.csv has them. DIR is an earlier result, whose joints are kept; those of a table are balls. The rod
+    is the result's, or for a table one that is chosen to fit; each key of [rod] sets it anew. So do those of [checks],
+    [fabrication] and [drawings] what is checked, made and drawn.
     """
     path, kinds, seconds = Path(source), wanted_kinds(only), seconds_of(time_limit)
     ends, case = _ends_and_case(path, unit, overrides_of(values))
