@@ -9,7 +9,8 @@ from shells import ROD, dome
 
 import rodshell as rs
 from rodshell.checks import OtherShape, OtherShapes, check, deploy, other_shapes, settled_shell
-from rodshell.checks.other_shapes import spanned
+from rodshell.checks.bending import rod_frames
+from rodshell.checks.other_shapes import _Search, spanned
 from rodshell.joints import Joint
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import find_equilibrium
@@ -133,6 +134,21 @@ def test_a_cap_whose_sections_turn_with_the_shell_has_its_reflection_only(joint:
     assert np.abs(image.positions - turned_over).max() < 1e-3 * half_width(popped.positions)
     assert image.energy == pytest.approx(1.0, rel=0.01)  # its ends lie off their plane by a little
     assert image.mirror
+
+
+def test_laths_popped_through_are_not_twisted_in_their_clamps() -> None:
+    """They are free to spin there: what is left is the twist along them, with the other sign."""
+    lath = rs.Rod(rs.RectangularSection(width=0.004, height=0.002), rs.Material(1e10, 600.0))
+    layout = rs.GridLayout(rods=(7, 7), spacing=(0.06, 0.06), length=0.6, edge=0.03)
+    popped = rs.find_form(rs.Cap(0.4, 0.346), layout, lath, ends="clamped", joint=rs.Pin()).popped["clamped"]
+    shell, found = settled_shell(popped)
+    frames = rod_frames(shell)
+    assert frames is not None
+    own, mirrored = (frames.strains(state)[:, 2] for state in (found.state, _Search(shell, found, None)._through()))
+    at_clamps = slice(len(own) - len(shell.ghosts), None)
+    assert np.abs(mirrored[at_clamps]).max() < 1e-12
+    rods = slice(0, at_clamps.start)
+    np.testing.assert_allclose(mirrored[rods], -own[rods], atol=0.02 * np.abs(own[rods]).max())
 
 
 def test_a_cap_in_two_layers_is_found_popped_through() -> None:

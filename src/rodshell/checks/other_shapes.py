@@ -200,7 +200,8 @@ class _Search:
         before, now = (unit(np.diff(at[shell.stretch.blocks], axis=1)[:, 0]) for at in (own, state))
         directors = edge_directors(shell, frames, own)
         wanted = parallel_transport(-self._reflected(directors), self._reflected(before), now)
-        turns = signed_angle(parallel_transport(directors, before, now), wanted, now)
+        with np.errstate(divide="ignore", invalid="ignore"):  # turned right round an edge has no frame, nor energy
+            turns = signed_angle(parallel_transport(directors, before, now), wanted, now)
         shell.turn_edges(state, np.unwrap(turns))  # neighbours less than half a revolution apart: twists keep small
         if shell.angles > len(turns):  # sections are free to spin in their clamps: no twist there
             clamps = frames.blocks[-len(shell.ghosts) :]
