@@ -704,6 +704,18 @@ def test_help_and_version_import_nothing_heavy(argument: str, heavy: set[str]) -
     assert heavy.isdisjoint(ended.stdout.split())
 
 
+@pytest.mark.parametrize(
+    ("option", "values"),
+    [("--rod.section.radius", "VALUE|auto"), ("--spacing", "VALUE|auto"), ("--joint.shear", "VALUE|rigid"),
+     ("--radius", "VALUE"), ("--method", "bound|gravity|paper"), ("--joint.kind", "ball|pin|spring|linker|rigid")],
+)  # fmt: skip
+def test_help_tells_words_that_may_stand_for_a_value_from_the_only_choices(
+    option: str, values: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["form", "--help"]) == 0
+    assert re.search(rf"{re.escape(option)} {re.escape(values)}\s", capsys.readouterr().out)
+
+
 def test_help_comes_without_arguments(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 0
     assert "form" in capsys.readouterr().out

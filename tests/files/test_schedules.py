@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from forms import ROD, archive, form, wished
 
+from rodshell.checks import JointLoads
 from rodshell.output.archive import export
 from rodshell.output.rods import joints_of, rods_of
 from rodshell.output.rounding import rounding_of
@@ -56,6 +57,23 @@ def test_the_rod_of_the_higher_layer_lies_over_the_other(tables: dict[str, list[
         low, high = sorted((row["rod_a"], row["rod_b"]), key=layer.__getitem__)
         assert layer[low] < layer[high]
         assert row["over"] == high
+
+
+def test_joints_scissor_by_what_their_angles_differ(tables: dict[str, list[dict[str, str]]]) -> None:
+    """To the digits of the table; in the result by another estimate of the same tangents."""
+    loads = {"/".join(one["rods"]): one["scissor_deg"] for one in wished().result["joint_loads"]["clamped"]}
+    for row in tables["joints"]:
+        grown = float(row["final_deg"]) - float(row["flat_deg"])
+        assert float(row["scissor_deg"]) == pytest.approx(grown, abs=0.0101)
+        assert loads[row["id"]] == pytest.approx(grown, abs=0.5)
+    assert max(abs(float(row["scissor_deg"])) for row in tables["joints"]) > 5.0
+
+
+def test_a_joint_scissors_alike_whichever_rod_is_the_first() -> None:
+    none = np.zeros((2, 3))
+    flat, now = np.radians([90.0, -90.0]), np.radians([80.0, -80.0])
+    loads = JointLoads(none, np.zeros((2, 2, 3)), none, flat, now)
+    np.testing.assert_allclose(np.degrees(loads.scissor), -10.0)
 
 
 def test_supports_stand_on_the_boundary_and_balance(tables: dict[str, list[dict[str, str]]]) -> None:

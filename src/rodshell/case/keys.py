@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from rodshell.case.schema import Case
@@ -27,12 +27,14 @@ class CaseKey:
     help : one line.
     kinds : of the table that has the key, where not every kind has it.
     choices : the words that it may take, where it is a choice.
+    any_value : whether it may take values besides these words.
     """
 
     path: str
     help: str
     kinds: tuple[str, ...] = ()
     choices: tuple[str, ...] = ()
+    any_value: bool = True
 
     @property
     def table(self) -> str:
@@ -50,7 +52,9 @@ def case_keys() -> dict[str, CaseKey]:
     for key in _keys_of(Case, ""):
         known = keys.get(key.path)
         if known:
-            key = replace(known, kinds=known.kinds + key.kinds, choices=known.choices + key.choices)
+            choices, any_value = (*known.choices, *key.choices), known.any_value or key.any_value
+            kinds = known.kinds + key.kinds
+            key = replace(known, kinds=kinds, choices=tuple(dict.fromkeys(choices)), any_value=any_value)
         keys[key.path] = key
     return keys
 
@@ -69,10 +73,11 @@ def _table_models(annotation: Any) -> list[type[Table]]:
     return [member for member in members if isinstance(member, type) and issubclass(member, Table)]
 
 
-def _choices(annotation: Any) -> tuple[str, ...]:
-    """The words of a key that is a choice, which may be left out; else none."""
+def _choices(annotation: Any) -> tuple[tuple[str, ...], bool]:
+    """The words that a key may take, if any, and whether it may take other values too; it may be left out."""
     members = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
-    return next((get_args(member) for member in members if get_origin(member) is Literal), ())
+    others = [member for member in members if get_origin(member) is not Literal and member is not NoneType]
+    return next((get_args(member) for member in members if get_origin(member) is Literal), ()), bool(others)
 
 
 def _kind_of(model: type[Table]) -> str:
@@ -87,5 +92,5 @@ def _keys_of(model: type[Table], prefix: str, kind: tuple[str, ...] = ()) -> Ite
             for inner in models:
                 yield from _keys_of(inner, path + ".", (_kind_of(inner),) if len(models) > 1 else ())
         else:
-            choices = _choices(field.annotation)
-            yield CaseKey(path, field.description or f"kind of {prefix.rstrip('.')}", kind, choices)
+            words = field.description or f"kind of {prefix.rstrip('.')}"
+            yield CaseKey(path, words, kind, *_choices(field.annotation))

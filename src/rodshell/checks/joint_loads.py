@@ -41,6 +41,11 @@ class JointLoads:
     angles: Floats
 
     @property
+    def scissor(self) -> Floats:
+        """(c,) by how much the angle between the two rods has grown, whichever of them is the first [rad]."""
+        return np.asarray(np.abs(self.angles) - np.abs(self.flat_angles))
+
+    @property
     def normal_forces(self) -> Floats:
         """(c,) by which the second rod is pushed along the normal [N]."""
         return np.asarray(dot(self.forces[:, 1], self.normals))

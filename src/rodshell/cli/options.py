@@ -35,8 +35,9 @@ class CaseOption(click.Option):
     def __init__(self, key: CaseKey) -> None:
         self.key = key
         names = [f"--{key.path}", *filter(None, [ALIASES.get(key.path)]), _parameter(key.path)]
-        text = key.help + (f" ({', '.join(key.kinds)})" if key.kinds and not key.choices else "")
-        super().__init__(names, metavar="|".join(map(str, key.choices)) or "VALUE", help=text)
+        text = key.help + (f" ({', '.join(key.kinds)})" if key.kinds and key.any_value else "")
+        values = ("VALUE",) if key.any_value else ()
+        super().__init__(names, metavar="|".join(map(str, (*values, *key.choices))), help=text)
 
 
 class CaseCommand(click.Command):

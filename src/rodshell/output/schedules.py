@@ -88,6 +88,8 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
         (i, j), (a, b) = joint.rods, (rods[k] for k in joint.rods)
         on_a, on_b = placed[i].get(b.id), placed[j].get(a.id)
         x, y = a.point(joint.at[0])
+        flat = _degrees(a.flat[1] - a.flat[0], b.flat[1] - b.flat[0])
+        angle = _degrees(on_a[1], on_b[1]) if on_a and on_b else None
         space = map(mm, on_a[0]) if on_a else ("", "", "")
         columns = {
             "id": joint.id,
@@ -98,23 +100,23 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
             **({} if brief else {"flat_x_mm": mm(x), "flat_y_mm": mm(y)}),
             **({} if brief else {"final_state": (final or "") if on_a else ""}),
             **dict(zip(("final_x_mm", "final_y_mm", "final_z_mm"), space, strict=True)),
-            "flat_deg": f"{_degrees(a.flat[1] - a.flat[0], b.flat[1] - b.flat[0]):.2f}",
-            "final_deg": f"{_degrees(on_a[1], on_b[1]):.2f}" if on_a and on_b else "",
+            "flat_deg": f"{flat:.2f}",
+            "final_deg": "" if angle is None else f"{angle:.2f}",
+            **({} if brief else {"scissor_deg": "" if angle is None else f"{round(angle - flat, 2) + 0.0:.2f}"}),
             **({} if brief else loads.get((a.id, b.id), dict.fromkeys(_CARRIED, "") if loads else {})),
         }  # fmt: skip
         rows.append(list(columns.values()))
     return list(columns), rows
 
 
-_CARRIED = ("scissor_deg", "force_N", "normal_force_N", "shear_moment_Nm", "out_of_plane_moment_Nm")
+_CARRIED = ("force_N", "normal_force_N", "shear_moment_Nm", "out_of_plane_moment_Nm")
 
 
 def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], dict[str, str]]:
-    """By the two rods: by how much they scissor, and what the joint carries, as the second rod feels it."""
+    """By the two rods: what the joint carries, as the second rod feels it."""
     table = (archive.result.get("joint_loads") or {}).get((final or "").removeprefix("popped_"), [])
     return {
         tuple(one["rods"]): {
-            "scissor_deg": f"{one['scissor_deg']:.2f}",
             "force_N": f"{np.linalg.norm(one['force']):.6g}",
             **{f"{name}_{unit}": f"{one[name]:.6g}" for name, unit in _LOADS},
         }

@@ -175,7 +175,7 @@ def _self_weight(weighed: SelfWeight) -> dict[str, Any]:
 def _joint_loads(mesh: GridMesh, loads: JointLoads) -> list[dict[str, Any]]:
     """Of each joint, on its second rod: SI units, angles in degrees."""
     names = [rod.name for rod in mesh.grid.rods]
-    forces, scissor = loads.forces[:, 1], np.degrees(loads.angles - loads.flat_angles)
+    forces, scissor = loads.forces[:, 1], np.degrees(loads.scissor)
     return [
         {
             "rods": [names[a], names[b]],
