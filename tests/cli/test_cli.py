@@ -598,10 +598,26 @@ def dome() -> Path:
     return folder
 
 
+def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinder, dome: Path) -> None:
+    """As of a target that was a Python function, or of a table of rods."""
+    from rodshell.output.result import rod_table
+
+    result = json.loads((dome / "result.json").read_text())
+    (dome / "case.toml").write_text("# the target was a Python function\n")
+    for rod in (
+        rs.Rod(rs.Tube(radius=0.02, thickness=0.003), rs.Material.preset("gfrp")),
+        rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=2.0, GJ=0.5, mass=0.3)),
+    ):
+        told = result | {"rod": rod_table(rod), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
+        (dome / "result.json").write_text(json.dumps(told))
+        assert main(["popup", str(dome), "--force", "-q"]) == 0
+        (_, _, same), options = finder.calls[-1]
+        assert (same, options["joint"]) == (rod, rs.Pin(mass=0.1))
+
+
 def test_popup_keeps_the_joints_and_the_mesh_of_a_result(
     finder: FakeFinder, dome: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Also where the result has no case file that knows them, as of a target that was a Python function."""
     result = json.loads((dome / "result.json").read_text())
 
     def kept(joint: rs.joints.Joint) -> dict[str, Any]:
@@ -612,8 +628,6 @@ def test_popup_keeps_the_joints_and_the_mesh_of_a_result(
 
     for joint in (rs.Rigid(mass=0.005, rest_angle=1.5), rs.Spring(shear=2.0, twist=float("inf")), rs.Linker(corners=4)):
         assert kept(joint) == {"joint": joint, "edge": 0.004}
-    (dome / "case.toml").write_text("# the target was a Python function\n")
-    assert kept(rs.Pin(mass=0.1))["joint"] == rs.Pin(mass=0.1)
     (dome / "result.json").write_text(json.dumps(result | {"joint": {"kind": "linker", "rod": {}}}))
     assert "linkers of another rod" in refused(capsys, "popup", str(dome), "--out", "x")
 

@@ -53,7 +53,12 @@ FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
 
-def load_case(name_or_path: str | PathLike[str] | None, overrides: Mapping[str, object] | None = None) -> Case:
+def load_case(
+    name_or_path: str | PathLike[str] | None,
+    overrides: Mapping[str, object] | None = None,
+    *,
+    otherwise: Mapping[str, Raw] | None = None,
+) -> Case:
     """The case of this name or in this file, with some keys set anew.
 
     Parameters
@@ -61,6 +66,7 @@ def load_case(name_or_path: str | PathLike[str] | None, overrides: Mapping[str, 
     name_or_path : one of `BUILT_IN`, or the path of a TOML file, or of a surface (`BY_SUFFIX`); None: an empty case.
     overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
         keeps those keys of its table that it has too.
+    otherwise : tables that stand in for those that the case does not have.
 
     Raises
     ------
@@ -68,6 +74,7 @@ def load_case(name_or_path: str | PathLike[str] | None, overrides: Mapping[str, 
     """
     overrides = dict(overrides or {})
     raw = {} if name_or_path is None else _read(name_or_path)
+    raw = {**deepcopy(dict(otherwise or {})), **raw}
     for path in case_tables():
         if not isinstance(_table(raw, path), dict):
             raise InputError(not_a_table(path, _table(raw, path)))

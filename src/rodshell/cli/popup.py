@@ -95,8 +95,9 @@ def _ends_and_case(path: Path, unit: str | None, given: dict[str, object]) -> "t
             raise InputError(f'--unit = "{unit}": {path} is a result, which is in SI; leave --unit out')
         ends = read_result(path)
         with reading(path) as file:
-            joint = {f"joint.{key}": value for key, value in ends.joint.items()}  # which not every case file knows
-            return ends, load_case(file("case.toml") if file("case.toml").is_file() else None, joint | given)
+            case = file("case.toml") if file("case.toml").is_file() else None
+            joint = {f"joint.{key}": value for key, value in ends.joint.items()}
+            return ends, load_case(case, joint | given, otherwise={"rod": ends.rod})
     if not path.exists():
         raise InputError(f"there is no file named {shown(str(path))}: give a table of rods, or the folder of a result")
     return read_table(path, unit), load_case(None, given)

@@ -29,13 +29,14 @@ class RodEnds:
     names : m labels, or None.
     flat : (m, 2, 2), the two ends in the plane [m].
     final : (m, 2, 3), the same two ends of the popped shell [m].
-    joint : what joins them, as in a case file; empty for a table, which does not say.
+    rod, joint : what they are and what joins them, as in a case file; empty for a table, which does not say.
     edge : longest edge of their mesh [m]; None where none was given.
     """
 
     names: list[str] | None
     flat: NDArray[np.float64]
     final: NDArray[np.float64]
+    rod: dict[str, Any] = field(default_factory=dict)
     joint: dict[str, Any] = field(default_factory=dict)
     edge: float | None = None
 
@@ -127,7 +128,7 @@ def _labels(path: Path, names: list[str]) -> list[str] | None:
 
 
 def read_result(folder: Path) -> RodEnds:
-    """The rods of an earlier result: their flat ends, where its shell has them, and their joints.
+    """The rods of an earlier result: their flat ends, where its shell has them, what they are and their joints.
 
     Raises
     ------
@@ -149,6 +150,7 @@ def read_result(folder: Path) -> RodEnds:
             "see the result's own deployment"
         )
     joint = archive.result.get("joint") or {}
+    rod = {key: table for key, table in archive.result.get("rod", {}).items() if key in ("section", "material")}
     if "rod" in joint:
         raise InputError(
             f"the joints in {folder} are linkers of another rod, which popup cannot take over: use "
@@ -163,4 +165,4 @@ def read_result(folder: Path) -> RodEnds:
         raise InputError(f"the result in {folder} lacks its rods or its states: run it again") from None
     if not rods:
         raise InputError(f"the result in {folder} has no rods")
-    return RodEnds([rod.id for rod in rods], flat, final, joint, (archive.result.get("layout") or {}).get("edge"))
+    return RodEnds([rod.id for rod in rods], flat, final, rod, joint, (archive.result.get("layout") or {}).get("edge"))
