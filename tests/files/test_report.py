@@ -259,6 +259,12 @@ def test_a_page_for_others_names_files_and_no_folders() -> None:
     )
 
 
+def test_no_drawing_of_the_page_claims_to_be_at_true_scale(tmp_path: Path) -> None:
+    page = page_of(wished(), tmp_path).read_text(encoding="utf-8")
+    assert ": flat plan</text>" in page
+    assert "1:1" not in page
+
+
 def test_lengths_of_the_case_follow_the_rounding() -> None:
     layout = {"spacing": [0.5, 0.5], "edge": 0.5 / 6, "offset": [0.0, -0.0125]}
     assert [value for _, value in wording.case_rows(layout, Rounding(0.1))] == [

@@ -6,6 +6,7 @@ from typing import Any
 
 from rodshell.output.archive import SHELLS, Archive
 from rodshell.output.drawing import Drawing
+from rodshell.output.drawings.titleblock import on_a_page
 from rodshell.output.figures import checks_table, key_figures, levels_table, supports_table
 from rodshell.output.inputs import shown_case
 from rodshell.output.pictures import picture_svg
@@ -62,8 +63,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         one_scale=sum(state in SHELLS for state in states) > 1,
         figures=key_figures(result, plan),
         levels=levels_table(result),
-        plan=shown(drawing_svg(drawings["plan"])),
-        drawings=[(drawings[name].title, shown(drawing_svg(drawings[name]))) for name in IN_PAGE if name in drawings],
+        plan=shown(_on_page(drawings["plan"])),
+        drawings=[(drawings[name].title, shown(_on_page(drawings[name]))) for name in IN_PAGE if name in drawings],
         tables=[
             (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
         ],
@@ -72,6 +73,10 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         versions=", ".join(f"{name} {number}" for name, number in (result.get("versions") or {}).items()),
         format_version=str(result.get("version") or "unknown"),
     )
+
+
+def _on_page(drawing: Drawing) -> str:
+    return drawing_svg(on_a_page(drawing), scale="lengths in mm")
 
 
 def _view(archive: Archive) -> dict[str, Any] | None:

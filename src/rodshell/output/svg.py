@@ -55,14 +55,17 @@ def inline(svg: str) -> str:
     return f"<svg viewBox{rest}" if head.startswith("<svg") else svg
 
 
-def drawing_svg(drawing: Drawing) -> str:
-    """A drawing at true scale: one unit is one millimetre, y points up (drawn as -y). A group a layer and pen."""
+def drawing_svg(drawing: Drawing, *, scale: str = "1:1 in mm") -> str:
+    """A drawing at true scale: one unit is one millimetre, y points up (drawn as -y). A group a layer and pen.
+
+    scale : what its title says of its size, which is true of the file and not of a page that shows it.
+    """
     margin = 2 * drawing.text
     low, high = drawing.box()
     width, height = high - low + 2 * margin
     return document(
         (low[0] - margin, -high[1] - margin, width, height),
-        tag("title", escape(f"{drawing.title}, 1:1 in mm")),
+        tag("title", escape(f"{drawing.title}, {scale}")),
         tag("rect", x=low[0] - margin, y=-high[1] - margin, width=width, height=height, fill=PAPER),
         *_shapes(drawing),
         *(_text(text) for text in drawing.texts),

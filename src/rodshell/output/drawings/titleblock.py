@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
 from typing import Any
 
@@ -17,6 +17,7 @@ from rodshell.output.wording import case_rows, joint_rows, rounded, stress
 
 NOT_GIVEN = "not given"
 COLUMNS = 4  # of entries, side by side
+TRUE_SIZE = ", 1:1"  # after the title of a drawing that is its own file
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     size, pencil = drawing.text, Pencil()
     y = bottom - 2.6 * size
     pencil.line([(left, y + 1.6 * size), (right, y + 1.6 * size)], "TITLE")
-    pencil.write(f"{block.name}: {drawing.title.lower()}, 1:1", (left, y), 1.4 * size, "TITLE", bold=True)
+    pencil.write(f"{block.name}: {drawing.title.lower()}{TRUE_SIZE}", (left, y), 1.4 * size, "TITLE", bold=True)
     rows = [block.entries[k : k + COLUMNS] for k in range(0, len(block.entries), COLUMNS)]
     lines = [" \N{MIDDLE DOT} ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(
         drawing
@@ -110,6 +111,17 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
     end = left + max(right - left, 0.25 * (right - left) + 4 * size)
     scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
     return drawing + pencil.done("", "", size)
+
+
+def on_a_page(drawing: Drawing) -> Drawing:
+    """A drawing with its title as a page shows it, which has it in any size: no scale but its bar is true there."""
+    return replace(
+        drawing,
+        texts=tuple(
+            replace(text, text=text.text.removesuffix(TRUE_SIZE)) if text.layer == "TITLE" and text.bold else text
+            for text in drawing.texts
+        ),
+    )
 
 
 def write_entries(
