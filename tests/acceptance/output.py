@@ -85,7 +85,7 @@ def file_rows(name: str) -> Iterator[Row]:
     marks = np.array([one.points[0] for one in plan if one.kind == "CIRCLE" and one.layer == "MARK"])
     off = 0.0
     for joint in joints:
-        places = [_along(cuts[joint[f"rod_{side}"]], float(joint[f"at_{side}_mm"])) for side in "ab"]
+        places = [_along(cuts[joint[f"rod_{side}"]], float(joint[f"at_{side}_from_cut_end_mm"])) for side in "ab"]
         nearest = marks[np.linalg.norm(marks - places[0], axis=1).argmin()]
         off = max(off, *(float(np.linalg.norm(place - nearest)) for place in places))
     yield Row(name, "joint marks of both rods and DXF, apart", off, 0.01, "mm", f"{len(joints)} joints")
