@@ -48,7 +48,7 @@ def gallery() -> dict[str, Piece]:
     vault = rs.HeightField(formula="4*cos(0.28*x)", domain=rs.Rectangle((9.0, 12.0)))
     bumps = "2.2*exp(-((x - 2.2)^2 + y^2)/4.5) + 1.8*exp(-((x + 2.2)^2 + y^2)/4.5)"
     ridge = "2 - 0.03*x^2 - 0.04*y^2 + 0.02*x*y + 0.9*exp(-(0.88*x + 0.48*y)^2/16 - (0.88*y - 0.48*x)^2/2.5)"
-    lath = rs.Rod(rs.RectangularSection(width=15 * MM, height=40 * MM), LARCH)
+    lath = rs.Rod(rs.RectangularSection(width=10 * MM, height=30 * MM), LARCH)
     return {
         "garden pavilion": Piece(rs.Paraboloid(radius=4.5, height=1.8), lath, 0.6, 0.003, 0.0001),
         "dome": Piece(rs.Hemisphere(radius=5.0), tube(25, 3), 0.8, 0.0105, 0.0001),
