@@ -11,14 +11,14 @@ from reprlib import repr as short
 from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.units import shown
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    Floats = Floats
 Choice = TypeVar("Choice", bound=str)
 
 

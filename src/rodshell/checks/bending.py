@@ -10,8 +10,8 @@ rods upright; of others by the shell's normal, that of the rods that cross there
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.formfinding.draped import node_normals
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import GridMesh
@@ -28,8 +28,6 @@ from rodshell.rods.fibres import (
     torsion_stress,
 )
 from rodshell.rods.section import Circle, Rod, Tube
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -176,7 +174,7 @@ def _on_entries(shell: Shell, strains: Floats) -> Floats:
     return result
 
 
-def _inner(mesh: GridMesh) -> NDArray[np.bool_]:
+def _inner(mesh: GridMesh) -> Bools:
     """(k,) which entries of `rod_nodes` are not ends."""
     inner = np.ones(len(mesh.rod_nodes), dtype=bool)
     inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False

@@ -1,7 +1,6 @@
 """From the pinned shape to the clamped one: on site the ends are turned into their clamps after the deployment."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rodshell.checks.deployment import SAME
 from rodshell.formfinding import Popped
@@ -11,8 +10,6 @@ from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import find_equilibrium
 from rodshell.solve.path import trace
 from rodshell.solve.problem import Problem
-
-Floats = NDArray[np.float64]
 
 SHORTEST = 0.02  # share of the angles: a snap is located to this
 MOST = 400  # factorisations; the paths that arrive take 3 to 33

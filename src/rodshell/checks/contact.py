@@ -20,9 +20,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
 from rodshell.geometry.frames import adapted
 from rodshell.geometry.vectors import cross, dot, unit
@@ -30,9 +30,6 @@ from rodshell.layout import FlatGrid, GridMesh
 from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
 SHORT = 0.5  # of a section's reach: edges are taken together up to this length, which leaves 0.2 % of it as sag
@@ -247,7 +244,7 @@ class _Edges:
             yield here, order[first[here]]
             first += 1
 
-    def _overlap(self, first: Ints, second: Ints, crossings: Ints) -> NDArray[np.bool_]:
+    def _overlap(self, first: Ints, second: Ints, crossings: Ints) -> Bools:
         """Whether both edges lie so near to the crossing of their rods that they overlap there by design."""
         tangents = self.tangent[first], self.tangent[second]
         sine = np.minimum(np.linalg.norm(cross(*tangents), axis=1), self._sines[crossings])

@@ -15,8 +15,8 @@ from itertools import pairwise, takewhile
 from math import prod
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.vectors import cross
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
@@ -26,7 +26,6 @@ from rodshell.solve.path import EASY, Snap, Trace, follow, potential, trace, una
 from rodshell.solve.problem import Pattern, Problem
 from rodshell.units import length_text
 
-Floats = NDArray[np.float64]
 Told = Callable[[float], None]
 Stage = tuple[float, Equilibrium]  # share of the way that the ends have gone, and the shell there
 
@@ -299,7 +298,7 @@ class _Path:
         return Problem(elements, stretch, supports, self._length, places=places, pattern=self._pattern)
 
 
-def laid_out(flat: Floats, ends: NDArray[np.intp], popped: Floats) -> Floats:
+def laid_out(flat: Floats, ends: Ints, popped: Floats) -> Floats:
     """The flat grid (n, 3) turned and moved in its plane to lie under the popped-up shell, at its lowest end [m].
 
     The rods' ends then have the shortest ways to go, in the least-squares sense (Procrustes in the plane).

@@ -8,17 +8,14 @@ angles. Both are resultants, whatever the joint is made of.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.draped import joint_normals, joint_tangents
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.joints.crossings import Places
 from rodshell.joints.linkers import LinkerBend
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
+from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
 from rodshell.checks.deployment import SAME, Deployment
 from rodshell.formfinding.draped import middle_surface
@@ -27,8 +27,6 @@ from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.modes import softest_modes
 from rodshell.solve.path import potential
 from rodshell.solve.problem import Problem
-
-Floats = NDArray[np.float64]
 
 MODES = 4
 KICKS = (0.2, 0.4)  # of the shell's size: how far the node goes that goes farthest

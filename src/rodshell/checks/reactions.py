@@ -8,12 +8,10 @@ check it: they vanish only if every free node is in equilibrium.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.model import Shell
 from rodshell.solve.mixed_newton import Equilibrium
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

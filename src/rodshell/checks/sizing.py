@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError, NetLimitError
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
@@ -17,8 +18,6 @@ from rodshell.rods.section import Circle, Rod, Section, Tube
 from rodshell.rods.stock import STOCK, depth, scaled, size_text
 from rodshell.targets import Target
 from rodshell.units import length_text, rounded_down
-
-Floats = NDArray[np.float64]
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
 SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.units import length_text, parse_quantity, read_unit
 
@@ -34,14 +34,14 @@ class RodEnds:
     """
 
     names: list[str] | None
-    flat: NDArray[np.float64]
-    final: NDArray[np.float64]
+    flat: Floats
+    final: Floats
     rod: dict[str, Any] = field(default_factory=dict)
     joint: dict[str, Any] = field(default_factory=dict)
     edge: float | None = None
 
     @property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Floats:
         """(m,) lengths of the rods [m]."""
         return np.linalg.norm(self.flat[:, 1] - self.flat[:, 0], axis=1)
 

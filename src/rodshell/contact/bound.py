@@ -5,13 +5,11 @@ from functools import cached_property
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.vectors import dot
 from rodshell.model import Freedom
 from rodshell.targets import Gap, Target
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,7 @@ class BoundToTarget:
     """
 
     target: Target
-    count: NDArray[np.intp]
+    count: Ints
     guides: Floats
 
     @cached_property

@@ -18,15 +18,12 @@ from typing import Any, Literal
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import dot
 from rodshell.model import Freedom
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 ROUND_OFF = 1e-10  # of the target's size: a node is below the surface only from this depth on
 SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal
@@ -54,7 +51,7 @@ class Touching:
     nodes: Ints
     points: Floats
     normals: Floats
-    stuck: NDArray[np.bool_]
+    stuck: Bools
 
     @staticmethod
     def none(supports: Any, state: Floats) -> "Touching":

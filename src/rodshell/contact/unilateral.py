@@ -4,13 +4,10 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.fabrication.bracing import Diagonal, diagonals
 from rodshell.fabrication.nesting import Nesting, nest
 from rodshell.fabrication.options import Fabrication
@@ -14,8 +14,6 @@ from rodshell.layout import GridMesh
 from rodshell.layout.layers import layers
 from rodshell.rods.section import Rod
 from rodshell.units import length_text
-
-Floats = NDArray[np.float64]
 
 SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
 
@@ -36,7 +34,7 @@ class Fabricated:
     options: Fabrication
     cut_length: Floats
     mass: Floats
-    layer: NDArray[np.intp]
+    layer: Ints
     splices: tuple[tuple[float, ...], ...]
     pieces: tuple[tuple[int, int, float], ...]
     nesting: Nesting | None

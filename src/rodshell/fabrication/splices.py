@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from rodshell.arrays import Floats
 
 Way = tuple[int, int, float, int]  # to a stop: pieces so far, short ones of them, worst bend, the stop before
 
@@ -34,7 +36,7 @@ def splices(
     return _fewest(stops, np.concatenate([[0.0], bend, [0.0]]), stock, short)
 
 
-def _fewest(stops: NDArray[np.float64], bend: NDArray[np.float64], stock: float, short: float) -> list[float] | None:
+def _fewest(stops: Floats, bend: Floats, stock: float, short: float) -> list[float] | None:
     """The way from the first stop to the last in the fewest steps of at most `stock`, then in the fewest under `short`,
     then of the least worst bend.
     """
@@ -49,7 +51,7 @@ def _fewest(stops: NDArray[np.float64], bend: NDArray[np.float64], stock: float,
     return _back(stops, best)
 
 
-def _back(stops: NDArray[np.float64], best: Sequence[Way | None]) -> list[float] | None:
+def _back(stops: Floats, best: Sequence[Way | None]) -> list[float] | None:
     found = list[float]()
     way = best[-1]
     if way is None:

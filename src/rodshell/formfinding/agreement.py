@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.formfinding.popup import Popped
 from rodshell.geometry.curves import on_curve
 from rodshell.layout import GridMesh
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from dataclasses import replace
 from math import degrees
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.contact.bound import BoundToTarget
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.natural import with_natural_ends
@@ -31,8 +31,6 @@ from rodshell.solve.mixed_newton import MOST_ITERATIONS, STRAIN_TOLERANCE, Equil
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
 WARN_ANGLE = 25.0  # degrees
@@ -190,7 +188,7 @@ def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
     return BoundToTarget(target, count, guides)
 
 
-def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> NDArray[np.intp]:
+def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> Ints:
     """Nodes between the ends of some rod: all but the apron's."""
     whole = np.repeat(np.arange(len(cuts)), [len(pieces) for pieces in cuts])
     _, _, nodes = nodes_along(mesh, [cut for pieces in cuts for cut in pieces], whole)
@@ -214,7 +212,7 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
 
 def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
     """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
-    windows, places = list[NDArray[np.intp]](), list[Floats]()
+    windows, places = list[Ints](), list[Floats]()
     for k, pieces in enumerate(cuts):
         s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
         for end in (end for cut in pieces if not cut.virtual for end in (cut.start, cut.end)):

@@ -5,13 +5,10 @@ carried is only a guess, from which a solve starts.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.layout import GridMesh
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 SAME_LINE = 0.25  # spacings
 

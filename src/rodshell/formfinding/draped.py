@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.formfinding.fall import Fall
 from rodshell.formfinding.thickness import StrongBending
 from rodshell.geometry.vectors import cross, dot, unit
@@ -17,8 +17,6 @@ from rodshell.targets import Target
 
 if TYPE_CHECKING:
     from rodshell.formfinding.rest import Rest
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -75,9 +73,7 @@ class Draped:
         return self.report.status is Status.CONVERGED
 
 
-def smallest_joint_angle(
-    mesh: GridMesh, positions: Floats, inside: NDArray[np.bool_]
-) -> tuple[float, tuple[float, float, float]]:
+def smallest_joint_angle(mesh: GridMesh, positions: Floats, inside: Bools) -> tuple[float, tuple[float, float, float]]:
     """Smallest angle between two rods [rad] over the joints whose node is `inside` (n,), and where it is."""
     tangents = joint_tangents(mesh, positions)
     angle = np.arctan2(

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
 from rodshell.formfinding.calming import calming
@@ -33,9 +33,6 @@ from rodshell.solve.step_limit import NO_NODES, REMEDY, ExplicitTies, step_limit
 from rodshell.solve.summed import narrow_or_dissected
 from rodshell.solve.time_series import End, Moment, TimeSeries
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 STILL = 1e-7  # kinetic energy, of weight times size
 BALANCED = 1e-3  # out-of-balance force on a node, of the weight of the heaviest

@@ -1,10 +1,8 @@
 """Which family's rod ends at each point along a seam."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from rodshell.arrays import Floats, Ints
 
 LEAVE_OUT = 1.5  # what it costs to leave a rod out: as much as rods at 0.3 spacings, or at 3.4
 APART = 4.0  # spacings along the seam that count as one between rods: past them, rods do not crowd

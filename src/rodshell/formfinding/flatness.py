@@ -3,12 +3,10 @@
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.rods.section import Rod
 from rodshell.units import length_text
-
-Floats = NDArray[np.float64]
 
 PLANE = 1e-6  # of the extent: what files of single precision leave of a plane
 

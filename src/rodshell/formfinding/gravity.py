@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.contact.unilateral import UnilateralContact
 from rodshell.formfinding.draped import Draped, laid_in_layers, middle_surface, node_normals, smallest_joint_angle
 from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
@@ -25,8 +25,6 @@ from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
 
 DEPTH = 1e-5  # of the size: deepest node inside the target
 CONTACT_UPDATES = 12

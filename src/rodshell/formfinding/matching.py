@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.formfinding.families import choose_families
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
@@ -21,11 +21,8 @@ from rodshell.nets.cuts import inside_nodes
 from rodshell.nets.nearby import interpolated
 from rodshell.targets import Target
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 Point = tuple[float, float]
-OnHeld = Callable[[Floats], Mask]  # whether points (n, 3) of the end lie on a seam whose rods are given
+OnHeld = Callable[[Floats], Bools]  # whether points (n, 3) of the end lie on a seam whose rods are given
 
 FAMILIES: tuple[Family, Family] = ("u", "v")
 ROUNDS = 4  # three settle
@@ -145,7 +142,7 @@ def _steps(net: ChebyshevNet, nodes: Ints, by: Floats) -> Floats:
     return np.asarray(np.linalg.solve(square, np.einsum("nik,ni->nk", along, by)[..., None])[..., 0])
 
 
-def _price(net: ChebyshevNet, inside: Mask, place: Floats, k: int, family: int, wanted: Wanted) -> float:
+def _price(net: ChebyshevNet, inside: Bools, place: Floats, k: int, family: int, wanted: Wanted) -> float:
     """What the rod of a family through point k costs: little where it is the mirror image of the one that it meets, for
     then both are short or both are long; infinitely much where it would end on a held seam again, at no other point.
     """

@@ -7,12 +7,10 @@ the line's geodesic curvature. It dies out by 0.27 from joint to joint. (Beam th
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.layout import GridMesh
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
 
 STEEP = 0.5  # rad that a line turns in its last span: such a rod stays on its line, beam theory is not for it
 

@@ -1,14 +1,12 @@
 """The flat grid over the target: what every fall starts from, and whether it stayed on top."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, GridLayout, GridMesh
 from rodshell.nets import chebyshev_net
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
 
 OVERHANG = 4.0  # spacings that a rod of automatic length hangs over the target's end
 SLIPPED = 0.2  # of the size: a joint of the axes that has moved so far from its vertical plane has slid off

@@ -4,17 +4,14 @@ from dataclasses import replace
 from string import ascii_uppercase
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross
 from rodshell.nets import geodesics
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch
 from rodshell.targets.seam import Seam
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 RAYS, STEPS = 240, 90  # of the look around a target, from its summit
 FAR = 3.0  # sizes that a ray runs
@@ -96,7 +93,7 @@ def _neighbours(points: Floats, reach: float) -> Ints:
     return np.asarray(cKDTree(points).query_pairs(reach, output_type="ndarray"), dtype=np.intp).reshape(-1, 2)
 
 
-def _connected(points: Floats, sides: NDArray[np.bool_], reach: float) -> list[Ints]:
+def _connected(points: Floats, sides: Bools, reach: float) -> list[Ints]:
     """Points (k,) of each part: those within `reach` [m] on the same sides of all seams belong together."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -121,7 +118,7 @@ def _middle(patch: Patch, points: Floats, areas: Floats) -> tuple[float, float]:
     return x, y
 
 
-def _from_above(patch: Patch, points: Floats) -> NDArray[np.bool_]:
+def _from_above(patch: Patch, points: Floats) -> Bools:
     """Whether these points (n, 3) are the ones that an anchor's x, y stands for."""
     z = patch.height(points[:, :2])
     return np.asarray(np.abs(z - points[:, 2]) < 1e-6 * patch.size)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from math import degrees, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import Method, drape
@@ -34,8 +34,6 @@ from rodshell.solve.report import Status
 from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.validation import choices_of
-
-Floats = NDArray[np.float64]
 
 STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
 ROLLED = pi / 4  # rad: a lath that turns by more bends about its other axis rather than its own

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.carried import carried_edges, carried_nodes
 from rodshell.formfinding.draped import node_normals
@@ -29,7 +29,6 @@ from rodshell.solve.report import SolveReport, Status
 from rodshell.units import length_text
 from rodshell.validation import choice
 
-Floats = NDArray[np.float64]
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
 ENDS: tuple[Ends, ...] = get_args(Ends)

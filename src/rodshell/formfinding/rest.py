@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.contact.modified_mass import Touching
 from rodshell.geometry.vectors import dot
 from rodshell.model import Freedom, Shell
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.modes import slowest_modes
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
 
 MODES = 4
 

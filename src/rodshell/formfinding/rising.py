@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.popup import FIRST_RISE, aligned, arched
 from rodshell.formfinding.progress import Progress, silent
@@ -26,8 +26,6 @@ from rodshell.solve.simulate import simulate
 from rodshell.solve.step_limit import step_limit
 from rodshell.solve.summed import narrow_or_dissected
 from rodshell.solve.time_series import Moment
-
-Floats = NDArray[np.float64]
 
 BALANCED = 1e-3  # out-of-balance force on a node, of EI over the square of the shell's half-width
 STILL = 1e-6  # kinetic energy, of the elastic energy

@@ -1,14 +1,12 @@
 """How far laths turn about their own axes: what lies flat on the target need not do so when it is let go."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.formfinding.draped import node_normals
 from rodshell.formfinding.popup import Popped
 from rodshell.geometry.vectors import dot, unit
 from rodshell.rods.bend_twist import BendTwist
-
-Floats = NDArray[np.float64]
 
 
 def roll(popped: Popped) -> Floats | None:

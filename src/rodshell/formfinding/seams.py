@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.matching import Point, Wanted, match_net, rod_ends
 from rodshell.formfinding.progress import Progress, silent
@@ -14,8 +14,6 @@ from rodshell.geometry.vectors import unit
 from rodshell.layout import FlatGrid, FlatRod, GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.targets.patch import Patch
-
-Floats = NDArray[np.float64]
 
 REMEDY = "turn the layout (layout.rotate), so that its rods cross the seams, or use a smaller spacing"
 FEWEST = 2  # joints of a rod: one that is left out takes those with it that it meets
@@ -126,13 +124,13 @@ def _in_order(meetings: list[Meeting]) -> tuple[Meeting, ...]:
     return tuple(meetings[k] for row in _rows(seams, points) for k in row.tolist())
 
 
-def _rows(seams: NDArray[np.intp], points: Floats) -> list[NDArray[np.intp]]:
+def _rows(seams: Ints, points: Floats) -> list[Ints]:
     """Indices of the points (n, 3) on each of the seams (n,) that there are, in their order along it."""
     here = [np.flatnonzero(seams == seam) for seam in np.unique(seams)]
     return [row[in_a_row(points[row])] for row in here]
 
 
-def in_a_row(points: Floats) -> NDArray[np.intp]:
+def in_a_row(points: Floats) -> Ints:
     """The order (n,) of points (n, 3) along a curve through them, from one of its ends: that of their shortest tree."""
     from scipy.sparse.csgraph import minimum_spanning_tree, shortest_path
     from scipy.spatial.distance import cdist
@@ -147,7 +145,7 @@ def _across(patch: Patch, seam: int) -> tuple[int, ...]:
     return tuple(-side if k == seam else side for k, side in enumerate(patch.sides))
 
 
-def _cut_by(patch: Patch, points: Floats) -> NDArray[np.intp]:
+def _cut_by(patch: Patch, points: Floats) -> Ints:
     """(n,) the seam on which points (n, 3) of a patch's end lie; -1: on the end of the whole."""
     off = np.array([patch.whole.margin(points), *(seam.distance(points) for seam in patch.seams)])
     return np.asarray(np.argmin(np.abs(off), axis=0) - 1)

@@ -6,7 +6,6 @@ from math import degrees, pi
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rodshell.errors import InputError, OutOfTimeError, RodshellError
 from rodshell.formfinding.pipeline import find_stages
@@ -18,7 +17,6 @@ from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.units import shown
 
-Floats = NDArray[np.float64]
 Objective = Literal["shear", "curvature", "gap"]
 Auto = Literal["auto"]
 Point = tuple[float, float]

@@ -7,8 +7,8 @@ from functools import cached_property, partial
 from math import degrees
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.agreement import Agreement
 from rodshell.formfinding.draped import Draped
@@ -32,8 +32,6 @@ from rodshell.targets.patch import Patch
 from rodshell.targets.seam import Seam
 from rodshell.units import shown
 from rodshell.validation import choices_of
-
-Floats = NDArray[np.float64]
 
 MANY = 0.1  # of the rods: a share left out that is worth a word
 ASTRAY = 0.005  # of the size: ends that are moved further are worth a word

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
 from rodshell.targets import Target
 from rodshell.units import length_text
-
-Floats = NDArray[np.float64]
 
 THICK = 0.015  # difference of the layers' lengths, or
 MUCH = 0.1  # of the rods' length beyond the moment at which they buckle: below it shells settle near their targets
@@ -37,7 +35,7 @@ def thickness(rod: Rod) -> float:
 
 
 def layers_left_out(
-    target: Target, mesh: GridMesh, positions: Floats, edges: NDArray[np.bool_], rod: Rod, spacing: float
+    target: Target, mesh: GridMesh, positions: Floats, edges: Bools, rod: Rod, spacing: float
 ) -> tuple[str, ...]:
     """That thick rods, if one lies above the other, would have other lengths than those of one surface.
 
@@ -94,9 +92,7 @@ class StrongBending:
         )
 
 
-def strong_bending(
-    target: Target, mesh: GridMesh, positions: Floats, bends: NDArray[np.bool_], rod: Rod
-) -> StrongBending | None:
+def strong_bending(target: Target, mesh: GridMesh, positions: Floats, bends: Bools, rod: Rod) -> StrongBending | None:
     """Of rods that cannot roll at their joints; None where they bend alike all ways.
 
     bends : (b,) those of the mesh that lie on the target, its nodes being at `positions` (n, 3) [m].

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.draped import Draped, laid_in_layers, node_normals
 from rodshell.geometry.vectors import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
-
-Floats = NDArray[np.float64]
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
 FEWEST_JOINTS = 3  # a rod with fewer swings about the line through them

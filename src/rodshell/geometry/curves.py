@@ -2,9 +2,8 @@
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
 
 
 @nb.njit(cache=True, error_model="numpy")

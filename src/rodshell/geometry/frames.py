@@ -1,12 +1,10 @@
 """Adapted frames of a rod: a unit tangent t and a director d1 across it; d2 = t x d1 completes the frame."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, dot, unit
-
-Floats = NDArray[np.float64]
 
 _ALONG = 1e-6  # a director within this angle [rad] of its tangent says nothing about the plane across
 

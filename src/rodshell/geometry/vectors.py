@@ -1,9 +1,8 @@
 """Small vector maths on arrays of three-vectors."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
 
 
 def cross(a: Floats, b: Floats) -> Floats:

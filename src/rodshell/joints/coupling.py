@@ -11,8 +11,9 @@ from typing import Self
 
 import numpy as np
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS
 from rodshell.rods.section import Rod
 
 

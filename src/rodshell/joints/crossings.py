@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
+from rodshell.arrays import Floats, Ints
 from rodshell.layout import GridMesh
-from rodshell.rods.elements import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.joints.crossings import Places
 from rodshell.joints.joint import Elastic, Joint
 from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.joints.sections import stencils
-from rodshell.rods.elements import Floats, Ints
 
 FIRM = 1e8  # of the half edges next to it: what a rigid direction of a joint has
 UP = np.array([0.0, 0.0, 1.0])

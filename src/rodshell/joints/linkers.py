@@ -11,9 +11,10 @@ from typing import Self
 
 import numpy as np
 
+from rodshell.arrays import Floats, Ints
 from rodshell.joints.crossings import Places
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS
 
 UP = (0.0, 0.0, 1.0)
 

@@ -12,11 +12,12 @@ from typing import Self
 import numba as nb
 import numpy as np
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted
 from rodshell.joints.crossings import Places
 from rodshell.joints.sections import by_edge, carried, edge_tangents, frame, of_edge, spread, stencils
 from rodshell.layout.layers import sides
-from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -30,11 +30,12 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted
 from rodshell.geometry.vectors import cross, dot
 from rodshell.joints.section_strains import curvatures, respond, strains_by
 from rodshell.joints.sections import by_edge, carried, edge_tangents, frame, of_edge, spread
-from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS
 
 
 @dataclass(frozen=True)

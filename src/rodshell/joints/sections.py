@@ -12,12 +12,11 @@ from typing import Protocol, TypeVar
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import adapted, parallel_transport
 from rodshell.geometry.vectors import unit
 from rodshell.joints.crossings import Places
-from rodshell.rods.elements import Floats, Ints
 
 
 class OfSections(Protocol):
@@ -48,7 +47,7 @@ def carried(element: T, state: Floats) -> T:
     return replace(element, source_tangents=tangents, source_directors=adapted(directors, tangents))  # type: ignore[type-var]
 
 
-def stencils(places: Places, met: Ints) -> Iterator[tuple[NDArray[np.bool_], Ints, Ints, Ints, Floats]]:
+def stencils(places: Places, met: Ints) -> Iterator[tuple[Bools, Ints, Ints, Ints, Floats]]:
     """Of crossings at the places `met` (m, 2), those alike in which edges their rods have there, set by set.
 
     Yields
@@ -62,7 +61,7 @@ def stencils(places: Places, met: Ints) -> Iterator[tuple[NDArray[np.bool_], Int
         yield mine, *_stencil(places, met[mine], kind.reshape(2, 2))
 
 
-def _stencil(places: Places, met: Ints, kind: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints, Floats]:
+def _stencil(places: Places, met: Ints, kind: Bools) -> tuple[Ints, Ints, Ints, Floats]:
     columns, legs, middles, weights = list[Ints](), list[tuple[int, int, int, int]](), [0, 0], list[Floats]()
     for rod in range(2):
         here = met[:, rod]

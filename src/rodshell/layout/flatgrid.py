@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 
 Family = Literal["u", "v", "free"]
@@ -49,7 +50,7 @@ class FlatRod:
     def length(self) -> float:
         return self.end - self.start
 
-    def point(self, s: ArrayLike) -> NDArray[np.float64]:
+    def point(self, s: ArrayLike) -> Floats:
         """Flat positions (..., 2) [m] at the material coordinates `s` [m]."""
         return np.asarray(self.origin) + np.asarray(s, dtype=float)[..., None] * np.asarray(self.direction)
 
@@ -92,13 +93,13 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:
 class Crossings:
     """Where rods cross: `rods` (c, 2) indices, `at` (c, 2) material coordinates on each of the two [m]."""
 
-    rods: NDArray[np.intp]
-    at: NDArray[np.float64]
+    rods: Ints
+    at: Floats
 
     def __len__(self) -> int:
         return len(self.rods)
 
-    def select(self, keep: NDArray[np.bool_]) -> "Crossings":
+    def select(self, keep: Bools) -> "Crossings":
         return Crossings(self.rods[keep], self.at[keep])
 
 
@@ -130,11 +131,11 @@ class FlatGrid:
             at[:, side] = np.clip(at[:, side], start[rod], end[rod])
         return FlatGrid(rods, Crossings(np.column_stack([a, b])[met], at[met]))
 
-    def joint_counts(self) -> NDArray[np.intp]:
+    def joint_counts(self) -> Ints:
         """(m,) number of joints on each rod."""
         return np.bincount(self.crossings.rods.ravel(), minlength=len(self.rods))
 
-    def without(self, leave_out: Callable[["FlatGrid"], NDArray[np.bool_]]) -> tuple["FlatGrid", list[str]]:
+    def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:
         """Leave out the rods that `leave_out` marks, again and again until it marks none; and their names."""
         grid, names = self, list[str]()
         while (out := leave_out(grid)).any():
@@ -208,5 +209,5 @@ def _refuse_overlaps(rods: Sequence[FlatRod]) -> None:
         raise InputError(f"rods {first} and {second} lie on one line and overlap: keep one of them")
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

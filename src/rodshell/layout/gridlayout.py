@@ -6,8 +6,8 @@ from numbers import Real
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
 from rodshell.validation import positive
@@ -94,7 +94,7 @@ class GridLayout:
         half = 0.0 if self.rods == "auto" else (self.rods[side] - 1) / 2 % 1
         return self.offset[1 - side] + half * self.spacing[side]
 
-    def lattice(self, family: Family, low: float, high: float) -> NDArray[np.float64]:
+    def lattice(self, family: Family, low: float, high: float) -> Floats:
         """Offsets [m] of the lines of a family from `low` to `high`, both within a spacing."""
         spacing, given = self.spacing[0 if family == "u" else 1], self.lines[0 if family == "u" else 1]
         if given:
@@ -105,7 +105,7 @@ class GridLayout:
         first, last = np.floor((low - phase) / spacing), np.ceil((high - phase) / spacing)
         return np.asarray(phase + spacing * np.arange(first, last + 1))
 
-    def offsets(self, family: Family) -> NDArray[np.float64] | None:
+    def offsets(self, family: Family) -> Floats | None:
         """Offsets [m] of the rods of a family, ascending, or None where the count is "auto"."""
         if self.rods == "auto":
             return None

@@ -3,13 +3,13 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import FlatGrid
 
 
-def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> NDArray[np.intp]:
+def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:
     """(rods,) layer of each rod, 1 the lowest, for `crossings` given as pairs of rods.
 
     Rod by rod, outwards from the first of each connected part, each takes the lowest layer that it crosses no rod of.
@@ -31,7 +31,7 @@ def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> NDArray[np.intp]:
     return layer
 
 
-def sides(grid: FlatGrid) -> NDArray[np.float64]:
+def sides(grid: FlatGrid) -> Floats:
     """(m,) -1 for rods of the lower layer and 1 for those of the upper.
 
     Raises

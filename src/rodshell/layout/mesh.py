@@ -5,14 +5,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.layout.flatgrid import FlatGrid, FlatRod, whole_rods
 from rodshell.layout.layers import sides
-
-Ints = NDArray[np.intp]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

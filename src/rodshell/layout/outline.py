@@ -5,13 +5,10 @@ of its faces, keeping it on the left, meets the ends that stick out into that fa
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.layout.flatgrid import FlatGrid, FlatRod
 from rodshell.layout.mesh import mesh_grid
-
-Ints = NDArray[np.intp]
-Floats = NDArray[np.float64]
 
 FEWEST = 3  # ends of an outline
 

@@ -4,12 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod
 from rodshell.layout.mesh import GridMesh
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.model.freedom import Freedom
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

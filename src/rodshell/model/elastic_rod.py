@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csc_matrix, diags
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, unit
 from rodshell.model.assembly import Assembly
@@ -27,9 +28,6 @@ from rodshell.rods.isotropic_bend import IsotropicBend
 from rodshell.rods.round_bend_twist import RoundBendTwist
 from rodshell.rods.stretch import Stretch
 from rodshell.validation import direction, finite, vector
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 _SPIN = (1.0, 0.0, 0.0)  # the one component of an angle block that means anything
 

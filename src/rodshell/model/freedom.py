@@ -5,10 +5,8 @@ from functools import cached_property
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from rodshell.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, directors_along, parallel_transport, signed_angle
 from rodshell.geometry.vectors import cross, dot
 from rodshell.rods.section import Rod
 from rodshell.validation import direction, finite
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 End = Literal["start", "end"]
 Rods = Rod | Sequence[Rod] | Callable[[float], Rod]
 Clamps = Sequence[End] | Mapping[End, ArrayLike]

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import unit
@@ -32,9 +32,6 @@ from rodshell.rods.elements import Elements
 from rodshell.rods.isotropic_bend import IsotropicBend
 from rodshell.rods.section import Rod
 from rodshell.rods.stretch import Stretch
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 UP = (0.0, 0.0, 1.0)
 OFFSET_STIFFNESS = 10.0  # of an edge's: ties of eccentric joints

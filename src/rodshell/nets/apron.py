@@ -9,13 +9,10 @@ Across an opening the net simply goes on: the drape does not know of it.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets.chebyshev import ChebyshevNet
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 RINGS = 2  # one leaves the ends 0.5 mm off the net on a 0.2 m hemisphere at 40 mm spacing, two 0.1 mm
 
@@ -66,11 +63,11 @@ class _Lines:
 
     stations: Floats
     offsets: Floats
-    live: Mask
-    stretches: NDArray[np.intp]
+    live: Bools
+    stretches: Ints
 
     @staticmethod
-    def of(stations: Floats, offsets: Floats, live: Mask) -> "_Lines":
+    def of(stations: Floats, offsets: Floats, live: Bools) -> "_Lines":
         return _Lines(stations, offsets, live, np.cumsum(~live, axis=1))
 
     def stretch_of(self, rod: FlatRod) -> tuple[int, int]:

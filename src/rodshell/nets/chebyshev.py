@@ -12,8 +12,8 @@ from string import ascii_lowercase
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError, NetLimitError
 from rodshell.geometry.curves import on_curve
 from rodshell.layout import FlatRod, GridLayout
@@ -25,8 +25,6 @@ from rodshell.nets.lines import LatticeLines, find_lines, march_lines
 from rodshell.nets.reach import Covering
 from rodshell.targets import Target
 from rodshell.units import length_text
-
-Floats = NDArray[np.float64]
 
 SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
 SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further

@@ -14,13 +14,10 @@ from functools import cached_property
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.targets import Implicit, Target
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 Heights = tuple[float, float]
 
@@ -187,7 +184,7 @@ def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # ty
     return going
 
 
-def fill_quadrants(target: Target, net: Net, wanted: Mask | None = None) -> None:
+def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None) -> None:
     """What is not known of all four quadrants, all nodes or those `wanted` (nu, nv): again and again those whose
     neighbours are known. Of a net of which only the axes are known these lie on one anti-diagonal after the other."""
     tried = np.zeros(net.points.shape[:2], dtype=bool) if wanted is None else ~wanted

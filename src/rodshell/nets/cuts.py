@@ -7,16 +7,11 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import lagrange
 from rodshell.nets.compass import Net
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Mask = NDArray[np.bool_]
-
 
 SQUARE = 5  # nodes each way
 
@@ -28,7 +23,7 @@ class Cut(NamedTuple):
     end: float
 
 
-def inside_nodes(target: Target, net: Net) -> Mask:
+def inside_nodes(target: Target, net: Net) -> Bools:
     """(nu, nv) nodes inside the target's end and connected with the anchor through inside nodes.
 
     Where the anchor lies in an opening, with the first inside nodes along the axes.
@@ -65,7 +60,7 @@ def _connect(region, reached):  # type: ignore[no-untyped-def]
                 top += 1
 
 
-def _region(target: Target, net: Net) -> Mask:
+def _region(target: Target, net: Net) -> Bools:
     """(nu, nv) nodes inside the target's end.
 
     A square of nodes in whose middle the end is further away than the way to its corners is asked about but once.
@@ -118,7 +113,7 @@ class Lines(NamedTuple):
 
     s: Floats
     points: Floats
-    inside: Mask
+    inside: Bools
 
 
 def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[list[list[Cut]]]:

@@ -7,8 +7,8 @@ parts of the spacing.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
 from rodshell.layout import GridLayout
 from rodshell.layout.flatgrid import Family
@@ -19,9 +19,6 @@ from rodshell.nets.cuts import inside_nodes
 from rodshell.nets.reach import Covering, march_covering
 from rodshell.targets import Target
 from rodshell.units import length_text
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `apron`
 STRIDE = 0.2  # of the target's size: the steps of the first march of all
@@ -95,7 +92,7 @@ def _stride(target: Target, start: Floats, heading: Floats, heights: Heights) ->
     return Covering(s, s, net.points, inside_nodes(target, net), heights=heights)
 
 
-def _around(inside: Mask) -> Mask:
+def _around(inside: Bools) -> Bools:
     """Nodes of an axis from the one before the first inside, or the anchor, to one past the last; all where none is."""
     on = np.append(np.flatnonzero(inside), STRIDES) if inside.any() else np.array([0, len(inside)])
     k = np.arange(len(inside))

@@ -8,8 +8,8 @@ three rounds, whatever the number of nodes. The equations are those of `compass`
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.curves import resampled
 from rodshell.geometry.vectors import cross, unit
 from rodshell.nets.compass import (
@@ -29,9 +29,6 @@ from rodshell.nets.compass import (
 )
 from rodshell.targets import Implicit, Target
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 ROUNDS = 6
 SETTLED = 2e-5  # of the target's size: what a round moves; the error left is its third power
 EXACT = 1e-13  # of the step, on a local model
@@ -48,7 +45,7 @@ def march_near(
     near: Net,
     *,
     coarser: Net | None = None,
-    wanted: Mask | None = None,
+    wanted: Bools | None = None,
     heights: Heights = ON_SURFACE,
 ) -> Net:
     """As `march`, from a guess taken out of a net `near`; any guess is safe, a bad one is only of no use.
@@ -171,7 +168,7 @@ def _geodesic(start, direction, normal, steps, points, value, gradient, hessian)
     return moved
 
 
-def _settle(target: Target, net: Net, wanted: Mask) -> None:
+def _settle(target: Target, net: Net, wanted: Bools) -> None:
     """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for what does not settle.
 
     A round asks the target only where the last one moved a node: elsewhere its model is still good.
@@ -298,7 +295,7 @@ def _plus(a, b):  # type: ignore[no-untyped-def]
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-def _forget(points: Floats, unsettled: Mask, i0: int, j0: int) -> None:
+def _forget(points: Floats, unsettled: Bools, i0: int, j0: int) -> None:
     """NaN for every node that has not settled, and for all that hang on it: those beyond it in its quadrant."""
     for rows in (slice(i0, None), slice(i0, None, -1)):
         for columns in (slice(j0, None), slice(j0, None, -1)):

@@ -8,15 +8,12 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.nets.compass import ON_SURFACE, Heights, Net, fill_quadrants
 from rodshell.nets.cuts import inside_nodes
 from rodshell.nets.nearby import march_near
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SURELY = 0.96  # of the margin: two nets in different steps end a little elsewhere
 
@@ -30,7 +27,7 @@ class Covering(Net):
     inside : (nu, nv) nodes inside the target's end, see `inside_nodes`.
     """
 
-    inside: Mask
+    inside: Bools
 
     def reach(self, past: int) -> Floats:
         """How far it is inside towards -u, +u, -v and +v, and so many nodes more [m]."""
@@ -66,7 +63,7 @@ def march_covering(
         fill_quadrants(target, net, wanted)
 
 
-def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Mask:
+def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
     """(nu, nv) nodes of the lines u and v that lie no further than a `margin` (2,) along u or v [m] outside what is
     inside of a net `near`, and all between these and the axes. Its end may lie so many nodes `past` the inside ones.
 

@@ -11,15 +11,13 @@ from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # scipy.integrate costs a third of a second, and only this reference needs it
     from scipy.integrate import OdeSolution
     from scipy.integrate._ivp.ivp import OdeResult
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
-
-Floats = NDArray[np.float64]
 
 LIMIT = 1.8616  # f vanishes first at this sigma: the net folds
 KNOWN = 1.95  # f is integrated to this sigma

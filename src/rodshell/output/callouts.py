@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.output.drawing import LETTER, SMALL, Text
 from rodshell.output.labels import CLOSE, Label, Room, fits, lines_near, nearby, off_its_mark, spread, take, upright
-
-Floats = NDArray[np.float64]
 
 SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names, over the usual one: the largest at which all of an outline find room
 OFF = 1.3  # from a place to where its name may begin

@@ -3,9 +3,8 @@
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
 
 # Signed: dark in the middle, so that rods without a gap are drawn in ink on light paper.
 SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f28c3a")

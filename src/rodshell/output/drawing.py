@@ -8,9 +8,9 @@ from math import cos, sin
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
+
 Anchor = Literal["start", "middle", "end"]
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Bools, Floats
 from rodshell.output.drawing import BELOW, LETTER, LINE, Text
 
-Floats = NDArray[np.float64]
 Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
@@ -107,7 +107,7 @@ def _extent(box: Floats) -> Extent:
     return min(a, b, c, d), min(e, f, g, h), max(a, b, c, d), max(e, f, g, h)
 
 
-def place(texts: Sequence[str], rods: Floats, size: float, *, at: NDArray[np.bool_] | None = None) -> list[Label]:
+def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None = None) -> list[Label]:
     """Labels at both ends of the rods (m, 2, 2), each on its rod's own line.
 
     A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
@@ -254,7 +254,7 @@ def lines_near(lines: Floats, place: Floats, reach: float) -> Floats:
     return np.asarray(lines[near])
 
 
-def runs_through(lines: Floats) -> NDArray[np.bool_]:
+def runs_through(lines: Floats) -> Bools:
     """(...) whether each of the lines (..., 2, 2) runs through the square from -1 to 1: no axis separates them."""
     low, high = lines.min(axis=-2), lines.max(axis=-2)
     off = lines[..., 0, 0] * lines[..., 1, 1] - lines[..., 0, 1] * lines[..., 1, 0]

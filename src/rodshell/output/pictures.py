@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.layout.outline import opens
 from rodshell.output.archive import SHELLS, Archive, made_once
 from rodshell.output.colours import mixed
@@ -16,8 +16,6 @@ from rodshell.output.svg import picture_document
 from rodshell.output.view import View, ground_axes
 from rodshell.output.wording import MINUS
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 Polylines = list[list[tuple[int, slice]]]
 
 WIDTH = 540.0  # drawing units of the shell itself

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.output.archive import Archive
 from rodshell.output.drawing import LETTER, SMALL
 from rodshell.output.rods import JointRecord, RodRecord, joints_of, outlines_of, rods_of
 from rodshell.output.rounding import Rounding, rounding_of
-
-Floats = NDArray[np.float64]
 
 NOTE = "Design aid, not code compliance"
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
 from rodshell.formfinding.bound import shape_of_net
 from rodshell.formfinding.flatness import is_flat
@@ -121,9 +122,7 @@ def head(name: str, status: str, warnings: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def grid_table(
-    footprint: Footprint, boundary: NDArray[np.float64], dropped: tuple[tuple[str, str], ...]
-) -> dict[str, Any]:
+def grid_table(footprint: Footprint, boundary: Floats, dropped: tuple[tuple[str, str], ...]) -> dict[str, Any]:
     """Rods, joints and rod ends."""
     rods: list[dict[str, Any]] = [
         {

@@ -6,12 +6,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.layout.outline import outlines
 from rodshell.output.archive import Archive, made_once, printable
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class RodRecord:
     end: float
     length: float
     flat: Floats
-    nodes: NDArray[np.intp]
+    nodes: Ints
     joints: tuple[tuple[str, float], ...]
     more: Mapping[str, Any] = field(default_factory=dict)
 
@@ -126,24 +124,24 @@ def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
     return nodes
 
 
-def outlines_of(rods: list[RodRecord]) -> list[NDArray[np.intp]]:
+def outlines_of(rods: list[RodRecord]) -> list[Ints]:
     """Rod ends along each outline of the flat grid, see `outlines`."""
     return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
 
 
 @lru_cache(maxsize=4)
-def _outlines(flat: bytes) -> list[NDArray[np.intp]]:
+def _outlines(flat: bytes) -> list[Ints]:
     """Kept for the next drawing of the same grid."""
     return outlines(np.frombuffer(flat).reshape(-1, 2, 2))
 
 
-def _nodes(archive: Archive) -> list[NDArray[np.intp]]:
+def _nodes(archive: Archive) -> list[Ints]:
     if "rod_nodes" not in archive.states or "rod_start" not in archive.states:
         return []
     return np.split(archive.states["rod_nodes"].astype(np.intp), archive.states["rod_start"][1:])
 
 
-def _record(entry: dict[str, Any], nodes: NDArray[np.intp], flat: Floats | None) -> RodRecord:
+def _record(entry: dict[str, Any], nodes: Ints, flat: Floats | None) -> RodRecord:
     family, start, end = entry["family"], float(entry["start"]), float(entry["end"])
     offset = None if entry.get("offset") is None else float(entry["offset"])
     if family == "u" and offset is not None:

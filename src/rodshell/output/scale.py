@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.output.archive import SHELLS, Archive, made_once
 from rodshell.output.colours import HEIGHT, SIGNED, STRESS, hex_colours
 from rodshell.output.drawing import Pen, Pencil
@@ -15,7 +15,6 @@ from rodshell.output.svg import number
 from rodshell.output.wording import MINUS
 from rodshell.units import PRESSURES
 
-Floats = NDArray[np.float64]
 Colour = Literal["gap", "stress"]
 
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
@@ -41,7 +40,7 @@ class Scale:
     caption: str
 
     @property
-    def bins(self) -> NDArray[np.intp]:
+    def bins(self) -> Ints:
         """(k,) index in the palette of each value's colour."""
         share = np.nan_to_num((self.values - self.low) / (self.high - self.low), nan=0.5)
         return np.rint(np.clip(share, 0, 1) * (BINS - 1)).astype(np.intp)

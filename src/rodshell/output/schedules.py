@@ -5,14 +5,13 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.output.archive import Archive
 from rodshell.output.rods import RodRecord, joints_of, rods_of
 from rodshell.output.rounding import FINEST, Rounding, rounding_of
 from rodshell.output.verdict import ENDS
 
-Floats = NDArray[np.float64]
 Rows = list[list[str]]
 Table = tuple[list[str], Rows]
 UNITS = {"mm": "mm", "kg": "kg", "MPa": "MPa", "deg": "\N{DEGREE SIGN}", "N": "N", "Nm": "N m"}

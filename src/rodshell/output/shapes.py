@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import OutputError
 from rodshell.output.archive import GAPS, SHELLS, Archive
-
-Floats = NDArray[np.float64]
 
 CAPTIONS = {
     "flat": "Flat, as cut and laid out",

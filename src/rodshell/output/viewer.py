@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.output.archive import Archive
 from rodshell.output.pictures import FAMILIES, SEGMENTS
 from rodshell.output.plan import nice_ticks
@@ -57,7 +58,7 @@ def _frame_shape(archive: Archive, name: str) -> Shape:
     return shape
 
 
-def _entries(lengths: list[int]) -> tuple[NDArray[np.intp], list[int]]:
+def _entries(lengths: list[int]) -> tuple[Ints, list[int]]:
     """Entries of `rod_nodes` that are drawn, at most about SEGMENTS, and how many of them each rod has."""
     stride, first, parts = max(1, -(-sum(lengths) // SEGMENTS)), 0, []
     for length in lengths:
@@ -74,8 +75,8 @@ def _scales(archive: Archive, shape: Shape) -> dict[Colour, Scale]:
 
 
 def _frame(
-    shape: Shape, scales: dict[Colour, Scale], nodes: NDArray[np.intp], entries: NDArray[np.intp],
-    low: NDArray[np.float64], size: float,
+    shape: Shape, scales: dict[Colour, Scale], nodes: Ints, entries: Ints,
+    low: Floats, size: float,
 ) -> dict[str, Any]:  # fmt: skip
     places = np.rint((shape.positions[nodes] - low) / size * STEPS).astype("<u2")
     coloured: dict[str, Any] = {

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.checks import (
     Bending,
     Checks,
@@ -20,7 +21,6 @@ from rodshell.checks import (
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
 
-Floats = NDArray[np.float64]
 PREFERRED = ("clamped", "pinned")  # the shell that the schedules tell of
 
 

@@ -4,12 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.output.svg import document, label, number, tag
 from rodshell.paper.panels import INK, PAPER, SOFT, joined
-
-Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT, EDGE, GAP, TEXT = 360.0, 260.0, 56.0, 40.0, 11.0  # drawing units
 MARGIN = 0.06  # of a chart's logarithmic span, at each end

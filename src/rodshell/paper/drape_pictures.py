@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.layout import FlatGrid
 from rodshell.paper.drapes import HEIGHT, WORDS, Drape
 from rodshell.paper.genetic_history import stored_footprint
 from rodshell.paper.panels import FINAL, FLAT, INK, Place, closed, dots, from_above, rods, rows_of_panels, standing
-
-Floats = NDArray[np.float64]
 
 TITLES = (
     "1  the flat grid above the target",

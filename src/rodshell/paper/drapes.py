@@ -6,8 +6,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.formfinding import Draped, Fall, Trimmed, drape, trim
 from rodshell.formfinding.drape import Method
 from rodshell.layout import FlatRod, GridLayout
@@ -16,7 +16,6 @@ from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, Rod
 from rodshell.targets import Target
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, str, float], None]
 
 ROD = Rod(Circle(radius=1e-3), Material(youngs_modulus=1e6, density=1e3))  # [HQK 3.2]

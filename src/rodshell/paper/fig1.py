@@ -10,8 +10,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.formfinding import FoundForm, find_stages
 from rodshell.output.folder import ResultFolder
 from rodshell.output.svg import tag
@@ -19,8 +19,6 @@ from rodshell.paper.drapes import ROD, Case, Progress
 from rodshell.paper.fig6 import CASES
 from rodshell.paper.panels import FINAL, FLAT, SOFT, Place, closed, dots, from_above, rods, rows_of_panels, standing
 from rodshell.paper.tables import aligned, result_of, write
-
-Floats = NDArray[np.float64]
 
 EDGE = 0.005  # [m], the paper's
 TITLE = "Fig 1 [HQK]: three shells popped up, their ends moved from G0 to G"

@@ -13,8 +13,8 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, FoundForm, agreement, find_stages
 from rodshell.formfinding.progress import silent
@@ -31,7 +31,6 @@ from rodshell.paper.tables import aligned, result_of, write
 
 __all__ = ["Comparison", "Genetic", "compare", "find", "make", "stored", "stored_footprint"]
 
-Floats = NDArray[np.float64]
 
 SEED = 1
 KEPT = Path("out") / "genetic-searches"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.formfinding import FoundForm, agreement, pop_up
 from rodshell.formfinding.popup import Popped
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
@@ -18,9 +18,6 @@ from rodshell.layout.flatgrid import Family
 from rodshell.layout.mesh import CROWDED
 from rodshell.paper.drapes import ROD
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 PATIENCE = 100  # Newton iterations of a pop-up from flat; smooth footprints mostly take 25 to 60
 SAME = 1e-4  # of the size: ends of G are many times further apart

@@ -6,9 +6,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
 
 WINDOW = 20  # generations in which
 GAIN = 0.01  # the best must gain less than this share to have converged

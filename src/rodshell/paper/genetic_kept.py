@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError, OutputError
 
-Floats = NDArray[np.float64]
 Judged = tuple[float, float]  # value, processor time [s]
 Evaluate = Callable[[Floats], Iterator[Judged]]
 

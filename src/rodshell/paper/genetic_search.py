@@ -18,15 +18,13 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.paper.drapes import Progress
 from rodshell.paper.genetic_design import Design
 from rodshell.paper.genetic_history import GAIN, Generation, gain
 from rodshell.paper.genetic_kept import Evaluate, Judged, Kept
-
-Floats = NDArray[np.float64]
 
 POPULATION = 100
 MOST = 300  # generations

@@ -5,14 +5,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.layout import GridMesh
 from rodshell.output.svg import document, label, number, tag
 from rodshell.output.view import RIGHT, TOWARDS, UP
 from rodshell.targets import Target
-
-Floats = NDArray[np.float64]
 
 PAPER, INK, SOFT, BODY = "#fdfdfb", "#22282f", "#7b838a", "#e2dccd"
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a"}
@@ -68,7 +66,7 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
     return [filled, *rods(mesh, place(from_aside(positions)), near)]
 
 
-def rods(mesh: GridMesh, at: Floats, near: NDArray[np.bool_] | None = None, **attributes: Any) -> Iterator[str]:
+def rods(mesh: GridMesh, at: Floats, near: Bools | None = None, **attributes: Any) -> Iterator[str]:
     """Every rod by its nodes' places (n, 2); pale where one of an edge's nodes is not `near` (n,)."""
     for k, rod in enumerate(mesh.grid.rods):
         nodes = mesh.nodes_of(k)

@@ -13,8 +13,8 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Draped, Fall, drape, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
@@ -27,8 +27,6 @@ from rodshell.paper.tables import aligned, result_of, write
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere
-
-Floats = NDArray[np.float64]
 
 TARGET = Hemisphere(0.2)
 FINE = GridLayout.orthogonal(rods=(17, 17), spacing=0.03, edge=EDGE, length=LENGTH)

@@ -15,8 +15,8 @@ from math import pi
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.geometry.vectors import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, Joint
 from rodshell.layout import mesh_grid, straight_rods
@@ -28,7 +28,6 @@ from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.simulate import simulate
 from rodshell.solve.step_limit import step_limit
 
-Floats = NDArray[np.float64]
 Demonstration = Literal["twisting", "bending"]
 
 ROD = Rod(Circle(1e-3), Material(1e6, 1e3))  # HQK section 3.2: r 1 mm, E 1 MPa, G = E/3, 1 g/cm3

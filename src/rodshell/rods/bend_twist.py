@@ -35,9 +35,10 @@ import numba as nb
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import cross, dot, unit
-from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,8 @@ twist (x, theta, x, theta, x). A solver sees only the sum of such sets.
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from rodshell.arrays import Floats, Ints
 
 NO_HESSIANS = np.empty((0, 0, 0))
 

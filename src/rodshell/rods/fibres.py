@@ -14,12 +14,10 @@ neither sigma^2 nor tau^2 has a maximum inside.
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
-
-Floats = NDArray[np.float64]
 
 VON_MISES = sqrt(3.0)
 POINTS = 33  # on a side of a rectangle, from its middle to a corner, and on a quarter of an ellipse: s within 1e-3

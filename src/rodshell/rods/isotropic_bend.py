@@ -11,8 +11,9 @@ from typing import Self
 import numba as nb
 import numpy as np
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.vectors import unit
-from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ from typing import Self
 import numba as nb
 import numpy as np
 
+from rodshell.arrays import Floats
 from rodshell.rods.bend_twist import BendTwist, spread
-from rodshell.rods.elements import NO_HESSIANS, Floats
+from rodshell.rods.elements import NO_HESSIANS
 
 
 @dataclass(frozen=True)

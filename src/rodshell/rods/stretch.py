@@ -10,7 +10,8 @@ from typing import Self
 import numba as nb
 import numpy as np
 
-from rodshell.rods.elements import NO_HESSIANS, Floats, Ints
+from rodshell.arrays import Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS
 
 
 @dataclass(frozen=True)

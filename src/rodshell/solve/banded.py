@@ -10,15 +10,12 @@ from collections.abc import Sequence
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from rodshell.arrays import Floats, Ints
 from rodshell.model import Freedom
 from rodshell.solve.linear import SingularError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 LANES = 4  # rows of the band are as long as whole vectors of so many numbers
 

@@ -4,11 +4,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.model import Freedom
-
-Floats = NDArray[np.float64]
 
 NO_CURVATURE = np.empty((0, 3, 3))
 
@@ -44,7 +42,7 @@ class Supports:
     """
 
     free: Freedom
-    moved: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    moved: Ints = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     goals: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
     def freedom(self, state: Floats) -> Freedom:

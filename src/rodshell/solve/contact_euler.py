@@ -9,14 +9,12 @@ from dataclasses import replace
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.solve.constraint import Constraint
 from rodshell.solve.forces import PointLoads
 from rodshell.solve.implicit_euler import ImplicitEuler, MakeMatrix, Motion, Refused, Step
 from rodshell.solve.summed import narrow_or_sparse
-
-Floats = NDArray[np.float64]
 
 MOST_PASSES = 30
 
@@ -25,7 +23,7 @@ class Planes(Constraint, Protocol):
     """The supports and the planes of nodes in contact."""
 
     @property
-    def nodes(self) -> NDArray[np.intp]: ...
+    def nodes(self) -> Ints: ...
 
 
 P = TypeVar("P", bound=Planes)

@@ -15,14 +15,13 @@ from math import sqrt
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.rods.elements import Elements
 from rodshell.solve.linear import SingularError
 from rodshell.solve.problem import Problem
 from rodshell.solve.tangent import Tangent
 
-Floats = NDArray[np.float64]
 Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
 
 CLOSE = 2e-3  # of the factor: the last stable point is as near as this to the first unstable one

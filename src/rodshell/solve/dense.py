@@ -6,11 +6,9 @@ up to a register past the end of what they need, and begin where a register woul
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.solve.tiles import BYTES, LANES, REGISTERS, ROWS, adding, eliminating, multiplying, subtracting
-
-Floats = NDArray[np.float64]
 
 PAD = 8  # numbers in the largest register
 BLOCK = 32  # pivots after which all rows below are updated

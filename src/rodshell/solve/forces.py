@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.validation import finite
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 class Force(Protocol):

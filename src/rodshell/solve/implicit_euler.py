@@ -24,8 +24,8 @@ from typing import Protocol, Self
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
@@ -34,8 +34,6 @@ from rodshell.solve.forces import Damping, Force, ImplicitForce
 from rodshell.solve.linear import SingularError
 from rodshell.solve.summed import SummedMatrix, narrow_or_sparse
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
 RELATIVE = 1e-9  # of the step's own motion: what is left once the last simplified step has been taken

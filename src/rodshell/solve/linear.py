@@ -7,7 +7,7 @@ import qdldl
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
 
 
 class LinearSolver(Protocol):

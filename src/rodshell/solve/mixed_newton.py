@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.rods.elements import Elements
 from rodshell.solve.linear import SingularError
@@ -23,7 +23,6 @@ from rodshell.solve.newton_step import HopelessError, NewtonStep
 from rodshell.solve.problem import Pattern, Problem
 from rodshell.solve.report import SolveReport, Status
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6

@@ -1,12 +1,12 @@
 """The slowest modes of a body about an equilibrium, K x = s M x, from the lowest s on: their s, or the modes."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, diags, eye, triu
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from rodshell.arrays import Floats, Ints
 from rodshell.model import Freedom
-from rodshell.rods.elements import NO_HESSIANS, Elements, Floats, Ints
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.linear import LinearSolver, Qdldl
 from rodshell.solve.step_limit import tangent_stiffness
@@ -31,7 +31,7 @@ class _Curvature:
         return self
 
 
-def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Floats, count: int) -> NDArray[np.float64]:
+def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Floats, count: int) -> Floats:
     """(count,) the lowest s [1/s2], ascending: a negative one grows as exp(sqrt(-s) t), others swing at sqrt(s) rad/s.
 
     Parameters

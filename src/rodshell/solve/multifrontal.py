@@ -15,13 +15,11 @@ import qdldl
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
+from rodshell.arrays import Floats, Ints, Longs
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
 from rodshell.solve.linear import SingularError
 from rodshell.solve.ordering import dissect
 from rodshell.solve.symbolic import Blocks, blocks_of, plan_of
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
 MOST_THREADS = 4  # the last part is one thread's work
@@ -107,18 +105,18 @@ def threads() -> int:
     return min(int(nb.config.NUMBA_NUM_THREADS), os.cpu_count() or 1, MOST_THREADS)
 
 
-def _dissected(places: Floats, blocks: Blocks) -> Ints:
+def _dissected(places: Floats, blocks: Blocks) -> Longs:
     """Blocks in the order of a nested dissection of their places."""
     return dissect(places[blocks.begin[:-1]], blocks.start, blocks.neighbours)
 
 
-def _first_of_places(places: Floats) -> Ints:
+def _first_of_places(places: Floats) -> Longs:
     """Where blocks begin: unknowns in a row that lie at one place, such as the directions of a node; and their end."""
     other = (places[1:] != places[:-1]).any(axis=1)
     return np.concatenate([[0], 1 + np.flatnonzero(other), [len(places)]])
 
 
-def _minimum_degree(indptr: NDArray[np.int64], indices: NDArray[np.int64]) -> NDArray[np.intp]:
+def _minimum_degree(indptr: NDArray[np.int64], indices: NDArray[np.int64]) -> Ints:
     """The AMD order, as QDLDL finds it."""
     size = len(indptr) - 1
     data = np.full(len(indices), 1e-3 / max(1, size))

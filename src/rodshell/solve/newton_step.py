@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.linear import SingularError
 from rodshell.solve.problem import Problem, pattern_of
-
-Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-13  # of the length: estimate of the error that is left
 FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces

@@ -2,16 +2,14 @@
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from rodshell.arrays import Floats, Longs
 
 LEAF = 12  # blocks that are not divided further
 UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
 
 
-def dissect(places: Floats, start: Ints, neighbours: Ints) -> Ints:
+def dissect(places: Floats, start: Longs, neighbours: Longs) -> Longs:
     """Order blocks so that separators come last: first both parts of a cut, each dissected, then what joins them.
 
     Parameters

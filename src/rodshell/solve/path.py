@@ -11,14 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport, Status
-
-Floats = NDArray[np.float64]
 
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25

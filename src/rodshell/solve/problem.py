@@ -5,15 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.model import Assembly, Freedom
 from rodshell.rods.elements import Elements
 from rodshell.rods.stretch import Stretch
 from rodshell.solve.constraint import Constraint
 from rodshell.solve.linear import LinearSolver, Qdldl
 from rodshell.solve.multifrontal import Multifrontal
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.mixed_newton import Equilibrium, find_stable
 from rodshell.solve.problem import Problem, linear_solver
 from rodshell.solve.summed import SparseSum
-
-Floats = NDArray[np.float64]
 
 FIRST = 6.0  # the first step leaves 1/36 of D in the matrix
 GROWTH, SHRINKAGE = 3.0, 0.25

@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.vectors import cross, unit
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
@@ -25,7 +26,6 @@ from rodshell.solve.report import SolveReport, Status
 from rodshell.solve.rod_supports import RodSupports, SupportPath, index_of
 from rodshell.validation import finite, vector
 
-Floats = NDArray[np.float64]
 _NONE: Mapping[int, ArrayLike] = {}
 
 EASY = 6  # a step of no more iterations may be followed by a longer one

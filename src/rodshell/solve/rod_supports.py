@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import cross, dot, unit
@@ -14,9 +15,6 @@ from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
 from rodshell.solve.constraint import Supports
 from rodshell.validation import direction, finite, vector
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 SPIN = (1.0, 0.0, 0.0)
 

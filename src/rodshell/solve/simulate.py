@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.solve.implicit_euler import ImplicitEuler, MakeMatrix, Motion, Refused, Step
 from rodshell.solve.step_limit import refuse_unstable
 from rodshell.solve.summed import narrow_or_sparse
 from rodshell.solve.time_series import End, Moment, MotionReport, Recorder, TimeSeries
-
-Floats = NDArray[np.float64]
 
 EASY = 5  # Newton iterations after which a step that was halved may grow back
 HALVINGS = 20

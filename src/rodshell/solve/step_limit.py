@@ -19,17 +19,14 @@ inertias I tied by C2.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, diags
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, StabilityError
 from rodshell.model import Assembly, Freedom
 from rodshell.rods.elements import Elements
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.linear import Qdldl, SingularError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 NO_NODES = np.empty(0, dtype=np.intp)
 LONGEST, SHORTEST = 1e6, 1e-15  # [s]; what is stable beyond has no limit, what is not even below never is

@@ -4,15 +4,12 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.model import Assembly, Freedom
 from rodshell.solve.banded import Banded
 from rodshell.solve.linear import LinearSolver, Qdldl
 from rodshell.solve.multifrontal import Multifrontal
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 WIDEST = 64  # half bandwidth beyond which a fill-reducing ordering wins over the band
 

@@ -8,32 +8,30 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Longs
 from rodshell.solve.dense import padded
 from rodshell.solve.sharing import parts_of, stacks_of
-
-Ints = NDArray[np.int64]
 
 
 class Plan(NamedTuple):
     """What the numeric phase needs; supernodes s in postorder, `n_s` of them."""
 
-    order: Ints  # (n,) original index of each permuted unknown
-    first: Ints  # (n_s + 1,) first column of each supernode
-    row_start: Ints  # (n_s + 1,) where its rows begin in `rows`
-    rows: Ints  # permuted row indices of each front, its own columns first
-    child_start: Ints  # (n_s + 1,)
-    children: Ints
-    run_start: Ints  # beside `children`
-    runs: Ints  # (r, 2) rows of a child's update matrix that stay side by side in the front: the first, and its place
-    entry_start: Ints  # (n_s + 1,)
-    entry_source: Ints  # which value of the matrix
-    entry_place: Ints  # where it goes in the rows of the front's pivots
-    panel_start: Ints  # (n_s + 1,) where its part of the factor begins
-    update_start: Ints  # (n_s,) where its update matrix lies in `stacks`
-    part_start: Ints  # (p + 1,) parts that can be eliminated at the same time, but for the last, which needs them all
-    parts: Ints  # (n_s,) the supernodes of each part, ascending
+    order: Longs  # (n,) original index of each permuted unknown
+    first: Longs  # (n_s + 1,) first column of each supernode
+    row_start: Longs  # (n_s + 1,) where its rows begin in `rows`
+    rows: Longs  # permuted row indices of each front, its own columns first
+    child_start: Longs  # (n_s + 1,)
+    children: Longs
+    run_start: Longs  # beside `children`
+    runs: Longs  # (r, 2) rows of a child's update matrix that stay side by side in the front: the first, and its place
+    entry_start: Longs  # (n_s + 1,)
+    entry_source: Longs  # which value of the matrix
+    entry_place: Longs  # where it goes in the rows of the front's pivots
+    panel_start: Longs  # (n_s + 1,) where its part of the factor begins
+    update_start: Longs  # (n_s,) where its update matrix lies in `stacks`
+    part_start: Longs  # (p + 1,) parts that can be eliminated at the same time, but for the last, which needs them all
+    parts: Longs  # (n_s,) the supernodes of each part, ascending
     stack_size: int
     largest_front: int
     largest_panel: int
@@ -43,18 +41,18 @@ class Blocks(NamedTuple):
     """Unknowns in blocks of consecutive ones, `begin` (b + 1,), and the blocks that each is coupled to:
     neighbours[start[k] : start[k + 1]]."""
 
-    begin: Ints
-    start: Ints
-    neighbours: Ints
+    begin: Longs
+    start: Longs
+    neighbours: Longs
 
 
-def blocks_of(indptr: Ints, indices: Ints, begin: Ints) -> Blocks:
+def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> Blocks:
     """The graph of blocks of a pattern (upper triangle, compressed columns)."""
     begin = np.asarray(begin, dtype=np.int64)
     return Blocks(begin, *_coupled(indptr.astype(np.int64), indices.astype(np.int64), begin))
 
 
-def plan_of(indptr: Ints, indices: Ints, blocks: Blocks, order: Ints) -> Plan:
+def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan:
     """Of a pattern whose `blocks` are eliminated in `order` (b,), but for what the tree leaves open."""
     order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)

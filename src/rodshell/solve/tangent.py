@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
+from rodshell.arrays import Floats
 from rodshell.rods.elements import Elements
 from rodshell.solve.problem import Problem, pattern_of
-
-Floats = NDArray[np.float64]
 
 CLOSE = 1e-2  # last change of the lowest eigenvalue, over it: modes only say how far to go
 MOST_ITERATIONS = 12

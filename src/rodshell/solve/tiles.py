@@ -18,9 +18,9 @@ import numpy as np
 from llvmlite import binding, ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
+
 Kernel = Callable[..., None]
 
 

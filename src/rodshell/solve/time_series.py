@@ -5,12 +5,10 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import OutputError
 from rodshell.solve.implicit_euler import Motion
-
-Floats = NDArray[np.float64]
 
 
 class End(Enum):

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from rodshell.arrays import Floats, Ints
 
 MOST_CELLS = 64  # for each point
 

@@ -4,12 +4,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.meshfile import cause, file_bytes, recoded
-
-Floats = NDArray[np.float64]
 
 CURVE_FILES = (".obj", ".dxf")
 SAG = 1e-4  # of a curve's extent: how finely arcs and splines of a DXF are divided

@@ -5,11 +5,9 @@ from typing import Protocol
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.validation import positive
-
-Floats = NDArray[np.float64]
 
 
 class Domain(Protocol):
@@ -20,7 +18,7 @@ class Domain(Protocol):
         """Half the width along x and along y [m]."""
         ...
 
-    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+    def holds(self, xy: Floats) -> Bools:
         """(n,) whether the points (n, 2) [m] are inside or on the edge."""
         ...
 
@@ -42,7 +40,7 @@ class Disc:
     def half_extent(self) -> tuple[float, float]:
         return self.radius, self.radius
 
-    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+    def holds(self, xy: Floats) -> Bools:
         return np.asarray(np.hypot(xy[:, 0], xy[:, 1]) <= self.radius)
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
@@ -63,7 +61,7 @@ class EllipseDomain:
     def half_extent(self) -> tuple[float, float]:
         return self.a, self.b
 
-    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+    def holds(self, xy: Floats) -> Bools:
         return np.asarray(np.hypot(xy[:, 0] / self.a, xy[:, 1] / self.b) <= 1.0)
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
@@ -100,7 +98,7 @@ class Rectangle:
     def half_extent(self) -> tuple[float, float]:
         return self.size[0] / 2, self.size[1] / 2
 
-    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+    def holds(self, xy: Floats) -> Bools:
         return np.asarray((np.abs(xy) <= self.half_extent).all(axis=1))
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:

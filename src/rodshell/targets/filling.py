@@ -1,13 +1,11 @@
 """The smoothest surface across an opening or a door: the net goes on there, although no rod will."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.targets.fitting import Samples
 from rodshell.targets.trianglemesh import TriangleMesh
-
-Floats = NDArray[np.float64]
 
 STEEPEST = 0.35  # cosine between the opening's axis and the normals around it: past that no cap fits, as on a tube
 BAND = 0.6  # of the opening's radius: width of the surface around it that decides
@@ -89,7 +87,7 @@ def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats]
     return centre + flat @ plane + height(flat)[:, None] * axis, normals
 
 
-def _enclosed(points: Floats, loop: Floats) -> NDArray[np.bool_]:
+def _enclosed(points: Floats, loop: Floats) -> Bools:
     """(n,) plane points inside a closed polygon, by crossings of a ray along x."""
     a, b = loop, np.roll(loop, -1, axis=0)
     inside = np.zeros(len(points), dtype=bool)

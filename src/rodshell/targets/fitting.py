@@ -5,14 +5,11 @@ from math import pi, sqrt
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.vectors import cross, unit
 from rodshell.targets.buckets import Buckets
 from rodshell.targets.patches import TERMS, PatchField
-from rodshell.targets.target import Floats
-
-Ints = NDArray[np.intp]
 
 FEWEST, MOST = 300, 8000  # patches on a surface
 POINTS_EACH = 3.0  # points for each patch

@@ -5,18 +5,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import dot, unit
 from rodshell.targets.rim import Rim
 from rodshell.targets.standing import Standing
-from rodshell.targets.target import Floats, Implicit
+from rodshell.targets.target import Implicit
 
 if TYPE_CHECKING:
     from rodshell.targets.freeform import Freeform
 
-Ints = NDArray[np.intp]
 
 LEVEL = 1e-4  # of the size: an edge this even is a base
 FAR = 0.5  # of the field's reach
@@ -35,7 +34,7 @@ class Outline:
         return replace(self.rim, points=self.rim.points * [1.0, 1.0, 0.0])
 
     @cached_property
-    def _normals(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def _normals(self) -> tuple[Floats, Floats, Bools]:
         """Outward normals (n, 2) where each edge begins and where it ends, those of its neighbours averaged in; and
         whether it begins at a corner."""
         after = self.rim.after
@@ -52,7 +51,7 @@ class Outline:
         x, y, _ = 0.5 * np.ptp(self.rim.points, axis=0)
         return float(x), float(y)
 
-    def holds(self, xy: Floats) -> NDArray[np.bool_]:
+    def holds(self, xy: Floats) -> Bools:
         return np.asarray(self.distance(xy)[0] <= 0.0)
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:

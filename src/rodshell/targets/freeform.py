@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.targets.filling import fill_openings
@@ -17,7 +17,7 @@ from rodshell.targets.jagged import smooth_loop
 from rodshell.targets.meshsamples import mesh_samples
 from rodshell.targets.patches import PatchField
 from rodshell.targets.rim import Rim
-from rodshell.targets.target import Floats, Gap, Implicit, Target
+from rodshell.targets.target import Gap, Implicit, Target
 from rodshell.targets.trianglemesh import TriangleMesh, sound_mesh
 from rodshell.units import length_text
 
@@ -53,7 +53,7 @@ class Freeform(Target):
     @staticmethod
     def of(
         vertices: Floats,
-        faces: NDArray[np.intp],
+        faces: Ints,
         *,
         base: float | None = None,
         curves: tuple[Floats, ...] = (),
@@ -132,7 +132,7 @@ class Freeform(Target):
         value, gradient, _ = self.field.implicit(x, second=False)
         return value, gradient
 
-    def carries(self, x: Floats) -> NDArray[np.bool_]:
+    def carries(self, x: Floats) -> Bools:
         """Inside the end, or where an opening was filled."""
         return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted[1])
 
@@ -195,7 +195,7 @@ class Freeform(Target):
 
         return footing(self)
 
-    def outside(self, x: Floats) -> NDArray[np.bool_]:
+    def outside(self, x: Floats) -> Bools:
         return self._footing.outside(x)
 
     def contact(self, x: Floats) -> Gap:

@@ -4,8 +4,8 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.targets.curvefile import read_curves
 from rodshell.targets.freeform import Freeform
@@ -16,8 +16,6 @@ from rodshell.targets.rhino import RHINO_FILES, read_3dm
 from rodshell.targets.step import STEP_FILES, read_step
 from rodshell.units import shown
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 File = str | PathLike[str]
 
 SURFACE_FILES = (*MESH_FILES, *RHINO_FILES, *STEP_FILES)

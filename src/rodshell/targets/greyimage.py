@@ -4,12 +4,10 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.meshfile import MOST_HEIGHTS, cause, file_bytes, require_few_heights
-
-Floats = NDArray[np.float64]
 
 COARSE = 1 / 300  # of white: an image whose levels lie further apart, as those of 8 bits do, has terraces
 ROUNDING = 12**-0.5  # levels, rms: what rounding to whole levels adds to a smooth height

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.domain import Disc, Rectangle
 from rodshell.targets.formula import parse_formula
@@ -14,7 +15,7 @@ from rodshell.targets.heights import Heights
 from rodshell.targets.jet import Jet
 from rodshell.targets.soundness import climb, relative_radius, require_smooth, sample, trusted_region
 from rodshell.targets.standing import Standing
-from rodshell.targets.target import Floats, Implicit
+from rodshell.targets.target import Implicit
 from rodshell.units import shown
 
 TIE = 1e-6  # of the size: peaks that are equally high

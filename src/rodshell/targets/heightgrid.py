@@ -3,16 +3,13 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.targets.greyimage import read_image
 from rodshell.targets.heighttable import read_table
 from rodshell.targets.nurbs import grid_triangles
 from rodshell.units import length_text
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 TABLES = (".csv", ".txt")
 GRID_FILES = (*TABLES, ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff")

@@ -6,12 +6,10 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.targets.domain import Disc, Rectangle
 from rodshell.targets.jet import Jet, differences
-
-Floats = NDArray[np.float64]
 
 NUDGE = 1e-5  # of the size: a 0/0 leaves round-off of 1e-16 / (nudge size)^2 in curvature, Taylor hardly less
 DIFFERENCE = 2e-3  # of the size: step of the differences; truncation and round-off both some 1e-10 in curvature
@@ -76,7 +74,7 @@ class Heights:
         return jet if isinstance(jet, Jet) else Jet(jet)
 
     @staticmethod
-    def _beyond(trusted: Disc | Rectangle, x: Floats, y: Floats) -> NDArray[np.bool_]:
+    def _beyond(trusted: Disc | Rectangle, x: Floats, y: Floats) -> Bools:
         a, b = trusted.half_extent
         if isinstance(trusted, Disc):
             return x * x + y * y > a * a

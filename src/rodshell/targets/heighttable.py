@@ -3,12 +3,10 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.meshfile import file_bytes, require_few_heights
-
-Floats = NDArray[np.float64]
 
 POINT = 3  # numbers in a row of points x, y, z; heights need more each way
 EVEN = 0.02  # of a step: coordinates go in equal steps, but for their rounding

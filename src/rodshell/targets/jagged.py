@@ -1,12 +1,9 @@
 """Jagged edges of a mesh, as faces that were left out leave them, and the smooth curves that they stand for."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.vectors import cross, dot
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 SHARP = 0.35  # [rad], 20 degrees: an edge between two such turns to opposite sides is a jog
 FEWEST = 4  # jogs in a row that make an edge jagged: a real corner or notch has fewer
@@ -44,7 +41,7 @@ def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
     return best
 
 
-def _jagged(loop: Floats, normals: Floats) -> NDArray[np.bool_]:
+def _jagged(loop: Floats, normals: Floats) -> Bools:
     """(n,) vertices of jagged parts: of rows of jogs that follow each other closely."""
     count = len(loop)
     ahead = np.roll(loop, -1, axis=0) - loop
@@ -72,7 +69,7 @@ def _rows(jogs: Ints, count: int) -> list[Ints]:
     return np.split(turned, np.flatnonzero(np.diff(turned) > RUN * np.sqrt(count)) + 1)
 
 
-def _splined(loop: Floats, edge: Floats, free: NDArray[np.bool_], weight: float) -> Floats:
+def _splined(loop: Floats, edge: Floats, free: Bools, weight: float) -> Floats:
     """The z (n, 3) that minimise |(z - loop) / edge|^2 + weight |third differences of z around the loop / edge|^2,
     those that are not free kept."""
     from scipy.sparse import coo_matrix, diags_array

@@ -5,9 +5,9 @@ from numbers import Real
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodshell.arrays import Floats
+
 Part = Any
 """A part of a jet: an array, a float where it is the same everywhere, or a jet again."""
 

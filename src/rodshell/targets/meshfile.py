@@ -9,14 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.targets.trianglemesh import MOST_FACES
 from rodshell.units import shown
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 MESH_FILES = (".obj", ".stl", ".ply", ".off", ".glb", ".gltf")
 IN_METRES = (".glb", ".gltf")  # by their standard

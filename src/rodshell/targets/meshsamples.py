@@ -1,14 +1,11 @@
 """Points of the smooth surface that a triangle mesh stands for, dense enough to fit patches to."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.geometry.vectors import dot, unit
 from rodshell.targets.fitting import Samples
 from rodshell.targets.trianglemesh import TriangleMesh, unique_rows
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 DENSITY = 0.9  # spacings: longest edge that is not divided
 FINEST = 48  # divisions of an edge

@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from rodshell.arrays import Floats, Ints
 
 GRID = 64  # quads each way: the field through them is right to 4e-5 of the size on a whole sphere
 PER_SPAN = 4  # of a NURBS with many knots

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.geometry.vectors import unit
 from rodshell.targets.seam import Seam
-from rodshell.targets.target import Floats, Gap, Implicit, Target
+from rodshell.targets.target import Gap, Implicit, Target
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +73,7 @@ class Patch(Target):
         h, apart = 1e-6 * self.size, self.seams[seam].distance
         return np.asarray((apart(x + h * np.eye(3)) - apart(x - h * np.eye(3))) / (2 * h))
 
-    def carries(self, x: Floats) -> NDArray[np.bool_]:
+    def carries(self, x: Floats) -> Bools:
         return self.whole.carries(x)
 
     def implicit(self, x: Floats) -> Implicit:

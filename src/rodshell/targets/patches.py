@@ -15,12 +15,10 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.targets.buckets import Buckets
-from rodshell.targets.target import Floats, Implicit
-
-Ints = NDArray[np.intp]
+from rodshell.targets.target import Implicit
 
 WIDTH = 0.5  # of the spacing of centres: weights of the blend
 NEGLIGIBLE = 16.0  # weights below exp(-16) of the largest change F by some 1e-10 of the spacing

@@ -8,10 +8,11 @@ from math import sqrt
 import numba as nb
 import numpy as np
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.domain import Disc, Domain, EllipseDomain
 from rodshell.targets.standing import Standing
-from rodshell.targets.target import Floats, Implicit
+from rodshell.targets.target import Implicit
 from rodshell.validation import number, positive
 
 

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.targets.curvefile import closed_loops
 from rodshell.targets.meshfile import file_bytes
-from rodshell.targets.nurbs import Floats, Ints, Nurbs
+from rodshell.targets.nurbs import Nurbs
 from rodshell.units import shown
 
 RHINO_FILES = (".3dm",)

@@ -7,13 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.geometry.vectors import cross, dot, unit
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 CORNER = 0.5  # cosine of 60 degrees between edges of a loop: it is not rounded there
 POINTS = 1500  # on each loop

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-
-Floats = NDArray[np.float64]
 
 REACH = 1e3  # lengths of an open seam by which its two ends go on straight
 
@@ -67,7 +66,7 @@ class Seam:
         side = left[before] + left[after]  # at a corner the mean of both sides decides
         return np.asarray(np.copysign(np.linalg.norm(off, axis=1), np.einsum("ni,ni->n", off, side)))
 
-    def _nearest(self, x: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
+    def _nearest(self, x: Floats) -> tuple[Ints, Floats, Floats]:
         """Of each point (n, 2 or 3): the nearest edge, its share up to the nearest place, and the way from there."""
         start, edge = self._corners[:-1], np.diff(self._corners, axis=0)
         off = x[:, None, :2] - start

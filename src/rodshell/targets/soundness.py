@@ -4,13 +4,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.domain import Disc, Rectangle
 from rodshell.targets.heights import Heights
 
-Floats = NDArray[np.float64]
 Region = Disc | Rectangle
 
 ROWS, COLUMNS = 65, 193  # of the lattice: some 3 mm apart on a target of 0.4 m

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.targets.domain import Domain
-from rodshell.targets.target import Floats, Gap, Target, offset_shape
+from rodshell.targets.target import Gap, Target, offset_shape
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Standing(Target):
             return x[:, 2] - self.base
         return -self.plan.distance(x[:, :2])[0]
 
-    def outside(self, x: Floats) -> NDArray[np.bool_]:
+    def outside(self, x: Floats) -> Bools:
         """(n,) points that are outside the body, as far as signs alone tell."""
         over, beside = self.level(x)[0] > 0, ~self.plan.holds(x[:, :2])
         return over | beside if self.base is None else np.where(x[:, 2] < self.base, beside, over)
@@ -57,7 +57,7 @@ class Standing(Target):
             distance[at], n[at], hessian[at] = self._wall(x[at], beside, ~(distance[at] <= 0))
         return Gap(distance, n, hessian)
 
-    def _wall(self, x: Floats, beside: Gap, over: NDArray[np.bool_]) -> Gap:
+    def _wall(self, x: Floats, beside: Gap, over: Bools) -> Gap:
         """The wall under the rim, or its upper corner; `beside`: the plan's edge; `over`: above the surface."""
         across, normal, bend = beside
         foot = x[:, :2] - across[:, None] * normal

@@ -9,16 +9,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.targets.curvefile import closed_loops
 from rodshell.targets.meshfile import file_bytes
 from rodshell.targets.nurbs import FINEST, GRID, PER_SPAN, grid_triangles
 from rodshell.units import shown
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 STEP_FILES = (".step", ".stp")
 UNIT = 1e-3  # m: OpenCASCADE turns every unit into millimetres

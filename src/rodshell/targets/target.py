@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
 from rodshell.targets.closest import newton_to_closest, shape_operators
-
-Floats = NDArray[np.float64]
 
 NEARLY = 1e-8  # of the size: Newton's step leaves the square of what was missing, which is then less than round-off
 
@@ -88,7 +86,7 @@ class Target(ABC):
     def margin(self, x: Floats) -> Floats:
         """(n,) how far inside the end the points (n, 3) are [m]; the shell is cut where this vanishes."""
 
-    def carries(self, x: Floats) -> NDArray[np.bool_]:
+    def carries(self, x: Floats) -> Bools:
         """(n,) whether a net may start at the points (n, 3) of the surface: inside the end, or in an opening."""
         return self.margin(x) > 0
 
@@ -128,9 +126,7 @@ class Target(ABC):
             gradient[left] = self.level(y[left])[1]
             return y, gradient
 
-    def _newton_to_closest(
-        self, x: Floats, y: Floats, damping: Floats | None = None
-    ) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    def _newton_to_closest(self, x: Floats, y: Floats, damping: Floats | None = None) -> tuple[Floats, Bools, Floats]:
         """One step (n, 3) of Newton from y towards the points closest to x, whether the distance is convex at y, and
         the gradient there."""
         step, convex = np.empty_like(x), np.empty(len(x), dtype=bool)
@@ -169,7 +165,7 @@ class Target(ABC):
         distance = np.einsum("ij,ij->i", x - y, n)
         return Gap(distance, n, offset_shape(shape, distance))
 
-    def outside(self, x: Floats) -> NDArray[np.bool_]:
+    def outside(self, x: Floats) -> Bools:
         """(n,) points that are outside the body of `contact` as far as signs alone tell; of others it knows."""
         return np.zeros(len(x), dtype=bool)
 

@@ -7,11 +7,9 @@ from math import cos, degrees, radians
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, dot
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 CREASE = 40.0  # degrees between faces: there a smooth piece ends
 WELD = 1e-6  # of the largest extent: vertices this close are one; single precision has 1e-7
@@ -91,7 +89,7 @@ class TriangleMesh:
         x = self.vertices[loop]
         return float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum())
 
-    def only(self, faces: NDArray[np.bool_]) -> "TriangleMesh":
+    def only(self, faces: Bools) -> "TriangleMesh":
         """The part that consists of these faces (m,)."""
         used, renumbered = np.unique(self.faces[faces], return_inverse=True)
         return TriangleMesh(self.vertices[used], renumbered.reshape(-1, 3).astype(np.intp))
@@ -187,7 +185,7 @@ class _Neighbours:
 
     faces: Ints
     edges: Ints
-    against: NDArray[np.bool_]
+    against: Bools
 
     @staticmethod
     def of(mesh: TriangleMesh, name: str) -> "_Neighbours":
@@ -210,7 +208,7 @@ class _Neighbours:
             )
         return _Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
 
-    def pieces(self, keep: NDArray[np.bool_], faces: int) -> Ints:
+    def pieces(self, keep: Bools, faces: int) -> Ints:
         """(m,) number of the piece that each face belongs to, when only the edges `keep` join faces."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
@@ -218,7 +216,7 @@ class _Neighbours:
         i, j = self.faces[keep].T
         return np.asarray(connected_components(coo_matrix((np.ones(len(i)), (i, j)), (faces, faces)), False)[1])
 
-    def turned(self, faces: int, name: str, mesh: TriangleMesh) -> NDArray[np.bool_]:
+    def turned(self, faces: int, name: str, mesh: TriangleMesh) -> Bools:
         """(m,) faces that run against the first one."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import breadth_first_order

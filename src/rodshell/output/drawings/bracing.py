@@ -1,16 +1,14 @@
 """The bracing plan: the diagonals of the cells in the final shape, with their true lengths."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.output.archive import Archive
 from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Drawing, Pen, Pencil, Text
 from rodshell.output.drawings.final import axes, seen_from_above
 from rodshell.output.labels import Room, runs_through, upright
 from rodshell.output.rods import joint_places
 from rodshell.output.rounding import rounding_of
-
-Floats = NDArray[np.float64]
 
 ENDS = ("from", "to")
 NUMBERS = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes

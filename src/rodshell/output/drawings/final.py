@@ -1,15 +1,13 @@
 """Drawings of the shell as it stands, from the side and at the stages of its erection, and what its plans share."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.output.archive import Archive
 from rodshell.output.drawing import INK, PALE, SOFT, Drawing, Pen, Pencil
 from rodshell.output.plan import nice_ticks
 from rodshell.output.rods import rods_of
 from rodshell.output.rounding import Rounding, rounding_of
-
-Floats = NDArray[np.float64]
 
 
 def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:

@@ -3,18 +3,16 @@
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from rodshell.arrays import Bools, Floats
 from rodshell.layout.outline import opens
 from rodshell.output.callouts import callouts, outward
 from rodshell.output.drawing import INK, LETTER, LINE, SMALL, Drawing, Pen, Pencil
 from rodshell.output.labels import Label, Room, closed_segments, lines_meet, place, take
 from rodshell.output.plan import FlatPlan, nice_ticks
 from rodshell.output.rods import outlines_of
-
-Floats = NDArray[np.float64]
 
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
 TITLE = "Flat plan"
@@ -137,7 +135,7 @@ def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     return [[pair for pair, own in zip(pairs, patch, strict=True) if own == one] for one in dict.fromkeys(patch)]
 
 
-def _largest_full(met: NDArray[np.bool_], x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
+def _largest_full(met: Bools, x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
     """Lowest and highest x, then y, of the largest rectangle of a lattice within which all of it is there."""
     best: tuple[float, tuple[float, float, float, float] | None] = (0.0, None)
     for low in range(len(y)):

@@ -6,14 +6,13 @@ from math import ceil
 from textwrap import wrap
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.output.drawing import INK, LETTER, SMALL, SOFT, Drawing, Pen, Pencil, Text
 from rodshell.output.drawings.titleblock import TitleBlock, scale_bar, shortened, write_entries
 from rodshell.output.labels import Room
 from rodshell.output.schedules import Table, head
 
-Floats = NDArray[np.float64]
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
@@ -71,7 +70,7 @@ def parts(compose: Compose, paper: tuple[float, float], whole: Sheet, *, true_si
     yield from best
 
 
-def _tiles(extent: Floats, paper: tuple[float, float]) -> NDArray[np.intp]:
+def _tiles(extent: Floats, paper: tuple[float, float]) -> Ints:
     """Sheets (2,) across and down that an extent (2,) of a drawing takes [mm of paper]."""
     low, high = room(paper)
     return np.maximum(np.ceil(extent / (high - low - 2 * OVERLAP)), 1).astype(np.intp)
@@ -181,9 +180,7 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
     return pencil.done("", "", TEXT)
 
 
-def _match_lines(
-    low: Floats, high: Floats, here: tuple[int, int], count: NDArray[np.intp], texts: Sequence[Text]
-) -> Drawing:
+def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, texts: Sequence[Text]) -> Drawing:
     """Lines along which a sheet meets its neighbours, and which these are, clear of the `texts` there."""
     pencil, (row, column), free = Pencil(), here, Room(20.0)
     for text in texts:

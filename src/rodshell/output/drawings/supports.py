@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.output.archive import Archive
 from rodshell.output.callouts import callouts, outward
 from rodshell.output.drawing import LAYERS, SMALL, Drawing, Pen, Pencil
@@ -13,9 +13,6 @@ from rodshell.output.labels import Room, closed_segments
 from rodshell.output.plan import FlatPlan
 from rodshell.output.rods import outlines_of
 from rodshell.output.schedules import seam_meetings
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 
 LEGEND = (
     "Red: where each rod ends and how it goes on. A thin line leads to its name: rod.0 its start, rod.1 its end.",
@@ -67,7 +64,7 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     return pencil.done("supports", "Support plan", text)
 
 
-def _walks(outlines: list[Ints], ends: Floats, alone: NDArray[np.bool_]) -> Iterator[Ints]:
+def _walks(outlines: list[Ints], ends: Floats, alone: Bools) -> Iterator[Ints]:
     """The ends that are `alone`, not sewn, in their order around the whole shell, its openings, and what is by itself.
 
     outlines : the ends around each grid and its openings. Where a seam ends, a walk goes on along the next patch.
@@ -86,7 +83,7 @@ def _walks(outlines: list[Ints], ends: Floats, alone: NDArray[np.bool_]) -> Iter
     yield from on_none[:, None]
 
 
-def _runs(loop: Ints, alone: NDArray[np.bool_]) -> list[Ints]:
+def _runs(loop: Ints, alone: Bools) -> list[Ints]:
     """The ends of an outline that are `alone`, run by run between the others; all of it where there are none."""
     turned = np.roll(loop, -int(np.argmin(alone[loop])))
     parts = [run[alone[run]] for run in np.split(turned, np.flatnonzero(~alone[turned]))]

@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats
 from rodshell.geometry.frames import directors_along
 from rodshell.geometry.vectors import cross, unit
 from rodshell.output.archive import Archive
 from rodshell.output.rods import rods_of
 from rodshell.output.scale import scale_of
 from rodshell.output.shapes import shape_of
-
-Floats = NDArray[np.float64]
 
 ROUND = 8  # sides of a circle
 SLENDER = 1e-3  # of the shell's size: thickness of a rod whose section has no shape

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.output.archive import Archive
 from rodshell.output.rods import rods_of
 from rodshell.output.shapes import STAGE, Shape, shape_names, shape_of
@@ -50,7 +51,7 @@ def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
     yield "pop_up.pvd", _file("Collection", tag("Collection", *entries))
 
 
-def _known(shape: Shape, nodes: NDArray[np.intp]) -> Iterator[tuple[str, NDArray[np.float64]]]:
+def _known(shape: Shape, nodes: Ints) -> Iterator[tuple[str, Floats]]:
     if shape.gap is not None and np.isfinite(shape.gap).all():
         yield "gap", shape.gap[nodes]
     for key, values in (("stress", shape.stress), ("curvature", shape.curvature)):

@@ -1,0 +1,9 @@
+"""The arrays that functions take and return: double precision, and indices."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Longs = NDArray[np.int64]
+Bools = NDArray[np.bool_]
