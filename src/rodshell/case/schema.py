@@ -41,7 +41,7 @@ from rodshell.units import length_text, rounded_down, shown
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
-    from rodshell.formfinding.fall import Fall
+    from rodshell.formfinding.methods import Method
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.layout import GridLayout
     from rodshell.output.takeaway import Takeaway
@@ -123,18 +123,22 @@ class DrapeTable(Table):
         if getattr(self, name) != type(self).model_fields[name].default:
             raise ValueError(f"drape.{name} = {shown(getattr(self, name))}: {why}")
 
-    def fall(self) -> "Fall":
-        """How the paper's method falls."""
-        from rodshell.formfinding.fall import Fall
+    def build(self) -> "Method":
+        """The method with its options."""
+        from rodshell.formfinding.methods import Bound, Fall, Gravity
         from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 
+        if self.method == "bound":
+            return Bound()
+        if self.method == "gravity":
+            return Gravity(acceleration=self.gravity)
         coupling: Coupling = SharedDofs()
         if self.coupling != "shared":
             penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
             coupling = penalty(C1=self.C1, C2=self.C2)
         return Fall(
-            coupling=coupling, height=self.height, time_step=self.time_step, duration=self.duration,
-            friction=self.friction, drag=self.drag, stream=self.frames,
+            acceleration=self.gravity, height=self.height, coupling=coupling, time_step=self.time_step,
+            duration=self.duration, friction=self.friction, drag=self.drag, stream=self.frames,
         )  # fmt: skip
 
 
@@ -312,9 +316,7 @@ class Case(Table):
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "ends": ends}
-        options["gravity"] = None if drape.method == "bound" else drape.gravity
-        options["fall"] = drape.fall() if drape.method == "paper" else None
+        options: dict[str, Any] = {"method": drape.build(), "anchor": anchor, "ends": ends}
         options["joint"] = self.joint.build()
         target = self.target.build()
         layout = self.layout.build(target)
