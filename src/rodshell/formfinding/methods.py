@@ -13,7 +13,7 @@ from typing import ClassVar, Literal, get_args
 from rodshell.contact.modified_mass import Stopped
 from rodshell.errors import InputError
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
-from rodshell.validation import choice, instance, number, positive
+from rodshell.validation import choice, instance, not_negative, positive
 
 STANDARD_GRAVITY = 9.81  # m/s2, as in the paper
 STOPPED: tuple[Stopped, ...] = get_args(Stopped)
@@ -95,12 +95,9 @@ class Fall:
             value = getattr(self, name)
             if value is not None:
                 positive(f"the fall's {name}", value, "s")
-        _not_negative("the fall's friction", self.friction, "[-]")
-        _not_negative("the fall's drag", self.drag, "1/s")
-        instance(
-            "the fall's coupling", self.coupling, SharedDofs | ImplicitPenalty | ExplicitPenalty,
-            "rodshell.SharedDofs(), rodshell.ImplicitPenalty() or rodshell.ExplicitPenalty()",
-        )  # fmt: skip
+        not_negative("the fall's friction", self.friction)
+        not_negative("the fall's drag", self.drag, "1/s")
+        require_coupling("the fall's coupling", self.coupling)
         choice("the fall's stopped", self.stopped, STOPPED)
         if isinstance(self.every, bool) or not isinstance(self.every, Integral) or self.every < 1:
             raise InputError(f"the fall's every must be a number of steps, 1 or more, not {self.every!r}")
@@ -125,7 +122,12 @@ def require_method(value: object) -> None:
         raise InputError(f"method must be rodshell.Bound(), rodshell.Gravity() or rodshell.Fall(), not {what}")
 
 
-def _not_negative(name: str, value: object, unit: str) -> None:
-    number(name, value, unit)
-    if float(value) < 0:  # type: ignore[arg-type]
-        raise InputError(f"{name} must not be negative, not {value} {unit}")
+def require_coupling(name: str, value: object) -> None:
+    """Refuse what is no coupling, with one sentence that calls it by its `name`.
+
+    Raises
+    ------
+    InputError : `value` is a word, a class, or anything else.
+    """
+    kinds = "rodshell.SharedDofs(), rodshell.ImplicitPenalty() or rodshell.ExplicitPenalty()"
+    instance(name, value, SharedDofs | ImplicitPenalty | ExplicitPenalty, kinds)
