@@ -150,7 +150,7 @@ class _FallSimulation:
     def _safe_step(self, state: Floats) -> float:
         """A step [s] below the stability limit of explicit ties, whatever touches: without rods, all nodes stopped.
 
-        Rods under compression, whose stiffness is negative, can lower the limit temporarily, hence the margin.
+        Rods under compression, whose stiffness is negative, can lower the limit temporarily: the margin allows for it.
         """
         alone = replace(self.motion, elements=())
         return OF_LIMIT * step_limit(alone, state, stopped=self._stopped(np.arange(len(state))))

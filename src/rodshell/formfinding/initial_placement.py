@@ -9,7 +9,7 @@ from rodshell.nets import chebyshev_net
 from rodshell.targets import Target
 
 OVERHANG = 4.0  # spacings that a rod of automatic length hangs over the target's end
-SLIPPED = 0.2  # of the size: a joint of the axes that has moved this far from its vertical plane has slid off
+SLIPPED = 0.2  # of the size: distance of the heading's axis from its vertical plane at which the grid is lost
 
 
 def anchor_point(target: Target, anchor: tuple[float, float] | None) -> Floats:
@@ -69,7 +69,7 @@ def placed_over(mesh: GridMesh, layout: GridLayout, top: Floats) -> Floats:
 
 
 def lost_contact(mesh: GridMesh, state: Floats, layout: GridLayout, top: Floats, target: Target) -> bool:
-    """Whether the grid slid off: the rod nearest the heading's axis left the vertical plane that symmetry keeps it in.
+    """Whether the grid leaves its place on the target: the rod nearest the heading's axis left its vertical plane.
 
     Parameters
     ----------

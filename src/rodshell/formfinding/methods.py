@@ -67,7 +67,7 @@ class Fall:
     drag : rate at which all velocities decay [1/s].
     stream : folder for the frames, which holds none yet, read with `TimeSeries.load`; None keeps none.
     every : number of steps from one frame to the next.
-    settle : end as soon as the grid is at rest; else go on for the whole duration.
+    settle : end as soon as the grid is at rest; otherwise at the end of the duration.
 
     Raises
     ------
@@ -111,7 +111,7 @@ Method = Bound | Gravity | Fall
 
 
 def require_method(value: object) -> None:
-    """Refuse what is none of the three methods, with one sentence that names them.
+    """Refuse all but the three methods, with one sentence that names them.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def require_method(value: object) -> None:
 
 
 def require_coupling(name: str, value: object) -> None:
-    """Refuse what is no coupling, with one sentence that calls it by its `name`.
+    """Refuse all but the three couplings, with one sentence that calls the argument by its `name`.
 
     Raises
     ------
