@@ -1,5 +1,7 @@
 """A greenhouse of laths: formed by calls and as a job, compared, changed, saved and read."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 from typing import assert_type
