@@ -14,14 +14,13 @@ from PIL import Image
 from sample_archive import sample_archive
 
 from rodshell.output import Archive
-from rodshell.output.colours import mixed
+from rodshell.output.colour_scale import mixed, scale_of
 from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
 from rodshell.output.labels import Room, lines_meet
 from rodshell.output.pdf import POINTS, WIDTHS, drawings_pdf
 from rodshell.output.pictures import LAYERS, PAPER, picture
 from rodshell.output.png import drawing_png
 from rodshell.output.rods import rods_of
-from rodshell.output.scale import scale_of
 from rodshell.output.shapes import shape_of
 from rodshell.output.svg import drawing_svg, number
 
