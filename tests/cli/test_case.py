@@ -360,6 +360,7 @@ def test_a_built_target_has_the_numbers_of_its_case(name: str) -> None:
 
 
 def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
+    from rodshell.formfinding import Gravity
     from rodshell.joints import Ball, Pin
     from rodshell.layout import GridLayout
     from rodshell.rods.section import Circle, Material, Rod, Tube
@@ -371,11 +372,9 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
     )
     assert rod == Rod(Circle(0.001), Material(1e6, 1000.0, 0.5))
     assert options == {
-        "method": "gravity",
+        "method": Gravity(),
         "anchor": (0.1, 0.0),
-        "gravity": 9.81,
         "ends": ("pinned", "clamped"),
-        "fall": None,
         "joint": Ball(),
     }
     tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
@@ -484,9 +483,23 @@ def test_a_case_of_python_objects_can_be_read_again_whatever_its_angle(load: Any
 
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02, rotate=angle)
     rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
-    case = load(case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball(), gravity=3.0))
+    case = load(case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball()))
     assert cos(case.layout.rotate - angle) == pytest.approx(1)
     assert abs(case.layout.rotate) < tau
+
+
+def test_each_method_of_draping_is_written_to_a_case_and_read_again(load: Any) -> None:
+    import rodshell as rs
+    from rodshell.case.from_objects import case_text
+
+    layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02)
+    rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+    ties = rs.ExplicitPenalty(C1=2.0, C2=3e-5)
+    timed = {"time_step": 1e-3, "duration": 2.0, "friction": 0.1, "drag": 4.0}
+    slow = rs.Fall(acceleration=1.6, height=0.1, coupling=ties, **timed)
+    for method in (rs.Bound(), rs.Gravity(acceleration=1.6), rs.Fall(), slow):
+        text = case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball(), method=method)
+        assert load(text).build().drape_options["method"] == method
 
 
 def test_each_key_has_one_line_of_help() -> None:

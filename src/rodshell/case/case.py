@@ -112,9 +112,7 @@ class Case(Table):
                 'layout.rotate to "auto", or leave it out'
             )
         anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "ends": ends}
-        options["gravity"] = None if drape.method == "bound" else drape.gravity
-        options["fall"] = drape.fall() if drape.method == "paper" else None
+        options: dict[str, Any] = {"method": drape.build(), "anchor": anchor, "ends": ends}
         options["joint"] = self.joint.build()
         target = self.target.build()
         layout = self.layout.build(target)

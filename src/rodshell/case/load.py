@@ -154,14 +154,24 @@ def _rename(raw: Raw, overrides: dict[str, object]) -> None:
     """Give keys that stand under their old names their new ones, with a warning each."""
     for old, new in RENAMED.items():
         old_table, _, old_name = old.rpartition(".")
-        table = _table(raw, old_table)
-        if old in overrides or (isinstance(table, dict) and old_name in table):
+        new_table, _, new_name = new.rpartition(".")
+        table = _found_table(raw, old_table)
+        if old in overrides or old_name in table:
             warnings.warn(f"the key {old} is now called {new}: rename it", RenamedKeyWarning, stacklevel=2)
-            if isinstance(table, dict) and old_name in table:
-                new_table, _, new_name = new.rpartition(".")
-                _table(raw, new_table).setdefault(new_name, table.pop(old_name))
-            if old in overrides:
-                overrides.setdefault(new, overrides.pop(old))
+        if old in overrides:
+            overrides.setdefault(new, overrides.pop(old))
+        if old_name in table:
+            _table(raw, new_table).setdefault(new_name, table.pop(old_name))
+            if not table and old_table not in case_tables():
+                del raw[old_table]
+
+
+def _found_table(raw: Raw, path: str) -> Raw:
+    """The table at a dotted path; empty where there is none."""
+    inner: Any = raw
+    for name in path.split("."):
+        inner = inner.get(name, {}) if isinstance(inner, dict) else {}
+    return inner if isinstance(inner, dict) else {}
 
 
 def _table(raw: Raw, path: str) -> Any:

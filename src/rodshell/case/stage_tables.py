@@ -34,7 +34,7 @@ from rodshell.errors import InputError
 from rodshell.units import rounded_down, shown
 
 if TYPE_CHECKING:
-    from rodshell.formfinding.fall import Fall
+    from rodshell.formfinding.methods import Method
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.layout import GridLayout
     from rodshell.targets import Target
@@ -114,18 +114,22 @@ class DrapeTable(Table):
         if getattr(self, name) != type(self).model_fields[name].default:
             raise ValueError(f"drape.{name} = {shown(getattr(self, name))}: {why}")
 
-    def fall(self) -> "Fall":
-        """How the paper's method falls."""
-        from rodshell.formfinding.fall import Fall
+    def build(self) -> "Method":
+        """The method with its options."""
+        from rodshell.formfinding.methods import Bound, Fall, Gravity
         from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 
+        if self.method == "bound":
+            return Bound()
+        if self.method == "gravity":
+            return Gravity(acceleration=self.gravity)
         coupling: Coupling = SharedDofs()
         if self.coupling != "shared":
             penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
             coupling = penalty(C1=self.C1, C2=self.C2)
         return Fall(
-            coupling=coupling, height=self.height, time_step=self.time_step, duration=self.duration,
-            friction=self.friction, drag=self.drag, stream=self.frames,
+            acceleration=self.gravity, height=self.height, coupling=coupling, time_step=self.time_step,
+            duration=self.duration, friction=self.friction, drag=self.drag, stream=self.frames,
         )  # fmt: skip
 
 
