@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rodshell.case.of import case_text
+from rodshell.case.from_objects import case_text
 from rodshell.checks import Checks, Contact, check
 from rodshell.checks.contact import contact_of_patches
 from rodshell.checks.joined import joined_checks

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import fmod, tau
 from typing import Any
 
-from rodshell.case.schema import Case
+from rodshell.case.case import Case
 from rodshell.formfinding import Bound, Fall, Method
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.sewn import SewnForm
