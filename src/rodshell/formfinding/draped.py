@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.rest import Rest
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrapeFigures:
     """How well a grid lies on its target.
 
@@ -43,7 +43,7 @@ class DrapeFigures:
     strong_bending: StrongBending | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Draped:
     """A flat grid lying on a target, not yet trimmed.
 

@@ -68,7 +68,7 @@ class DynamicPopUpSettings:
             not_negative("the pop-up's drag", drag, "1/s")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DynamicPopUp:
     """A shell that popped up in time.
 

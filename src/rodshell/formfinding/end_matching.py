@@ -35,7 +35,7 @@ THERE = 0.05  # spacings between them in the end, at most
 UNLIKE = 0.6  # what it costs where a rod is at right angles to the mirror image of the one that it meets
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EndGoals:
     """Points where rods should end.
 
@@ -71,7 +71,7 @@ class MatchedEnd:
     distance: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MatchedNet:
     """A layout and its net, with the rod ends that lie at the points where rods should end.
 

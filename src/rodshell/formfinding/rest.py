@@ -14,7 +14,7 @@ from rodshell.solve.modes import slowest_modes
 from rodshell.targets import Target
 
 MODES = 4
-LONGEST = 5.0  # usual durations: where a drag would do, a fall that is longer than this is not proposed
+LONGEST = 5.0  # usual durations: where a drag is enough, a fall that is longer than this is not proposed
 CALM = 0.5  # of the usual duration, in which the proposed drag brings the grid to rest
 SPARE = 1.5  # times as long as the observed decay asks for: the slowest oscillation matters last
 

@@ -17,7 +17,7 @@ NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
 FEWEST_JOINTS = 3  # a rod with fewer swings about the line through its joints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Boundary:
     """The final boundary G: where the rod ends go.
 
@@ -35,7 +35,7 @@ class Boundary:
     normals: Floats | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Footprint:
     """The trimmed grid, flat: its rods end on the footprint G0.
 
@@ -57,7 +57,7 @@ class Footprint:
         return self.mesh.flat[self.mesh.ends.ravel(), :2]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trimmed:
     """The draped grid without what hangs over.
 
