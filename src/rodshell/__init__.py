@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         pop_up,
         trim,
     )
-    from rodshell.formfinding.rising import Rise, Risen, pop_up_in_time
+    from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.joints import (
         Ball,
@@ -99,7 +99,7 @@ _HOMES = {
         "Agreement", "Bound", "Boundary", "DrapeFigures", "Draped", "Fall", "Footprint", "Gravity", "Popped", "Trimmed",
         "agreement", "drape", "map_back", "pop_up", "trim",
     ),
-    "rodshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
+    "rodshell.formfinding.dynamic_pop_up": ("DynamicPopUp", "DynamicPopUpSettings", "dynamic_pop_up"),
     "rodshell.formfinding.sewn": ("PatchLayout",),
     "rodshell.joints": (
         "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
@@ -126,15 +126,15 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
-    "Disc", "DrapeFigures", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce",
-    "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection",
-    "Gravity", "GravityForce", "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler",
-    "ImplicitForce", "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError",
-    "OutOfTimeError", "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped",
-    "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn",
-    "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube",
-    "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
-    "pop_up_in_time", "pop_up_table", "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod",
+    "Disc", "DrapeFigures", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse",
+    "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form",
+    "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "RodshellError", "HeightField",
+    "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Linker", "Material", "Moment",
+    "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement",
+    "PointLoads", "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rod", "RodShape", "RodStrains",
+    "Sewn", "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube",
+    "agreement", "chebyshev_net", "drape", "dynamic_pop_up", "find_form", "heights_from", "map_back", "mesh_grid",
+    "pop_up", "pop_up_table", "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod",
     "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 

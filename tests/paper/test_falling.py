@@ -12,9 +12,9 @@ import rodshell as rs
 from rodshell.case import load_case
 from rodshell.cli import main
 from rodshell.errors import InputError, OutputError, StabilityError
-from rodshell.formfinding.calming import calming, decay
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.methods import Fall
+from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.output.manifest import read_manifest
 from rodshell.solve.report import Status
@@ -108,10 +108,10 @@ def test_decay_is_that_of_a_damped_swing(rate: float) -> None:
     """Energy of x = exp(-c t / 2) cos(w t), whose peaks fall as exp(-c t)."""
     times = np.linspace(0.0, 8.0, 801)
     seen = list(zip(times, np.exp(-rate * times) * np.sin(12 * times) ** 2, strict=True))
-    found, peak = decay(seen)
+    found, peak = energy_decay(seen)
     assert abs(found / rate - 1) < 0.05  # windows begin anywhere in a swing of 0.26 s, of 2 s
     assert abs(peak / np.exp(-6 * rate) - 1) < 0.25 * rate
-    assert decay([]) == (0.0, 0.0)
+    assert energy_decay([]) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_a_remedy_that_would_not_help_is_not_named(drag: float, rate: float, say
     energies = np.exp(-rate * times)
     still = float(energies[times > 4.5].max()) * np.exp(-5.0)
     seen = [(0.0, still * np.exp(15.0)), *zip(times, energies, strict=True)]
-    assert calming(seen, still, 1.0, 6.0, drag) == says
+    assert rest_advice(seen, still, 1.0, 6.0, drag) == says
 
 
 def test_beyond_the_step_limit_of_explicit_springs_a_fall_is_refused() -> None:

@@ -9,7 +9,7 @@ from numpy.linalg import norm
 import rodshell as rs
 from rodshell.checks.bending import bending_of
 from rodshell.cli.rodends import read_result
-from rodshell.formfinding.thickness import strong_bending
+from rodshell.formfinding.section_limits import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.vectors import unit
 from rodshell.nets.sphere import crossing_angle

@@ -11,8 +11,8 @@ import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
-from rodshell.formfinding import bound, pipeline
-from rodshell.formfinding.roll import roll
+from rodshell.formfinding import bound_drape, pipeline
+from rodshell.formfinding.section_limits import section_rotation
 from rodshell.output import read
 from rodshell.output.archive import json_text
 from rodshell.output.verdict import verdict
@@ -140,16 +140,17 @@ def test_laid_either_way_a_lath_takes_the_same_shape_where_nothing_holds_it():
 
 
 @pytest.mark.parametrize("turn", [0.1, 1.0, 2.0, -2.5])
-def test_roll_is_what_the_twist_angles_add(turn):
+def test_section_rotation_is_what_the_twist_angles_add(turn):
     """Laths held by pins lie nearly flat; turned by more than a quarter they are nearer to their other side."""
     popped = of_laths(LYING, rs.Pin()).popped["pinned"]
-    before = roll(popped)
+    before = section_rotation(popped.shell, popped.state)
     assert np.degrees(before).max() < 7.0
     state = popped.state.copy()
     state[popped.shell.first_angle :, 0] += turn
-    turned = roll(replace(popped, state=state))
+    turned = section_rotation(popped.shell, state)
     assert np.all(np.abs(turned - np.arccos(abs(np.cos(turn)))) <= before + 1e-9)
-    assert roll(hemisphere_form().popped["pinned"]) is None
+    round_rods = hemisphere_form().popped["pinned"]
+    assert section_rotation(round_rods.shell, round_rods.state) is None
 
 
 @pytest.mark.parametrize(("ending", "tail", "left"), [(6, 0.5, 5), (4, 0.7, 7), (10, None, 0), (11, None, 0)])
@@ -208,8 +209,8 @@ def test_a_drape_that_is_no_minimum_is_warned_of(monkeypatch):
         found = plain(*arguments, **options)
         return replace(found, report=replace(found.report, negative_modes=19))
 
-    plain = bound.find_equilibrium
-    monkeypatch.setattr(bound, "find_equilibrium", find)
+    plain = bound_drape.find_equilibrium
+    monkeypatch.setattr(bound_drape, "find_equilibrium", find)
     form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=())
     assert any("19 negative modes" in text for text in form.warnings)
 
@@ -220,7 +221,7 @@ def test_a_drape_that_is_no_minimum_is_warned_of(monkeypatch):
 @pytest.fixture
 def hurried(monkeypatch):
     """The bound drape with two iterations: too few for a steep bump."""
-    monkeypatch.setattr(bound, "find_equilibrium", partial(bound.find_equilibrium, most_iterations=2))
+    monkeypatch.setattr(bound_drape, "find_equilibrium", partial(bound_drape.find_equilibrium, most_iterations=2))
 
 
 @pytest.mark.usefixtures("hurried")

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 import rodshell as rs
 from rodshell.errors import InputError
-from rodshell.formfinding.draped import node_normals
+from rodshell.formfinding.layers import node_normals
 from rodshell.model import Shell
 from rodshell.solve import newton_step
 from rodshell.solve.constraint import Supports

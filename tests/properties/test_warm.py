@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.formfinding.carried import carried_edges, carried_nodes, corresponding
+from rodshell.formfinding.warm_start import corresponding_rods, transferred_edges, transferred_nodes
 from rodshell.nets import nearby
 from rodshell.nets.chebyshev import chebyshev_net
 from rodshell.nets.compass import march
@@ -166,23 +166,23 @@ def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last)
 def test_fields_are_carried_unchanged_to_the_same_mesh_and_linear_ones_to_any(last):
     mesh = last.footprint.mesh
     field = np.column_stack([mesh.flat[:, 0], np.sin(30 * mesh.flat[:, 1])])
-    np.testing.assert_allclose(carried_nodes(field, mesh, mesh), field, atol=1e-12)
+    np.testing.assert_allclose(transferred_nodes(field, mesh, mesh), field, atol=1e-12)
     forces = np.cos(np.arange(len(mesh.edges)))
-    np.testing.assert_allclose(carried_edges(forces, mesh, mesh), forces, atol=1e-12)
+    np.testing.assert_allclose(transferred_edges(forces, mesh, mesh), forces, atol=1e-12)
     fine = rs.find_form(OVAL, layout_of(edge=0.005), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
     straight = mesh.flat[:, :1]
-    carried = carried_nodes(straight, mesh, fine)
+    carried = transferred_nodes(straight, mesh, fine)
     np.testing.assert_allclose(carried, fine.flat[:, :1], atol=1e-6)  # rods differ by 3e-7 m in length
 
 
 def test_rods_without_a_counterpart_get_nothing(last):
     mesh = last.footprint.mesh
     few = rs.find_form(OVAL, layout_of(rods=(5, 4)), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
-    pairs = dict(corresponding(few, mesh))
+    pairs = dict(corresponding_rods(few, mesh))
     offsets = {mesh.grid.rods[new].offset: few.grid.rods[old].offset for new, old in pairs.items()}
     assert all(abs(new - old) < 1e-12 for new, old in offsets.items())
     assert 0 < len(pairs) < len(mesh.grid.rods)
-    carried = carried_nodes(np.ones((few.node_count, 1)), few, mesh)
+    carried = transferred_nodes(np.ones((few.node_count, 1)), few, mesh)
     only = np.setdiff1d(np.arange(len(mesh.grid.rods)), list(pairs))
     alone = np.setdiff1d(
         np.concatenate([mesh.nodes_of(k) for k in only]), np.concatenate([mesh.nodes_of(k) for k in pairs])

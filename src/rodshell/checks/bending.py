@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.formfinding.draped import node_normals
+from rodshell.formfinding.layers import node_normals
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell

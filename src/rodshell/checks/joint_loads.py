@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.draped import joint_normals, joint_tangents
+from rodshell.formfinding.layers import joint_normals, joint_tangents
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.joints.crossings import Places
 from rodshell.joints.linkers import LinkerBend

@@ -11,11 +11,10 @@ from rodshell.errors import InputError
 from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.flatness import flat_warning
 from rodshell.formfinding.methods import Bound, Method
 from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.roll import roll
+from rodshell.formfinding.section_limits import flat_warnings, section_rotation
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -77,7 +76,7 @@ class FoundForm:
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
-        flat = flat_warning(self.trimmed.positions, self.rod)
+        flat = flat_warnings(self.trimmed.positions, self.rod)
         return (*flat, *self.draped.warnings, *_stretched(self.draped), *tails, *_rolled(self.popped))
 
 
@@ -238,7 +237,7 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
 def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
     """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
     for ends, shell in popped.items():
-        angles = roll(shell) if shell.report.converged else None
+        angles = section_rotation(shell.shell, shell.state) if shell.report.converged else None
         if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
             return (
                 f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "

@@ -12,10 +12,10 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding.carried import carried_edges, carried_nodes
-from rodshell.formfinding.draped import node_normals
+from rodshell.formfinding.layers import node_normals
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
+from rodshell.formfinding.warm_start import transferred_edges, transferred_nodes
 from rodshell.geometry.vectors import dot, unit
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
@@ -207,14 +207,14 @@ class _PopUp:
         if here is None or there is None or last.shell.angles:
             return None
         shell, mesh, before = self.shell(last.ends), self.footprint.mesh, last.footprint.mesh
-        moved = carried_nodes(last.positions - there, before, mesh)
+        moved = transferred_nodes(last.positions - there, before, mesh)
         moved[mesh.ends] = 0.0
         state = self.upright(shell, here + moved, self.boundary.tangents)
         stiffer = shell.stretch.stiffness.mean() / last.shell.stretch.stiffness.mean()
         found = find_stable(
             self.problem(shell),
             state,
-            stiffer * carried_edges(last.forces, before, mesh),
+            stiffer * transferred_edges(last.forces, before, mesh),
             most_iterations=MOST_AGAIN,
             progress=lambda k, step: self.progress(
                 "pop-up", f"{last.ends}, again, iteration {k} of at most {MOST_AGAIN}", step

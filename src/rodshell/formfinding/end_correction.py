@@ -1,8 +1,9 @@
-"""Natural ends: how the rods of a net, bound to the surface, straighten there.
+"""End correction: from the lines of a net to where rods bound to the surface would lie.
 
-A line of the net goes on curving to its end, while a rod bends no more at its own. The joints hardly move for it: so
-between them each rod differs from its line by a cubic spline that vanishes at the joints, and whose end moments undo
-the line's geodesic curvature. It dies out by 0.27 from joint to joint. (Beam theory, to first order.)
+A line of the net is curved up to its end, while a rod's bending moment vanishes there (the natural boundary condition).
+The joints hardly move for it: so between them each rod differs from its line by a cubic spline that vanishes at the
+joints, and whose end moments cancel the line's geodesic curvature. By beam theory, to first order; the correction
+decays by the factor 2 - sqrt(3) = 0.27 from joint to joint, as cubic splines do (docs/theory.md, The bound drape).
 """
 
 import numba as nb
@@ -12,25 +13,31 @@ from rodshell.arrays import Floats
 from rodshell.layout import GridMesh
 from rodshell.targets import Target
 
-STEEP = 0.5  # rad that a line turns in its last span: such a rod stays on its line, beam theory is not for it
+STEEP = 0.5  # rad that a line turns in its last span: from there beam theory does not hold, the rod stays on its line
 
 
-def with_natural_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
-    """The nodes (n, 3) of lines of a net on the target, moved sideways to about where rods would be [m].
+def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
+    """(n, 3) the nodes, moved sideways on the target to where rods would lie, to first order [m].
 
     The axes stay: they are geodesics, and the drape holds them on their lines.
+
+    Parameters
+    ----------
+    target : the surface.
+    mesh : of the net's lines.
+    points : (n, 3) its nodes on the net's lines [m].
     """
     joint = np.zeros(mesh.node_count, dtype=bool)
     joint[mesh.joint_nodes] = True
     normal = target.on_surface(points).normal
     result = points.copy()
     rods = np.flatnonzero([rod.offset != 0.0 for rod in mesh.grid.rods])
-    _straighten(points, normal, mesh.rod_nodes, mesh.rod_start[rods], mesh.rod_stop[rods], mesh.stations, joint, result)
+    _correct(points, normal, mesh.rod_nodes, mesh.rod_start[rods], mesh.rod_stop[rods], mesh.stations, joint, result)
     return target.retract(result)
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _straighten(points, normal, rod_nodes, rod_start, rod_stop, stations, joint, result):  # type: ignore[no-untyped-def]
+def _correct(points, normal, rod_nodes, rod_start, rod_stop, stations, joint, result):  # type: ignore[no-untyped-def]
     for rod in range(len(rod_start)):
         nodes, s = rod_nodes[rod_start[rod] : rod_stop[rod]], stations[rod_start[rod] : rod_stop[rod]]
         at = np.flatnonzero(joint[nodes])
@@ -49,10 +56,10 @@ def _straighten(points, normal, rod_nodes, rod_start, rod_stop, stations, joint,
                 x, y = (s[b] - s[k]) / h, (s[k] - s[a]) / h
                 shift = h * h / 6.0 * (moments[span] * (x**3 - x) + moments[span + 1] * (y**3 - y))
                 _shift(result, nodes[k], shift, side, k)
-        for end, inner, stop, one in ((0, 1, -1, -1), (len(at) - 1, len(at) - 2, len(nodes), 1)):
+        for end, inner, stop, step in ((0, 1, -1, -1), (len(at) - 1, len(at) - 2, len(nodes), 1)):
             begin, h = at[end], abs(s[at[end]] - s[at[inner]])
             slope = h / 6.0 * (2.0 * moments[end] + moments[inner])
-            for k in range(begin + one, stop, one):  # past the last joint a rod goes straight on
+            for k in range(begin + step, stop, step):  # past the last joint the rod is straight
                 far = abs(s[k] - s[begin])
                 _shift(result, nodes[k], far * (slope + 0.5 * far * moments[end]), side, k)
 
@@ -80,7 +87,7 @@ def _sideways(points, normal, nodes):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, error_model="numpy")
 def _curvature(points, nodes, s, side):  # type: ignore[no-untyped-def]
-    """(n,) geodesic curvature towards `side` by three nodes [1/m], at the ends continued."""
+    """(n,) geodesic curvature towards `side` by three nodes [1/m], extrapolated to the ends."""
     curvature = np.empty(len(nodes))
     for k in range(1, len(nodes) - 1):
         before, after, curvature[k] = s[k] - s[k - 1], s[k + 1] - s[k], 0.0
@@ -88,8 +95,8 @@ def _curvature(points, nodes, s, side):  # type: ignore[no-untyped-def]
             turn = (points[nodes[k + 1], i] - points[nodes[k], i]) / after
             turn -= (points[nodes[k], i] - points[nodes[k - 1], i]) / before
             curvature[k] += 2.0 * turn / (before + after) * side[k, i]
-    for end, k, one in ((0, 1, 1), (len(nodes) - 1, len(nodes) - 2, -1)):
-        rate = (curvature[k + one] - curvature[k]) / (s[k + one] - s[k])
+    for end, k, step in ((0, 1, 1), (len(nodes) - 1, len(nodes) - 2, -1)):
+        rate = (curvature[k + step] - curvature[k]) / (s[k + step] - s[k])
         curvature[end] = curvature[k] + rate * (s[end] - s[k])
     return curvature
 

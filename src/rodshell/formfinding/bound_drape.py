@@ -1,4 +1,4 @@
-"""The bound drape: march the net, then bind the elastic grid to the target (numerics.md, section 4).
+"""The bound drape: march the net, then bind the elastic grid to the target (docs/theory.md, The bound drape).
 
 Every node slides on the target without friction, rods do not stretch, and bending alone decides what the net
 leaves open: the shape of each span between its joints. No load and no stretch stiffness enter, so that the
@@ -14,10 +14,11 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.contact.bound import BoundToTarget
 from rodshell.formfinding.draped import Draped, DrapeFigures
+from rodshell.formfinding.end_correction import corrected_ends
+from rodshell.formfinding.layers import thickness_warnings
 from rodshell.formfinding.methods import Bound
-from rodshell.formfinding.natural import with_natural_ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.thickness import layers_left_out, strong_bending
+from rodshell.formfinding.section_limits import strong_bending
 from rodshell.geometry.vectors import dot
 from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
@@ -35,7 +36,7 @@ from rodshell.targets import Target
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
 WARN_ANGLE = 25.0  # degrees
-MOST_TURNS = 3  # solves of a drape in layers; the second leaves strains of 1e-8
+MOST_SOLVES = 3  # of a drape in layers; the second leaves strains of 1e-8
 PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces settle by 0.05 a step at 200 rods
 
 
@@ -49,7 +50,18 @@ def bound_drape(
     joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
-    """Drape `layout` over `target` by its net; see `drape`."""
+    """Drape a layout over a target by its net; see `drape`.
+
+    Parameters
+    ----------
+    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+    warm_start : a grid draped before, near whose net the new one is looked for.
+    joint : whose eccentricity lays the rods in two layers, and which may hold rods against rolling.
+
+    Raises
+    ------
+    NetLimitError : no net covers the target from this anchor and heading.
+    """
     progress("net", "marching", 0.0)
     eccentricity = joint.eccentricity if joint else 0.0
     near = warm_start.net if warm_start else None
@@ -58,12 +70,12 @@ def bound_drape(
     cuts = [list[FlatRod]() for _ in grid.rods]
     for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
         cuts[whole].append(piece)
-    mesh = mesh_grid(grid, layout.edge, marks=[[s for cut in on for s in (cut.start, cut.end)] for on in cuts])
+    mesh = mesh_grid(grid, layout.edge, marks=[[s for cut in pieces for s in (cut.start, cut.end)] for pieces in cuts])
     start = np.empty((mesh.node_count, 3))
     for k, line in enumerate(grid.rods):
         start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
     rod_within = _within_surface(rod)
-    shell, natural = Shell.of(mesh, rod_within), with_natural_ends(target, mesh, start)
+    shell, corrected = Shell.of(mesh, rod_within), corrected_ends(target, mesh, start)
     problem = Problem(
         elements=shell.elements,
         stretch=_penalty(shell.stretch, rod_within, target),
@@ -73,24 +85,24 @@ def bound_drape(
         places=shell.places,
     )
     found = _in_layers(
-        problem, target, mesh, natural, eccentricity,
+        problem, target, mesh, corrected, eccentricity,
         progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
     on_target = _nodes_on_target(mesh, cuts)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
     warnings = [*target.warnings, *net.warnings]
-    on = np.zeros(mesh.node_count, dtype=bool)
-    on[on_target] = True
-    edges, bends = (np.asarray(on[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
+    touching = np.zeros(mesh.node_count, dtype=bool)
+    touching[on_target] = True
+    edges, bends = (np.asarray(touching[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
     strong = strong_bending(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
     if strong is not None:
         warnings += strong.warnings
     if not eccentricity:
-        warnings += layers_left_out(target, mesh, found.state, edges, rod, min(layout.spacing))
+        warnings += thickness_warnings(target, mesh, found.state, edges, rod, min(layout.spacing))
     if found.report.negative_modes:
         warnings.append(
-            f"the drape's state is no minimum of the bound grid's energy ({found.report.negative_modes} negative "
-            "modes): use a smaller spacing"
+            f"the drape is not a minimum of the bound grid's energy ({found.report.negative_modes} negative modes): "
+            "use a smaller spacing"
         )
     if not (found.report.stable or found.report.reason):
         warnings += _tightest_bend(target, layout, found.state[on_target])
@@ -98,7 +110,7 @@ def bound_drape(
         x, y, z = net.min_angle_at
         warnings.append(
             f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
-            "joints there must close far; another anchor or heading, a smaller part or a seam may open them"
+            "the joints there nearly close; another anchor or heading, a smaller part or a seam may open them"
         )
     figures = DrapeFigures(
         max_gap=float(np.abs(target.distance(found.state[on_target])).max()),
@@ -126,17 +138,17 @@ def bound_drape(
 
 
 def _within_surface(rod: Rod) -> Rod:
-    """The rod with EI2 for all directions.
+    """The rod with EI2 in all directions.
 
-    Out of the surface the rods bend as it bends; what is theirs to choose is the bend within it, towards m2, the first
-    director being the normal. So the twist angles are left out, as of a round rod.
+    Out of the surface the rods bend as it bends; free is only the bend within it, towards m2, the first director being
+    the normal. So the twist angles are left out, as for a round rod.
     """
     within = rod.bend_stiffnesses[1]
     return Rod(GivenSection(rod.stretch_stiffness, within, within, rod.twist_stiffness))
 
 
 def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
-    """Edges whose stiffness only has to outweigh bending, which goes with the square of the size over the edge."""
+    """Edges whose stiffness only has to outweigh bending, which grows with the square of the size over the edge."""
     weight = max(LEAST_PENALTY, PENALTY * (target.size / float(np.median(stretch.rest_lengths))) ** 2)
     stiffness = weight * rod.bend_stiffness / target.size**2
     return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
@@ -150,8 +162,10 @@ def _in_layers(
     eccentricity: float,
     progress: Callable[[int, float], None],
 ) -> Equilibrium:
-    """Equilibrium on the target of rods whose own lines, in two layers, keep their lengths: once more where sideways
-    motion turned edges towards another curvature."""
+    """Equilibrium on the target of rods that keep their lengths in their own layers.
+
+    Solved again where sideways motion turned edges towards another curvature, which changes their lengths there.
+    """
     state, forces, reports = start, np.zeros(len(mesh.edges)), list[SolveReport]()
     while True:
         if eccentricity:
@@ -163,23 +177,25 @@ def _in_layers(
         strain = 0.0
         if eccentricity:
             strain = float(np.abs(_between_layers(target, mesh, state, eccentricity) / lengths - 1.0).max())
-        if strain < STRAIN_TOLERANCE or not found.report.converged or len(reports) == MOST_TURNS:
+        if strain < STRAIN_TOLERANCE or not found.report.converged or len(reports) == MOST_SOLVES:
             return replace(found, report=found.report.after(*reports[:-1]))
         problem = replace(problem, elements=found.elements, pattern=found.pattern)
 
 
 def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentricity: float) -> Floats:
-    """(e,) lengths [m] on the target of edges whose rods' own lines lie in two layers, near `positions` (n, 3): by how
-    much the layers' chords are longer or shorter depends on the target's curvature along them."""
+    """(e,) rest lengths on the target of edges whose rods lie in two layers, near `positions` (n, 3) [m].
+
+    By how much the layers' chords are longer or shorter depends on the target's curvature along them.
+    """
     above = 0.5 * eccentricity * np.array([1.0 if rod.family == "v" else -1.0 for rod in mesh.grid.rods])
     normal, (a, b) = target.on_surface(positions).normal, mesh.edges.T
     chord = positions[b] - positions[a]
-    own = chord + above[mesh.edge_rods, None] * (normal[b] - normal[a])
-    return np.asarray(mesh.edge_lengths * np.sqrt(dot(chord, chord) / dot(own, own)))
+    in_layer = chord + above[mesh.edge_rods, None] * (normal[b] - normal[a])
+    return np.asarray(mesh.edge_lengths * np.sqrt(dot(chord, chord) / dot(in_layer, in_layer)))
 
 
 def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
-    """All nodes on the target; those of the two axes keep to their lines, the anchor to its place."""
+    """All nodes on the target; those of the two axes are held on their lines, and the anchor at its point."""
     count = np.full(mesh.node_count, 2, dtype=np.intp)
     guides = np.tile([1.0, 0.0, 0.0], (mesh.node_count, 1))
     guides[np.abs(target.on_surface(start).normal[:, 0]) > 0.7] = [0.0, 1.0, 0.0]
@@ -192,16 +208,16 @@ def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
 
 
 def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> Ints:
-    """Nodes between the ends of some rod: all but the apron's."""
+    """Nodes between the ends of the rods: all but the apron's."""
     whole = np.repeat(np.arange(len(cuts)), [len(pieces) for pieces in cuts])
     _, _, nodes = nodes_along(mesh, [cut for pieces in cuts for cut in pieces], whole)
-    on = np.zeros(mesh.node_count, dtype=bool)
-    on[nodes] = True
-    return np.flatnonzero(on)
+    between = np.zeros(mesh.node_count, dtype=bool)
+    between[nodes] = True
+    return np.flatnonzero(between)
 
 
 def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[str]:
-    """Where the target curves too sharply for the spacing, which is what stops a bound drape that has a net."""
+    """A warning where the target curves too sharply for the spacing, which stops a bound drape that has a net."""
     curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
     k = int(np.argmax(curvature))
     radius, (x, y, z) = 1.0 / curvature[k], np.where(np.abs(points[k]) < 1e-6 * target.size, 0.0, points[k])
@@ -209,32 +225,37 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
         return []
     return [
         f"near ({x:.4g}, {y:.4g}, {z:.4g}) m the target's radius of curvature is {radius:.3g} m, the spacing "
-        f"{max(layout.spacing):.3g} m: a spacing below half of that radius would do"
+        f"{max(layout.spacing):.3g} m: use a spacing below half of that radius"
     ]
 
 
 def _net_deviation(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
     """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
-    windows, places = list[Ints](), list[Floats]()
+    windows, offsets = list[Ints](), list[Floats]()
     for k, pieces in enumerate(cuts):
         s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
         for end in (end for cut in pieces if not cut.virtual for end in (cut.start, cut.end)):
             first = min(max(int(np.searchsorted(s, end)) - 1, 0), max(len(s) - 3, 0))
             three = np.minimum(first + np.arange(3), len(s) - 1)
             windows.append(nodes[three])
-            places.append(s[three] - end)
-    x = np.array(places).T
+            offsets.append(s[three] - end)
+    x = np.array(offsets).T
     f = target.margin(positions[np.concatenate(windows)]).reshape(-1, 3).T
     slope = (f[1] - f[0]) / (x[1] - x[0])  # Newton's parabola through three nodes
     bend = np.zeros_like(slope)
     bent = x[2] > x[1]
     bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
     ahead = (f[0] - x[0] * slope + x[0] * x[1] * bend) / ((x[0] + x[1]) * bend - slope)
-    return ahead.reshape(-1, 2) * [-1.0, 1.0]
+    return np.asarray(ahead.reshape(-1, 2) * [-1.0, 1.0])
 
 
 def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
-    """Key figures of a net for the result file."""
+    """Key figures of a net for the result file: its error [m], and its smallest angle and where that is [m].
+
+    Parameters
+    ----------
+    net : a marched net.
+    """
     return {
         "error_estimate": net.error_estimate,
         "min_angle_deg": degrees(net.min_angle),

@@ -3,14 +3,14 @@
 Implicit Euler with the coupling that is asked for, drag, and no load. Pinned ends only: the paper moves nodes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.formfinding.methods import require_coupling
 from rodshell.formfinding.popup import FIRST_RISE, aligned, arched
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
@@ -26,87 +26,108 @@ from rodshell.solve.simulate import simulate
 from rodshell.solve.step_limit import step_limit
 from rodshell.solve.summed import narrow_or_dissected
 from rodshell.solve.time_series import Moment
+from rodshell.validation import not_negative, positive
 
 BALANCED = 1e-3  # out-of-balance force on a node, of EI over the square of the shell's half-width
 STILL = 1e-6  # kinetic energy, of the elastic energy
-OF_LIMIT = 0.9  # share of the explicit ties' step limit that is taken
-CHECKS = 10  # moments between two looks at the rest
+OF_LIMIT = 0.9  # share of the stability limit of explicit ties that is taken as time step
+CHECKS = 10  # steps between two checks whether it is at rest
 
 
-@dataclass(frozen=True)
-class Rise:
-    """How the ends move.
+@dataclass(frozen=True, kw_only=True)
+class DynamicPopUpSettings:
+    """How the rod ends move from the footprint to the boundary.
 
     Parameters
     ----------
-    coupling : how the rods hold together.
-    time_step : [s]; explicit ties take at most nine tenths of their limit.
-    moving : time [s] in which the ends reach the boundary, on straight paths, starting and stopping smoothly.
-    duration : of the whole motion [s], which ends earlier when the grid is at rest.
-    drags : rates at which velocities decay [1/s], while the ends move and after. A lively start can swing through
-        the plane and pop up to the other side.
+    coupling : how the rods hold together: shared DOFs, implicit or explicit penalty [HQK 2.2].
+    time_step : [s]; with explicit ties at most nine tenths of their stability limit.
+    moving_time : in which the ends reach the boundary, on straight paths, starting and stopping smoothly [s].
+    duration : longest simulated time [s]; the motion ends earlier when the grid is at rest.
+    drags : rates at which velocities decay [1/s], while the ends move and after. With less drag at the start a grid
+        can swing through its plane and pop up to the other side.
+
+    Raises
+    ------
+    InputError : a value is of the wrong kind or sign.
     """
 
     coupling: Coupling = field(default_factory=SharedDofs)
     time_step: float = 0.01
-    moving: float = 1.0
+    moving_time: float = 1.0
     duration: float = 10.0
     drags: tuple[float, float] = (20.0, 3.0)
 
     def __post_init__(self) -> None:
-        for name in ("time_step", "moving", "duration"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise InputError(f"the rise's {name} must be positive, not {value} s")
+        for name in ("time_step", "moving_time", "duration"):
+            positive(f"the pop-up's {name}", getattr(self, name), "s")
+        require_coupling("the pop-up's coupling", self.coupling)
+        if not (isinstance(self.drags, Sequence) and len(self.drags) == 2):
+            raise InputError(f"the pop-up's drags must be two numbers in 1/s, not {self.drags!r}")
+        for drag in self.drags:
+            not_negative("the pop-up's drag", drag, "1/s")
 
 
-@dataclass(frozen=True)
-class Risen:
-    """The shell that popped up in time: positions (n, 3) of the footprint's nodes [m], and how they rest."""
+@dataclass(frozen=True, eq=False)
+class DynamicPopUp:
+    """A shell that popped up in time.
+
+    Parameters
+    ----------
+    positions : (n, 3) of the footprint's nodes [m].
+    rest : how the motion ended.
+    """
 
     positions: Floats
     rest: Rest
 
 
-def pop_up_in_time(
+def dynamic_pop_up(
     footprint: Footprint,
     boundary: Boundary,
     rod: Rod,
     *,
     joint: Joint | None = None,
-    rise: Rise | None = None,
+    settings: DynamicPopUpSettings = DynamicPopUpSettings(),
     progress: Progress = silent,
-) -> Risen:
+) -> DynamicPopUp:
     """Move the rod ends from the footprint to the boundary in time, pinned, from (nearly) flat.
 
     A flat grid stays flat, in unstable equilibrium: as in `pop_up`, the start is a low arch with its ends a
     twentieth of their way on.
 
+    Parameters
+    ----------
+    footprint, boundary : where the m rods' ends are and where they go.
+    joint : what the rods do to each other where they cross; ball joints by default.
+    settings : coupling, time stepping and drag.
+    progress : called as progress(stage, detail, residual), each ten steps.
+
     Raises
     ------
-    StabilityError, ConvergenceError : explicit ties that are too stiff for any step; a step that fails.
+    StabilityError : explicit ties are too stiff for any step.
+    ConvergenceError : a step fails.
     """
-    rise = rise or Rise()
     if joint and joint.eccentricity and not footprint.mesh.layered:
         footprint, boundary = in_layers(footprint, boundary, joint.eccentricity)
     mesh = footprint.mesh
-    shell = Shell.of(mesh, rod, joint=joint, coupling=rise.coupling)
+    shell = Shell.of(mesh, rod, joint=joint, coupling=settings.coupling)
     ends = mesh.ends.ravel()
     flat = aligned(mesh.flat, mesh.flat[ends], boundary.points)
     state = shell.state(arched(footprint, flat, flat[ends], boundary))
 
     def supports(time: float) -> Supports:
-        way = min(1.0, time / rise.moving)
-        share = FIRST_RISE + (1 - FIRST_RISE) * way * way * (3 - 2 * way)
+        progressed = min(1.0, time / settings.moving_time)
+        share = FIRST_RISE + (1 - FIRST_RISE) * progressed * progressed * (3 - 2 * progressed)
         return Supports(shell.held_ends(), shell.ends, (1 - share) * flat[ends] + share * boundary.points)
 
     motion = Motion.of(shell, constraint=supports)
-    step = min(rise.time_step, OF_LIMIT * step_limit(motion, state))
+    step = min(settings.time_step, OF_LIMIT * step_limit(motion, state))
     unit_force = rod.bend_stiffness / (0.5 * float(np.ptp(boundary.points, axis=0).max())) ** 2
-    stop = _looking(shell, rise.moving, BALANCED * unit_force, progress)
+    stop = _stop_check(shell, settings.moving_time, BALANCED * unit_force, progress)
     matrix, steps, refused = narrow_or_dissected(shell.places), 0, 0
     last = Moment(0.0, state, np.zeros_like(state), motion)
-    for rate, until in zip(rise.drags, (rise.moving, rise.duration), strict=True):
+    for rate, until in zip(settings.drags, (settings.moving_time, settings.duration), strict=True):
         if until <= last.time:
             break
         series = simulate(
@@ -118,10 +139,10 @@ def pop_up_in_time(
         last = series.last
         steps, refused = steps + series.report.steps, refused + series.report.refused_steps
     energy, force = _activity(shell, last)
-    resting = last.time >= rise.moving and _rests(last, energy, force, BALANCED * unit_force)
+    resting = last.time >= settings.moving_time and _rests(last, energy, force, BALANCED * unit_force)
     gap = joint_gap(shell, last.state)
     rest = Rest(resting, last.time, energy, force, gap, (), steps, refused)
-    return Risen(shell.positions(last.state), rest)
+    return DynamicPopUp(shell.positions(last.state), rest)
 
 
 def _activity(shell: Shell, moment: Moment) -> tuple[float, float]:
@@ -135,17 +156,17 @@ def _rests(moment: Moment, energy: float, force: float, least: float) -> bool:
     return force < least and energy < STILL * moment.motion.elastic_energy(moment.state)
 
 
-def _looking(shell: Shell, moving: float, least: float, progress: Progress) -> Callable[[Moment], bool]:
-    """Asked at each step: tells where it is, and from time to time whether it rests."""
+def _stop_check(shell: Shell, moving_time: float, least: float, progress: Progress) -> Callable[[Moment], bool]:
+    """Called after each step: reports progress, and from time to time checks whether the grid is at rest."""
     count = 0
 
-    def look(moment: Moment) -> bool:
+    def stop(moment: Moment) -> bool:
         nonlocal count
         count += 1
         if count % CHECKS:
             return False
         energy, force = _activity(shell, moment)
         progress("pop-up", f"rising, t = {moment.time:.3f} s, kinetic energy {energy:.1e} J", force)
-        return moment.time >= moving and _rests(moment, energy, force, least)
+        return moment.time >= moving_time and _rests(moment, energy, force, least)
 
-    return look
+    return stop

@@ -1,8 +1,8 @@
-"""Rods that meet at a seam: lay a patch's rods such that they end where rods of its neighbours do.
+"""End matching: choose the rods of a patch such that they end where the rods of its neighbours do, at a seam.
 
 The net of a patch says which two lines run through every point of its surface. Through each point where a
-neighbour's rod ends, one of the two becomes a rod: that point's coordinate in the net is the rod's offset. Which of the
-two is a matter of spacing, see `choose_families`. Then the net is marched with these lines and their offsets are
+neighbour's rod ends, one of the two becomes a rod: that point's coordinate in the net is the rod's offset. Which one is
+chosen by spacing, see `choose_families`. Then the net is marched with these lines and their offsets are
 corrected, until the rods end at their points.
 """
 
@@ -22,7 +22,7 @@ from rodshell.nets.nearby import interpolated
 from rodshell.targets import Target
 
 Point = tuple[float, float]
-OnHeld = Callable[[Floats], Bools]  # whether points (n, 3) of the end lie on a seam whose rods are given
+OnSeam = Callable[[Floats], Bools]  # whether points (k, 3) of the end lie on a seam whose rods are given
 
 FAMILIES: tuple[Family, Family] = ("u", "v")
 ROUNDS = 4  # three settle
@@ -35,42 +35,55 @@ THERE = 0.05  # spacings between them in the end, at most
 UNLIKE = 0.6  # what it costs where a rod is at right angles to the mirror image of the one that it meets
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """Ends that rods should have.
+@dataclass(frozen=True, eq=False)
+class EndGoals:
+    """Points where rods should end.
 
     Parameters
     ----------
     points : (n, 3) on seams of the target [m].
-    like : (n, 3) unit tangents that the rods should have there, as far as spacing allows.
+    tangents : (n, 3) unit tangents that the rods should have there, as far as spacing allows.
     rows : indices of the points along each seam, in their order there.
-    held : whether points (n, 3) of the target's end lie on one of these seams.
+    on_seam : whether points (k, 3) of the target's end lie on one of these seams, as a mask (k,).
     """
 
     points: Floats
-    like: Floats
+    tangents: Floats
     rows: Sequence[Ints]
-    held: OnHeld
+    on_seam: OnSeam
 
 
 @dataclass(frozen=True)
-class Met:
-    """A rod end (side 0 start, 1 end) of a net that lies at the wanted point of this index, `off` it [m]."""
+class MatchedEnd:
+    """A rod end of a net that lies at one of the points where rods should end.
+
+    Parameters
+    ----------
+    point : index of that point.
+    rod : name of the rod.
+    side : 0 at its start, 1 at its end.
+    distance : from the point [m].
+    """
 
     point: int
     rod: str
     side: int
-    off: float
+    distance: float
 
 
-@dataclass(frozen=True)
-class Matched:
-    """A layout and its net, with the rod ends that lie at wanted points."""
+@dataclass(frozen=True, eq=False)
+class MatchedNet:
+    """A layout and its net, with the rod ends that lie at the points where rods should end.
+
+    Parameters
+    ----------
+    anchor : x, y of the point under the layout's middle [m].
+    """
 
     layout: GridLayout
     anchor: Point
     net: ChebyshevNet
-    met: tuple[Met, ...]
+    matched: tuple[MatchedEnd, ...]
 
 
 @dataclass
@@ -83,29 +96,40 @@ class _Line:
 
 
 def match_net(
-    target: Target, layout: GridLayout, anchor: Point, wanted: Wanted, *, eccentricity: float = 0.0
-) -> Matched:
-    """Choose the lines of a layout such that its rods end at the points wanted, one at each; some may stay alone."""
+    target: Target, layout: GridLayout, anchor: Point, goals: EndGoals, *, eccentricity: float = 0.0
+) -> MatchedNet:
+    """Choose the lines of a layout such that its rods end at the goals, one at each; some goals may stay without.
+
+    Parameters
+    ----------
+    anchor : x, y of the point of the target under the layout's middle [m].
+    eccentricity : distance of the layers of families u and v [m].
+
+    Raises
+    ------
+    NetLimitError : no net covers the target from this anchor and heading.
+    """
     net = chebyshev_net(target, layout, anchor=anchor, eccentricity=eccentricity)
-    place, inside = _coordinates(net, wanted.points), inside_nodes(target, net.net)
-    family = np.full(len(place), -1)
-    for row in wanted.rows:
-        known = row[np.isfinite(place[row, 0])]
-        price = np.array([[_price(net, inside, place, k, which, wanted) for which in (0, 1)] for k in known])
-        family[known] = choose_families(place[known], wanted.points[known], price.reshape(-1, 2), layout.spacing)
-    lines = _through(place, family, layout.spacing)
-    met = list[Met]()
+    uv, inside = _coordinates(net, goals.points), inside_nodes(target, net.net)
+    family = np.full(len(uv), -1)
+    for row in goals.rows:
+        known = row[np.isfinite(uv[row, 0])]
+        price = np.array([[_price(net, inside, uv, k, axis, goals) for axis in (0, 1)] for k in known])
+        family[known] = choose_families(uv[known], goals.points[known], price.reshape(-1, 2), layout.spacing)
+    lines = _lines_through(uv, family, layout.spacing)
+    matched = list[MatchedEnd]()
     for _ in range(ROUNDS):
-        shift = _onto_lines(lines, layout.spacing)
+        shift = _shift_onto_lines(lines, layout.spacing)
         if np.any(shift):
             x, y, _ = interpolated(net.net, shift[:1], shift[1:])[0, 0].tolist()
             anchor = (x, y)
         laid = replace(layout, lines=(_filled(lines, 0, layout.spacing), _filled(lines, 1, layout.spacing)))
         net = chebyshev_net(target, laid, anchor=anchor, near=net, eccentricity=eccentricity)
-        met, moved = _corrected(net, lines, wanted.points)
+        matched, moved = _corrected(net, lines, goals.points)
         if moved < SETTLED * target.size:
             break
-    return Matched(laid, anchor, net, tuple(one for one in met if one.off < THERE * min(layout.spacing)))
+    close = tuple(end for end in matched if end.distance < THERE * min(layout.spacing))
+    return MatchedNet(laid, anchor, net, close)
 
 
 def _coordinates(net: ChebyshevNet, points: Floats) -> Floats:
@@ -122,15 +146,15 @@ def _coordinates(net: ChebyshevNet, points: Floats) -> Floats:
     return result
 
 
-def _steps(net: ChebyshevNet, nodes: Ints, by: Floats) -> Floats:
-    """(n, 2) steps of u, v that move a net's nodes (n, 2) by `by` (n, 3) [m], within the surface."""
+def _steps(net: ChebyshevNet, nodes: Ints, displacement: Floats) -> Floats:
+    """(n, 2) steps of u, v that move a net's nodes (n, 2) by a displacement (n, 3) [m], within the surface."""
     grid = net.net
     along = np.empty((len(nodes), 3, 2))
     for axis, knots in enumerate((grid.u, grid.v)):
         ends = []
-        for way in (-1, 1):
+        for step in (-1, 1):
             there = nodes.copy()
-            there[:, axis] = np.clip(nodes[:, axis] + way, 0, len(knots) - 1)
+            there[:, axis] = np.clip(nodes[:, axis] + step, 0, len(knots) - 1)
             lost = ~np.isfinite(grid.points[there[:, 0], there[:, 1], 0])
             there[lost] = nodes[lost]
             ends.append(there)
@@ -139,14 +163,14 @@ def _steps(net: ChebyshevNet, nodes: Ints, by: Floats) -> Floats:
         chord = grid.points[high[:, 0], high[:, 1]] - grid.points[low[:, 0], low[:, 1]]
         along[:, :, axis] = chord / np.maximum(run, 1e-300)[:, None]
     square = np.einsum("nik,nil->nkl", along, along)
-    return np.asarray(np.linalg.solve(square, np.einsum("nik,ni->nk", along, by)[..., None])[..., 0])
+    return np.asarray(np.linalg.solve(square, np.einsum("nik,ni->nk", along, displacement)[..., None])[..., 0])
 
 
-def _price(net: ChebyshevNet, inside: Bools, place: Floats, k: int, family: int, wanted: Wanted) -> float:
-    """What the rod of a family through point k costs: little where it is the mirror image of the one that it meets, for
-    then both are short or both are long; infinitely much where it would end on a held seam again, at no other point.
+def _price(net: ChebyshevNet, inside: Bools, uv: Floats, k: int, family: int, goals: EndGoals) -> float:
+    """Cost of the rod of a family through point k: small where it is the mirror image of the one that it meets, since
+    then both are short or both are long; infinite where it would end on such a seam again, at no other point.
     """
-    at, offset, across = place[k, family], place[k, 1 - family], 1 - family
+    at, offset, across = uv[k, family], uv[k, 1 - family], 1 - family
     knots, lines = (net.net.u, net.net.v) if family == 0 else (net.net.v, net.net.u)
     line = int(np.argmin(np.abs(lines - offset)))
     mask, points = (inside[:, line], net.net.points[:, line]) if family == 0 else (inside[line], net.net.points[line])
@@ -157,32 +181,35 @@ def _price(net: ChebyshevNet, inside: Bools, place: Floats, k: int, family: int,
         return np.inf
     run, side = np.unravel_index(np.argmin(away), away.shape)
     other = int(runs[run, 1 - side])
-    if wanted.held(points[[other]])[0]:
-        partners = np.abs(place[:, across] - offset) < SAME * net.layout.spacing[family]
-        partners &= np.abs(place[:, family] - knots[other]) < NEAR * net.layout.spacing[across]
-        if not np.any(partners & (np.arange(len(place)) != k)):
+    if goals.on_seam(points[[other]])[0]:
+        partners = np.abs(uv[:, across] - offset) < SAME * net.layout.spacing[family]
+        partners &= np.abs(uv[:, family] - knots[other]) < NEAR * net.layout.spacing[across]
+        if not np.any(partners & (np.arange(len(uv)) != k)):
             return np.inf
     step = np.eye(2)[family] * net.layout.edge / 2
-    low, high = (interpolated(net.net, uv[:1], uv[1:])[0, 0] for uv in (place[k] - step, place[k] + step))
-    cosine = (high - low) @ wanted.like[k] / np.linalg.norm(high - low)
+    low, high = (interpolated(net.net, there[:1], there[1:])[0, 0] for there in (uv[k] - step, uv[k] + step))
+    cosine = (high - low) @ goals.tangents[k] / np.linalg.norm(high - low)
     return float(UNLIKE * (1.0 - cosine**2))
 
 
-def _through(place: Floats, family: Ints, spacing: tuple[float, float]) -> list[_Line]:
+def _lines_through(uv: Floats, family: Ints, spacing: tuple[float, float]) -> list[_Line]:
     """The lines of the chosen families through the points; nearly equal offsets are one line."""
     lines = list[_Line]()
-    for which in (0, 1):
-        mine = np.flatnonzero(family == which)
-        ordered = mine[np.argsort(place[mine, 1 - which])]
-        offsets = place[ordered, 1 - which]
-        for group in np.split(np.arange(len(mine)), np.flatnonzero(np.diff(offsets) > SAME * spacing[which]) + 1):
+    for axis in (0, 1):
+        chosen = np.flatnonzero(family == axis)
+        ordered = chosen[np.argsort(uv[chosen, 1 - axis])]
+        offsets = uv[ordered, 1 - axis]
+        for group in np.split(np.arange(len(chosen)), np.flatnonzero(np.diff(offsets) > SAME * spacing[axis]) + 1):
             if len(group):
-                lines.append(_Line(which, float(offsets[group].mean()), ordered[group].tolist()))
+                lines.append(_Line(axis, float(offsets[group].mean()), ordered[group].tolist()))
     return lines
 
 
-def _onto_lines(lines: list[_Line], spacing: tuple[float, float]) -> Floats:
-    """(2,) by which the anchor moves in u, v so that axes that all but lie on lines do; the lines' offsets follow."""
+def _shift_onto_lines(lines: list[_Line], spacing: tuple[float, float]) -> Floats:
+    """(2,) step of the anchor in u, v [m] by which axes that nearly lie on lines come to lie on them.
+
+    The lines' offsets are changed with it.
+    """
     shift = np.zeros(2)
     for family in (0, 1):
         nearest = min((line.offset for line in lines if line.family == family), key=abs, default=np.inf)
@@ -194,7 +221,7 @@ def _onto_lines(lines: list[_Line], spacing: tuple[float, float]) -> Floats:
 
 
 def _filled(lines: list[_Line], family: int, spacing: tuple[float, float]) -> tuple[float, ...]:
-    """Ascending offsets of the lines of a family, with evenly spread ones between where they lie too far apart."""
+    """Ascending offsets of the lines of a family [m], with evenly spread ones in gaps that are too wide."""
     offsets = sorted({line.offset for line in lines if line.family == family})
     if not offsets:
         return ()
@@ -206,26 +233,26 @@ def _filled(lines: list[_Line], family: int, spacing: tuple[float, float]) -> tu
     return tuple(result)
 
 
-def _corrected(net: ChebyshevNet, lines: list[_Line], points: Floats) -> tuple[list[Met], float]:
-    """The rod ends at the points, and by how much at most the lines were moved then, to end there [m]."""
-    met, most = list[Met](), 0.0
+def _corrected(net: ChebyshevNet, lines: list[_Line], points: Floats) -> tuple[list[MatchedEnd], float]:
+    """Move the lines such that they end at the points: the rod ends before that, and the largest move [m]."""
+    matched, most = list[MatchedEnd](), 0.0
     for line in lines:
         family = FAMILIES[line.family]
         rods = [rod for rod in net.rods if rod.family == family and abs(rod.offset - line.offset) < 1e-12]
-        ends, places = rod_ends(net, rods), [place for rod in rods for place in (rod.start, rod.end)]
+        ends, stations = rod_ends(net, rods), [s for rod in rods for s in (rod.start, rod.end)]
         steps = list[float]()
         for k in line.points if rods else ():
             away = np.linalg.norm(ends - points[k], axis=1)
             end = int(np.argmin(away))
             if away[end] < NEAR * min(net.layout.spacing):
-                met.append(Met(k, rods[end // 2].name, end % 2, float(away[end])))
-                place = (places[end], line.offset) if line.family == 0 else (line.offset, places[end])
-                node = [np.argmin(np.abs(knots - at)) for knots, at in zip((net.net.u, net.net.v), place, strict=True)]
+                matched.append(MatchedEnd(k, rods[end // 2].name, end % 2, float(away[end])))
+                uv = (stations[end], line.offset) if line.family == 0 else (line.offset, stations[end])
+                node = [np.argmin(np.abs(knots - at)) for knots, at in zip((net.net.u, net.net.v), uv, strict=True)]
                 steps.append(float(_steps(net, np.array([node]), points[[k]] - ends[end])[0, 1 - line.family]))
         if steps:
             line.offset += float(np.mean(steps))
             most = max(most, abs(float(np.mean(steps))))
-    return met, most
+    return matched, most
 
 
 def rod_ends(net: ChebyshevNet, rods: Sequence[FlatRod]) -> Floats:

@@ -1,9 +1,9 @@
 """The gravity drape: static equilibrium of the user's rods under their weight, in unilateral contact.
 
-From the flat grid, on nested meshes. One joint, the anchor, is held in x and y, and a neighbour keeps its
-heading: without friction the draped grid would else slide or turn off at once. Even so the state may be a
-saddle; the negative modes of its exact Hessian say so (numerics.md, section 4). Stretch makes its footprint
-fall short of the inextensible net: that is physics, and grows with the weight over the stretch stiffness.
+From the flat grid, on nested meshes. One joint, the anchor, is held in x and y, and a neighbour keeps its heading:
+otherwise the draped grid would slide or turn off at once without friction. Even so the state may be a saddle; the
+negative modes of its exact Hessian show it. Stretch makes its footprint fall short of the inextensible net: that is
+physics, and grows with the weight over the stretch stiffness (docs/theory.md, The gravity drape).
 """
 
 from collections.abc import Callable
@@ -13,16 +13,10 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.contact.unilateral import UnilateralContact
-from rodshell.formfinding.draped import (
-    Draped,
-    DrapeFigures,
-    laid_in_layers,
-    middle_surface,
-    node_normals,
-    smallest_joint_angle,
-)
+from rodshell.formfinding.draped import Draped, DrapeFigures, smallest_joint_angle
+from rodshell.formfinding.initial_placement import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
+from rodshell.formfinding.layers import middle_surface, node_normals, place_in_layers
 from rodshell.formfinding.methods import Gravity
-from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout, GridMesh, mesh_grid
@@ -50,24 +44,35 @@ def gravity_drape(
     joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
-    """Let `layout` fall on `target`; see `drape`."""
-    gravity, top = method.acceleration, standing_point(target, anchor)
-    grid = falling_grid(target, layout, anchor)
+    """Hang a layout on a target at rest; see `drape`.
+
+    Parameters
+    ----------
+    method : the acceleration of gravity.
+    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+
+    Raises
+    ------
+    InputError : the anchor lies outside the target.
+    """
+    top = anchor_point(target, anchor)
+    grid = initial_grid(target, layout, anchor)
     mesh: GridMesh | None = None
     state: Floats | None = None
-    levels, apart = list[SolveReport](), joint.eccentricity if joint else 0.0
+    levels, eccentricity = list[SolveReport](), joint.eccentricity if joint else 0.0
     edges = _edges(layout)
     for edge in edges:
-        coarse, mesh = mesh, mesh_grid(grid, edge, marks=middle_marks(grid, layout))
-        start = over(mesh, layout, top) if coarse is None or state is None else coarse.prolong(state, mesh)
+        coarse, mesh = mesh, mesh_grid(grid, edge, marks=middle_marks(grid))
+        start = placed_over(mesh, layout, top) if coarse is None or state is None else coarse.prolong(state, mesh)
         name = f"level {len(levels) + 1} of {len(edges)}"
         shell = Shell.of(mesh, rod, joint=joint)
         normals = node_normals(mesh, start) if shell.angles else None
-        if apart and normals is not None:
-            _, start, normals = laid_in_layers(mesh, start, normals, apart)
-        found, contact = _settle(
-            target, layout, rod, shell, start, normals, top, gravity, len(levels) == 0, name, progress
-        )
+        if eccentricity and normals is not None:
+            _, start, normals = place_in_layers(mesh, start, normals, eccentricity)
+        found, contact = _equilibrium(
+            target, layout, rod, shell, start, normals, top,
+            gravity=method.acceleration, cold=not levels, level=name, progress=progress,
+        )  # fmt: skip
         levels.append(found.report)
         state = middle_surface(mesh, shell.mesh, shell.positions(found.state))
         if not found.report.converged:
@@ -80,7 +85,7 @@ def gravity_drape(
     if levels[-1].status is Status.CONVERGED and levels[-1].negative_modes:
         warnings.append(
             f"the draped state is a saddle or near one ({levels[-1].negative_modes} negative modes): without friction "
-            'the grid would slide off; method "bound" does not depend on this'
+            'the grid would slide off; the drape by method "bound" does not depend on this'
         )
     figures = DrapeFigures(
         max_gap=float(max(0.0, -target.contact(state).distance.min())),
@@ -94,7 +99,7 @@ def gravity_drape(
         layout=layout,
         rod=rod,
         anchor=anchor,
-        eccentricity=apart,
+        eccentricity=eccentricity,
         mesh=mesh,
         positions=state,
         rods=grid.rods,
@@ -127,7 +132,7 @@ def _held(shell: Shell, layout: GridLayout) -> Freedom:
     return free.with_directions(np.array([neighbour]), (along[0], along[1], 0.0), (0.0, 0.0, 1.0))
 
 
-def _settle(
+def _equilibrium(
     target: Target,
     layout: GridLayout,
     rod: Rod,
@@ -135,12 +140,18 @@ def _settle(
     start: Floats,
     normals: Floats | None,
     top: Floats,
+    *,
     gravity: float,
     cold: bool,
-    name: str,
+    level: str,
     progress: Progress,
 ) -> tuple[Equilibrium, UnilateralContact]:
-    """Equilibrium on one mesh: Newton's method for given contact multipliers, which are then updated."""
+    """Equilibrium on one mesh: Newton's method for given contact multipliers, which are then updated.
+
+    start, normals : (n, 3) positions of the shell's nodes [m], and normals there where rods have directors.
+    top : (3,) the point under the layout's middle [m].
+    cold : whether the start is the flat grid.
+    """
     mesh = shell.mesh
     nodes = np.arange(shell.node_count)
     load = np.zeros((len(shell.like), 3))
@@ -162,7 +173,7 @@ def _settle(
             forces,
             descend=update == 0,
             most_iterations=most,
-            progress=_telling(progress, f"gravity, {name}, contact {update + 1} of at most {CONTACT_UPDATES}", most),
+            progress=_reporting(progress, f"gravity, {level}, contact {update + 1} of at most {CONTACT_UPDATES}", most),
         )
         state, forces = found.state, found.forces
         reports.append(found.report)
@@ -173,11 +184,11 @@ def _settle(
     status = found.report.status
     if found.report.converged and depth >= DEPTH * target.size:
         status = Status.STALLED
-    if not found.report.reason and slid_off(mesh, shell.positions(state), layout, top, target):
+    if not found.report.reason and lost_contact(mesh, shell.positions(state), layout, top, target):
         status = Status.SLID_OFF
     report = replace(found.report.after(*reports[:-1]), status=status)
     return replace(found, report=report), contact
 
 
-def _telling(progress: Progress, where: str, most: int) -> Callable[[int, float], None]:
+def _reporting(progress: Progress, where: str, most: int) -> Callable[[int, float], None]:
     return lambda iteration, step: progress("drape", f"{where}, iteration {iteration} of at most {most}", step)

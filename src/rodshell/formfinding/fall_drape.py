@@ -1,6 +1,6 @@
-"""The paper's drape: the grid falls on the target in time and comes to rest there [HQK section 3].
+"""The fall drape, which is the paper's: the grid falls on the target in time and comes to rest there [HQK section 3].
 
-Implicit Euler, the rods tied as the coupling says, contact by modified masses (`contact.modified_mass`). Nothing is
+Implicit Euler, the rods tied by the coupling, contact by modified masses (`contact.modified_mass`). Nothing is
 anchored: without friction the draped state is unstable sideways, and it is reached because the fall is symmetric, or
 because touching nodes that are stopped at each step creep. How fast it would slide off is part of the result.
 """
@@ -13,12 +13,12 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
-from rodshell.formfinding.calming import calming
-from rodshell.formfinding.draped import Draped, DrapeFigures, middle_surface, smallest_joint_angle
+from rodshell.formfinding.draped import Draped, DrapeFigures, smallest_joint_angle
+from rodshell.formfinding.initial_placement import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
+from rodshell.formfinding.layers import middle_surface
 from rodshell.formfinding.methods import Fall
-from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.rest import Rest, held_back, joint_gap, lowest_modes, out_of_balance
+from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
 from rodshell.geometry.vectors import dot
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
@@ -39,13 +39,13 @@ BALANCED = 1e-3  # out-of-balance force on a node, of the weight of the heaviest
 USUAL_STEP = 0.01  # [s] on a target of 0.2 m; times go with the square root of lengths
 USUAL_DURATION = 6.0
 USUAL_SIZE = 0.2  # [m]
-OF_LIMIT = 0.9  # share of the step that is taken of what explicit ties bear whatever touches
+OF_LIMIT = 0.9  # share of the stability limit of explicit ties, whatever touches, that is taken as time step
 UNSTABLE = -1e-3  # [1/s2]: the free turn about the vertical has 0 up to round-off
-CHECKS = 10  # moments between two looks at the rest
-LIMITS = 4  # looks at the rest between two at the step limit
+CHECKS = 10  # steps between two checks whether it is at rest
+LIMITS = 4  # such checks between two of the step limit
 
 
-def falling_drape(
+def fall_drape(
     target: Target,
     layout: GridLayout,
     rod: Rod,
@@ -55,28 +55,34 @@ def falling_drape(
     joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
-    """Let `layout` fall on `target` in time; see `drape`.
+    """Let a layout fall on a target in time; see `drape`.
+
+    Parameters
+    ----------
+    fall : height, time stepping, coupling, impacts, friction and drag.
+    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
 
     Raises
     ------
-    StabilityError : the time step is beyond the limit of explicit ties, at the start or where the grid has landed.
-    ConvergenceError : the first step fails however small. A later one ends the fall, which is then not at rest.
+    InputError : the anchor lies outside the target.
+    StabilityError : the time step is beyond the stability limit of explicit ties, at the start or after landing.
+    ConvergenceError : the first step fails, however small. A later one ends the fall, which is then not at rest.
     """
-    top = standing_point(target, anchor)
-    grid = falling_grid(target, layout, anchor)
-    mesh = mesh_grid(grid, layout.edge, marks=middle_marks(grid, layout))
+    top = anchor_point(target, anchor)
+    grid = initial_grid(target, layout, anchor)
+    mesh = mesh_grid(grid, layout.edge, marks=middle_marks(grid))
     shell = Shell.of(mesh, rod, joint=joint, coupling=fall.coupling)
-    falling = _Falling(target, shell, fall, progress)
-    series = falling.run(over(shell.mesh, layout, top + [0.0, 0.0, fall.height]))
-    rest, report = falling.outcome(series)
+    simulation = _FallSimulation(target, shell, fall, progress)
+    series = simulation.run(placed_over(shell.mesh, layout, top + [0.0, 0.0, fall.height]))
+    rest, report = simulation.outcome(series)
     assert series.last is not None
     positions = middle_surface(mesh, shell.mesh, shell.positions(series.last.state))
-    if not report.reason and slid_off(mesh, positions, layout, top, target):
+    if not report.reason and lost_contact(mesh, positions, layout, top, target):
         report = replace(report, status=Status.SLID_OFF)
     angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
     figures = DrapeFigures(
         max_gap=float(max(0.0, -target.contact(positions).distance.min())),
-        contact_pulls=falling.pulls(series.last),
+        contact_pulls=simulation.contact_pulls(series.last),
         min_angle=angle,
         min_angle_at=where,
     )
@@ -93,15 +99,15 @@ def falling_drape(
         levels=(report,),
         figures=figures,
         rest=rest,
-        warnings=_warnings(rest, series, falling),
+        warnings=_warnings(rest, series, simulation),
     )
 
 
-class _Falling:
-    """The motion, and what is asked of it on the way and at its end."""
+class _FallSimulation:
+    """A fall, with the checks that are made during it and at its end."""
 
     def __init__(self, target: Target, shell: Shell, fall: Fall, progress: Progress) -> None:
-        massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # linkers' own nodes, too: they fall and land
+        massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # also the linkers' nodes, which fall and land
         every = len(massive) == len(shell.like)  # a slice is faster
         pull = GravityForce(slice(None) if every else massive, (0.0, 0.0, -fall.acceleration))
         self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
@@ -113,10 +119,11 @@ class _Falling:
         self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.places))
         self._ties: ExplicitTies | None = None
         self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
-        self._late = ""
-        self._seen = list[tuple[float, float]]()  # times [s] and kinetic energies [J]
+        self._out_of_time = ""
+        self._energies = list[tuple[float, float]]()  # times [s] and kinetic energies [J]
 
     def run(self, positions: Floats) -> TimeSeries:
+        """The fall from these positions (n, 3) of the shell's nodes [m]."""
         fall = self.fall
         normals = np.tile([0.0, 0.0, 1.0], (len(positions), 1)) if self.shell.angles else None
         state = self.shell.state(positions, normals=normals)
@@ -133,7 +140,7 @@ class _Falling:
                 every=fall.every if fall.stream else never,
                 stream=fall.stream,
                 stepper=self.stepper,
-                stop=self._looking(),
+                stop=self._stop_check(),
             )
         except ConvergenceError as error:
             if self.stepper.last is None:  # not one step was taken
@@ -141,19 +148,19 @@ class _Falling:
             return error.report  # type: ignore[return-value]
 
     def _safe_step(self, state: Floats) -> float:
-        """A step [s] that explicit ties bear whatever touches: without help of the rods, all nodes stopped.
+        """A step [s] below the stability limit of explicit ties, whatever touches: without rods, all nodes stopped.
 
-        Rods under compression, whose stiffness is negative, can lower it for a moment; the share leaves room for that.
+        Rods under compression, whose stiffness is negative, can lower the limit temporarily: the margin allows for it.
         """
         alone = replace(self.motion, elements=())
         return OF_LIMIT * step_limit(alone, state, stopped=self._stopped(np.arange(len(state))))
 
     def _stopped(self, touching: Ints) -> Ints:
-        """Of nodes that touch, those that lose their whole velocity at each step."""
+        """The touching nodes that lose their whole velocity at each step."""
         return touching if self._law.stops_wholly else NO_NODES
 
     def _refuse_unstable(self, moment: Moment) -> None:
-        """Raise StabilityError where the explicit ties do not bear the step with what touches now."""
+        """Raise StabilityError where the step is beyond the limit of explicit ties with the nodes that touch now."""
         free = self.touching.freedom(moment.state)
         if self._ties is None:
             self._ties = ExplicitTies(moment.motion, free)
@@ -165,11 +172,11 @@ class _Falling:
                 f"{self._ties.limit():.4g} s: {REMEDY}"
             )
 
-    def _looking(self) -> Callable[[Moment], bool]:
-        """Asked at each step: tells where it is, and from time to time whether it rests."""
+    def _stop_check(self) -> Callable[[Moment], bool]:
+        """Called after each step: reports progress, and from time to time checks whether the grid is at rest."""
         count = 0
 
-        def look(moment: Moment) -> bool:
+        def stop(moment: Moment) -> bool:
             nonlocal count
             count += 1
             if count % CHECKS:
@@ -177,16 +184,16 @@ class _Falling:
             if self.fall.time_step and moment.motion.explicit and count % (LIMITS * CHECKS) == 0:
                 self._refuse_unstable(moment)
             energy, force = self.activity(moment)
-            self._seen.append((moment.time, energy))
+            self._energies.append((moment.time, energy))
             where = f"falling, {100 * moment.time / self._duration:.0f} % of {self._duration:.3g} s"
             try:
                 self._progress("drape", f"{where}, kinetic energy {energy:.1e} J", force)
-            except OutOfTimeError as late:
-                self._late = str(late)
+            except OutOfTimeError as error:
+                self._out_of_time = str(error)
                 return True
             return self.fall.settle and self.rests(energy, force)
 
-        return look
+        return stop
 
     @property
     def touching(self) -> Touching:
@@ -196,22 +203,25 @@ class _Falling:
     def activity(self, moment: Moment) -> tuple[float, float]:
         """Kinetic energy [J] and largest out-of-balance force [N]."""
         energy = moment.motion.kinetic_energy(moment.velocity)
-        return energy, held_back(moment.motion, moment.state, self.load, self.touching)
+        return energy, unbalanced_force(moment.motion, moment.state, self.load, self.touching)
 
     def rests(self, energy: float, force: float) -> bool:
+        """Whether this kinetic energy [J] and out-of-balance force [N] count as rest."""
         return energy < STILL * self._weight * self.target.size and force < BALANCED * self._heaviest
 
-    def remedy(self, rest: Rest) -> str:
-        """A drag and a duration that would do, from the energy that there was and from its decay."""
+    def advice(self, rest: Rest) -> str:
+        """A drag and a duration that would bring the grid to rest, from the kinetic energy and its decay."""
         usual, still = USUAL_DURATION * self._slowness, STILL * self._weight * self.target.size
-        return calming(self._seen, still, rest.force_residual / (BALANCED * self._heaviest), usual, self.fall.drag)
+        force = rest.force_residual / (BALANCED * self._heaviest)
+        return rest_advice(self._energies, still, force, usual, self.fall.drag)
 
-    def pulls(self, last: Moment) -> int:
-        """Nodes in contact that the target would have to pull."""
+    def contact_pulls(self, last: Moment) -> int:
+        """Number of touching nodes that the target would have to pull."""
         push = out_of_balance(last.motion, last.state, self.load)[self.touching.nodes]
         return int(np.count_nonzero(dot(push, self.touching.normals) < 0))
 
     def outcome(self, series: TimeSeries) -> tuple[Rest, SolveReport]:
+        """How the fall ended."""
         last, done = series.last, series.report
         assert last is not None
         assert done is not None
@@ -221,7 +231,7 @@ class _Falling:
         gap = joint_gap(self.shell, last.state)
         rest = Rest(resting, last.time, energy, force, gap, growth, done.steps, done.refused_steps)
         strain = float(np.abs(self.shell.stretch.strains(last.state)).max())
-        status = Status.OUT_OF_TIME if self._late else Status.MOVING
+        status = Status.OUT_OF_TIME if self._out_of_time else Status.MOVING
         report = SolveReport(
             Status.CONVERGED if resting else status,
             self.shell.freedom().size,
@@ -231,21 +241,21 @@ class _Falling:
             force,
             strain,
             sum(s < UNSTABLE for s in growth),
-            "" if resting else self._late,
+            "" if resting else self._out_of_time,
         )
         return rest, report
 
 
-def _warnings(rest: Rest, series: TimeSeries, falling: _Falling) -> tuple[str, ...]:
+def _warnings(rest: Rest, series: TimeSeries, simulation: _FallSimulation) -> tuple[str, ...]:
     if series.report is not None and series.report.end is End.STALLED:
         return (
-            f"the fall could not go on at t = {rest.time:.4g} s however small its steps ({series.report.reason}); "
-            "use a shorter edge, or softer or shared joints",
+            f"the fall ended at t = {rest.time:.4g} s, where no time step converged, however small "
+            f"({series.report.reason}); use a shorter edge, or softer or shared joints",
         )
     if not rest.at_rest:
         return (
             f"the grid is NOT AT REST after {rest.time:.3g} s: kinetic energy {rest.kinetic_energy:.1e} J, "
-            f"out-of-balance force {rest.force_residual:.1e} N; give it {falling.remedy(rest)}",
+            f"out-of-balance force {rest.force_residual:.1e} N; give it {simulation.advice(rest)}",
         )
     if rest.fastest_growth:
         count = sum(s < UNSTABLE for s in rest.growth)
