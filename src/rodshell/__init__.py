@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         Draped,
         Fall,
         Footprint,
-        Popped,
+        PopUp,
         Trimmed,
         agreement,
         drape,
@@ -65,11 +65,10 @@ if TYPE_CHECKING:
     from rodshell.output.takeaway import DrawingStyle, Takeaway
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
-    from rodshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
+    from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.rod_statics import RodShape, solve_rod
-    from rodshell.solve.simulate import simulate
-    from rodshell.solve.time_series import Moment, TimeSeries
+    from rodshell.solve.simulate import Sample, TimeSeries, simulate
     from rodshell.targets import (
         Cap,
         Disc,
@@ -93,7 +92,7 @@ _HOMES = {
     "rodshell.fabrication": ("Fabrication",),
     "rodshell.form": ("Form", "PoppedUp", "Sewn", "find_form", "pop_up_table", "sew"),
     "rodshell.formfinding": (
-        "Agreement", "Boundary", "Draped", "Fall", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
+        "Agreement", "Boundary", "Draped", "Fall", "Footprint", "PopUp", "Trimmed", "agreement", "drape", "map_back",
         "pop_up", "trim",
     ),
     "rodshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
@@ -110,10 +109,9 @@ _HOMES = {
     "rodshell.output.archive": ("Archive", "read"),
     "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
     "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
-    "rodshell.solve.forces": ("Damping", "ExplicitForce", "Gravity", "ImplicitForce", "PointLoads"),
+    "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
-    "rodshell.solve.simulate": ("simulate",),
-    "rodshell.solve.time_series": ("Moment", "TimeSeries"),
+    "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
@@ -124,15 +122,15 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "Agreement", "Archive", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
     "Disc", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
-    "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity",
+    "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "GravityForce",
     "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
-    "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutOfTimeError",
-    "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle",
-    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn", "SharedDofs", "Shell",
-    "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net",
-    "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table",
-    "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from",
-    "trim",
+    "ImplicitPenalty", "InputError", "Linker", "Material", "Motion", "NetLimitError", "OutOfTimeError",
+    "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "PopUp", "PoppedUp", "Rectangle",
+    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sample", "Sewn", "SharedDofs",
+    "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement",
+    "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time",
+    "pop_up_table", "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods",
+    "surface_from", "trim",
 ]  # fmt: skip
 
 

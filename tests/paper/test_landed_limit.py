@@ -12,11 +12,10 @@ from rodshell.formfinding.fall import Fall
 from rodshell.joints import ExplicitPenalty, Ties
 from rodshell.layout import mesh_grid
 from rodshell.model import Freedom, Shell
-from rodshell.solve.constraint import Supports
-from rodshell.solve.contact_euler import ContactEuler
-from rodshell.solve.forces import Gravity
-from rodshell.solve.implicit_euler import Motion, Step
-from rodshell.solve.step_limit import step_limit
+from rodshell.solve.forces import GravityForce
+from rodshell.solve.implicit_euler import ContactEuler, Motion, Step
+from rodshell.solve.linear_stability import step_limit
+from rodshell.solve.problem import Supports
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, coarse_layout, slope
 
 C = 3.0  # N/m
@@ -27,7 +26,7 @@ APART = 1e-4  # m
 def tied(free: Freedom, weighing: np.ndarray) -> Motion:
     """Two nodes on a table, tied explicitly; those that weigh rest on it at every step."""
     ties = Ties(np.array([[0, 1]]), np.array([C]))
-    return Motion((), np.full((2, 3), MASS), Supports(free), (Gravity(weighing),), (ties,))
+    return Motion((), np.full((2, 3), MASS), Supports(free), (GravityForce(weighing),), (ties,))
 
 
 def swing(motion: Motion, step: float, steps: int = 50) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Is it safe to build: bending and stress, reactions and their balance, the way up from flat, its own weight."""
 
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures
-from rodshell.checks.check import Checks, check, settled_shell
+from rodshell.checks.check import Checks, check
 from rodshell.checks.contact import Contact, contact_of
 from rodshell.checks.deployment import Deployment, Elsewhere, deploy
 from rodshell.checks.joint_loads import JointLoads, joint_loads
@@ -30,5 +30,4 @@ __all__ = [
     "other_shapes",
     "reactions",
     "self_weight",
-    "settled_shell",
 ]

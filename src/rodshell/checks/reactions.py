@@ -11,7 +11,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.model import Shell
-from rodshell.solve.mixed_newton import Equilibrium
+from rodshell.solve.equilibrium import Equilibrium
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,13 @@ class Reactions:
 
 
 def reactions(shell: Shell, found: Equilibrium) -> Reactions:
-    """Reactions of a shell without loads whose ends are held."""
+    """Reactions of a shell without loads whose ends are held.
+
+    Parameters
+    ----------
+    shell : with its source frames at the equilibrium.
+    found : the equilibrium; its gradient at the held ends is what the supports exert.
+    """
     state, gradient = found.state, found.gradient
     points = state[shell.ends]
     forces, moments = gradient[shell.ends], np.zeros_like(points)

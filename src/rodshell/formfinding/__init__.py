@@ -5,10 +5,10 @@ from rodshell.formfinding.drape import drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
 from rodshell.formfinding.pipeline import FoundForm, PoppedTable, find_stages, pop_up_stages
-from rodshell.formfinding.popup import Popped, pop_up
+from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, map_back, trim
 
 __all__ = [
-    "Agreement", "Boundary", "Draped", "Fall", "Footprint", "FoundForm", "Popped", "PoppedTable", "Trimmed",
+    "Agreement", "Boundary", "Draped", "Fall", "Footprint", "FoundForm", "PopUp", "PoppedTable", "Trimmed",
     "agreement", "drape", "find_stages", "map_back", "pop_up", "pop_up_stages", "trim",
 ]  # fmt: skip

@@ -24,14 +24,12 @@ from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.contact_euler import ContactEuler
-from rodshell.solve.forces import Damping, Gravity
-from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.forces import Damping, GravityForce
+from rodshell.solve.implicit_euler import ContactEuler, Motion
+from rodshell.solve.linear_stability import NO_NODES, REMEDY, ExplicitTies, step_limit
+from rodshell.solve.newton_matrix import narrow_or_dissected
 from rodshell.solve.report import SolveReport, Status
-from rodshell.solve.simulate import simulate
-from rodshell.solve.step_limit import NO_NODES, REMEDY, ExplicitTies, step_limit
-from rodshell.solve.summed import narrow_or_dissected
-from rodshell.solve.time_series import End, Moment, TimeSeries
+from rodshell.solve.simulate import End, Sample, TimeSeries, simulate
 from rodshell.targets import Target
 
 STILL = 1e-7  # kinetic energy, of weight times size
@@ -74,7 +72,7 @@ def falling_drape(
     assert series.last is not None
     positions = middle_surface(mesh, shell.mesh, shell.positions(series.last.state))
     if not report.reason and slid_off(mesh, positions, layout, top, target):
-        report = replace(report, status=Status.SLID_OFF)
+        report = replace(report, status=Status.LOST_CONTACT)
     angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
     return Draped(
         method="paper",
@@ -106,7 +104,7 @@ class _Falling:
     def __init__(self, target: Target, shell: Shell, gravity: float, fall: Fall, progress: Progress) -> None:
         massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # linkers' own nodes, too: they fall and land
         every = len(massive) == len(shell.like)  # a slice is faster
-        pull = Gravity(slice(None) if every else massive, (0.0, 0.0, -gravity))
+        pull = GravityForce(slice(None) if every else massive, (0.0, 0.0, -gravity))
         self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
         self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
         self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)
@@ -155,7 +153,7 @@ class _Falling:
         """Of nodes that touch, those that lose their whole velocity at each step."""
         return touching if self._law.stops_wholly else NO_NODES
 
-    def _refuse_unstable(self, moment: Moment) -> None:
+    def _refuse_unstable(self, moment: Sample) -> None:
         """Raise StabilityError where the explicit ties do not bear the step with what touches now."""
         free = self.touching.freedom(moment.state)
         if self._ties is None:
@@ -168,11 +166,11 @@ class _Falling:
                 f"{self._ties.limit():.4g} s: {REMEDY}"
             )
 
-    def _looking(self) -> Callable[[Moment], bool]:
+    def _looking(self) -> Callable[[Sample], bool]:
         """Asked at each step: tells where it is, and from time to time whether it rests."""
         count = 0
 
-        def look(moment: Moment) -> bool:
+        def look(moment: Sample) -> bool:
             nonlocal count
             count += 1
             if count % CHECKS:
@@ -196,7 +194,7 @@ class _Falling:
         assert self.stepper.last is not None
         return self.stepper.last  # type: ignore[return-value]
 
-    def activity(self, moment: Moment) -> tuple[float, float]:
+    def activity(self, moment: Sample) -> tuple[float, float]:
         """Kinetic energy [J] and largest out-of-balance force [N]."""
         energy = moment.motion.kinetic_energy(moment.velocity)
         return energy, held_back(moment.motion, moment.state, self.load, self.touching)
@@ -209,7 +207,7 @@ class _Falling:
         usual, still = USUAL_DURATION * self._slowness, STILL * self._weight * self.target.size
         return calming(self._seen, still, rest.force_residual / (BALANCED * self._heaviest), usual, self.fall.drag)
 
-    def pulls(self, last: Moment) -> int:
+    def pulls(self, last: Sample) -> int:
         """Nodes in contact that the target would have to pull."""
         push = out_of_balance(last.motion, last.state, self.load)[self.touching.nodes]
         return int(np.count_nonzero(dot(push, self.touching.normals) < 0))

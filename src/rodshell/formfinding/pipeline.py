@@ -13,7 +13,7 @@ from rodshell.formfinding.drape import Method, drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.fall import Fall
 from rodshell.formfinding.flatness import flat_warning
-from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
+from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.roll import roll
 from rodshell.formfinding.trim import (
@@ -57,7 +57,7 @@ class FoundForm:
     draped: Draped
     trimmed: Trimmed
     footprint: Footprint
-    popped: dict[Ends, Popped]
+    popped: dict[Ends, PopUp]
     agreement: dict[Ends, Agreement]
     ends: tuple[Ends, ...]
 
@@ -89,7 +89,7 @@ class PoppedTable:
     joint: Joint
     footprint: Footprint
     boundary: Boundary
-    popped: dict[Ends, Popped]
+    popped: dict[Ends, PopUp]
     dropped: tuple[tuple[str, str], ...]
 
     @property
@@ -131,7 +131,7 @@ def find_stages(
     )  # fmt: skip
     trimmed = cut(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
     footprint = map_back(trimmed)
-    popped, last = dict[Ends, Popped](), start.popped if start else {}
+    popped, last = dict[Ends, PopUp](), start.popped if start else {}
     for end in ends if draped.converged else ():
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
@@ -197,7 +197,7 @@ def _spans(grid: FlatGrid) -> float:
     return float(np.median(gaps)) if gaps else min(rod.length for rod in grid.rods)
 
 
-def _popped_status(popped: dict[Ends, Popped]) -> str:
+def _popped_status(popped: dict[Ends, PopUp]) -> str:
     for ends, shell in popped.items():
         if not shell.report.converged:
             return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
@@ -237,7 +237,7 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     )
 
 
-def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
     """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
     for ends, shell in popped.items():
         angles = roll(shell) if shell.report.converged else None

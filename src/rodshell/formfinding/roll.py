@@ -4,12 +4,12 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.formfinding.draped import node_normals
-from rodshell.formfinding.popup import Popped
+from rodshell.formfinding.popup import PopUp
 from rodshell.geometry.vectors import dot, unit
 from rodshell.rods.bend_twist import BendTwist
 
 
-def roll(popped: Popped) -> Floats | None:
+def roll(popped: PopUp) -> Floats | None:
     """(b,) angle [rad] of each bend of the mesh, from 0 to pi/2, between a rod's first material director and the
     shell's normal, both seen along the rod; None where rods have no directors, because they bend alike all ways."""
     shell, mesh = popped.shell, popped.shell.mesh

@@ -19,9 +19,8 @@ from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import NUDGE, Equilibrium, find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import NUDGE, Equilibrium, find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import SolveReport, Status
 from rodshell.solve.rod_supports import RodSupports, SupportPath, index_of
 from rodshell.validation import finite, vector

@@ -13,7 +13,7 @@ from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.model.elastic_rod import ElasticRod
 from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
-from rodshell.solve.constraint import Supports
+from rodshell.solve.problem import Supports
 from rodshell.validation import direction, finite, vector
 
 SPIN = (1.0, 0.0, 0.0)
