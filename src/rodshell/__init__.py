@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.rod_statics import RodShape, solve_rod
+    from rodshell.solve.rod_supports import RodLoads, RodSupports
     from rodshell.solve.simulate import Sample, TimeSeries, simulate
     from rodshell.targets import (
         Cap,
@@ -109,6 +110,7 @@ _HOMES = {
     "rodshell.output.archive": ("Archive", "read"),
     "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
     "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
+    "rodshell.solve.rod_supports": ("RodLoads", "RodSupports"),
     "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
     "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
@@ -124,13 +126,13 @@ __all__ = [
     "Disc", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
     "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "GravityForce",
     "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
-    "ImplicitPenalty", "InputError", "Linker", "Material", "Motion", "NetLimitError", "OutOfTimeError",
-    "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "PopUp", "PoppedUp", "Rectangle",
-    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sample", "Sewn", "SharedDofs",
-    "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement",
-    "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time",
-    "pop_up_table", "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods",
-    "surface_from", "trim",
+    "ImplicitPenalty", "InputError", "Linker", "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError",
+    "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "PopUp", "PoppedUp", "Rectangle",
+    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodLoads", "RodShape", "RodStrains", "RodSupports",
+    "Sample", "Sewn", "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries",
+    "Trimmed", "Tube", "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid",
+    "pop_up", "pop_up_in_time", "pop_up_table", "read", "sew", "simulate", "solve_rod", "sphere_net_end",
+    "sphere_net_rod", "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

@@ -17,8 +17,8 @@ from rodshell.checks.contact import (
     _Outline,
     contact,
     contact_of_patches,
-    joined_contact,
     nearest_points,
+    worst_contact,
 )
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.side_by_side import side_by_side as side_by_side_meshes
@@ -264,9 +264,9 @@ def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:
 
 def test_rods_of_patches_are_named_with_their_patch() -> None:
     near, far = Contact(0.01, 0, ("U1", "U2"), (0.0, 0.0, 0.0)), Contact(-0.01, 2, ("V3", "V4"), (1.0, 0.0, 0.0))
-    joined = joined_contact({"A": near, "B": far, "C": Contact()})
+    joined = worst_contact({"A": near, "B": far, "C": Contact()})
     assert joined == replace(far, rods=("B-V3", "B-V4"))
-    assert joined_contact({"A": Contact()}) == Contact()
+    assert worst_contact({"A": Contact()}) == Contact()
 
 
 def test_a_section_without_an_outline_is_not_judged() -> None:

@@ -8,8 +8,7 @@ import pytest
 from numpy.linalg import norm
 
 import rodshell as rs
-from rodshell.checks.joint_loads import joint_loads
-from rodshell.checks.reactions import reactions
+from rodshell.checks.support_and_joint_loads import joint_loads, reactions
 from rodshell.joints.crossings import Places
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports

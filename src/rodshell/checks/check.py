@@ -10,14 +10,14 @@ import numpy as np
 from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
 from rodshell.checks.contact import Contact, contact, contact_of
 from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
-from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
-from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
+from rodshell.checks.support_and_joint_loads import JointLoads, Reactions, joint_loads, reactions
 from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
-from rodshell.formfinding.popup import UP, Ends
+from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
+from rodshell.model.shell import UP
 from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
 from rodshell.solve.critical import MOST_FACTORIZATIONS

@@ -21,6 +21,7 @@ from rodshell.geometry.vectors import dot, unit
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, find_stable
 from rodshell.solve.path import follow
@@ -34,7 +35,6 @@ Start = Literal["draped", "flat"]
 ENDS: tuple[Ends, ...] = get_args(Ends)
 STARTS: tuple[Start, ...] = get_args(Start)
 
-UP = np.array([0.0, 0.0, 1.0])
 FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
 CLAMP_STEP = 0.25
 MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
