@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rodshell.case.from_objects import case_text
 from rodshell.checks import Checks, Contact, check
 from rodshell.checks.contact import contact_of_patches
-from rodshell.checks.joined import joined_checks
+from rodshell.checks.merge import merged_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import fabricate
 from rodshell.formfinding import Bound, FoundForm, Method, PoppedTable, find_stages, pop_up_stages
@@ -154,7 +154,7 @@ class Sewn(_Judged, SewnForm):
             )
         takeaway.require_known_stress(self.rod, self.joint)
         weight = takeaway.judged_by(self.rod).shear_weight
-        checks = joined_checks(
+        checks = merged_checks(
             {
                 name: check(
                     one.popped, self.rod,

@@ -230,6 +230,11 @@ def stress_text(pascals: float) -> str:
     return f"{float(f'{pascals / size:.3g}'):g} {name}"
 
 
+def percent_text(share: float) -> str:
+    """A share as a percentage: with two significant digits below 10 %, else in whole percents."""
+    return f"{100 * share:.0f} %" if share >= 0.095 else f"{100 * share:.2g} %"
+
+
 def _plain(value: Real) -> float:
     try:
         return float(value)

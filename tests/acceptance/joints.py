@@ -8,7 +8,7 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.paper.two_rods import Demonstration, run, run_statics
-from rodshell.solve.step_limit import step_limit
+from rodshell.solve.linear_stability import step_limit
 from tests.acceptance.rows import Row, print_table
 from tests.analytic import coupling_problems as couplings
 from tests.analytic import joint_problems as joints

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 from tests.analytic.joint_problems import (
     EI,
     JOINTS,

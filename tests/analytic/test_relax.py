@@ -10,9 +10,8 @@ from rodshell.model import Freedom
 from rodshell.rods.isotropic_bend import IsotropicBend
 from rodshell.rods.stretch import Stretch
 from rodshell.solve import relax as relax_module
-from rodshell.solve.constraint import Supports
 from rodshell.solve.implicit_euler import ImplicitEuler
-from rodshell.solve.problem import Problem
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.relax import relax
 
 PINNED, SLIDING, PLANE = ((), ((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))

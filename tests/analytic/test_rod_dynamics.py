@@ -13,11 +13,10 @@ import rodshell as rs
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.rods.round_bend_twist import RoundBendTwist
-from rodshell.solve.banded import Banded
-from rodshell.solve.constraint import Supports
 from rodshell.solve.implicit_euler import ImplicitEuler, Refused
-from rodshell.solve.simulate import _Grid
-from rodshell.solve.time_series import End
+from rodshell.solve.newton_matrix import Banded
+from rodshell.solve.problem import Supports
+from rodshell.solve.simulate import End, _Grid
 from tests.analytic.rod_motions import (
     G,
     angular_losses,

@@ -9,7 +9,7 @@ from rodshell.contact.modified_mass import ModifiedMass
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.summed import SparseSum
+from rodshell.solve.newton_matrix import SparseSum
 from rodshell.targets.domain import Domain, EllipseDomain
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, RADIUS, STEP, TARGETS, G, Particles, slope
 

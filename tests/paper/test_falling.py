@@ -18,7 +18,7 @@ from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.output.manifest import read_manifest
 from rodshell.solve.report import Status
-from rodshell.solve.time_series import TimeSeries
+from rodshell.solve.simulate import TimeSeries
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
 
 TENTH = 0.1e-3  # [m]

@@ -8,12 +8,10 @@ import pytest
 from numpy.linalg import norm
 
 import rodshell as rs
-from rodshell.checks.joint_loads import joint_loads
-from rodshell.checks.reactions import reactions
+from rodshell.checks.support_and_joint_loads import joint_loads, reactions
 from rodshell.joints.crossings import Places
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 SPACING = 0.05
@@ -48,7 +46,9 @@ def popped(name, ends="clamped", start="draped"):
 def settled(shell, state, forces):
     """One Newton step further, for forces to round-off."""
     supports = Supports(shell.held_ends())
-    return find_equilibrium(Problem(shell.elements, shell.stretch, supports, 0.2, places=shell.places), state, forces)
+    return find_equilibrium(
+        Problem(shell.elements, shell.stretch, supports, 0.2, flat_coordinates=shell.places), state, forces
+    )
 
 
 @every_joint

@@ -14,9 +14,8 @@ from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.vectors import unit
 from rodshell.nets.sphere import crossing_angle
 from rodshell.output.rods import joint_places
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import Status
 
 R, APART = 0.2, 4e-3
@@ -202,7 +201,9 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
     cut = rs.trim(draped)
     released = rs.Shell.of(cut.mesh, rod, joint=rs.Pin())
     state = released.state(cut.positions, normals=target.on_surface(cut.positions).normal)
-    problem = Problem(released.elements, released.stretch, Supports(released.held_ends()), 2.0, places=released.places)
+    problem = Problem(
+        released.elements, released.stretch, Supports(released.held_ends()), 2.0, flat_coordinates=released.places
+    )
     counted = find_equilibrium(problem, state, np.zeros(len(cut.mesh.edges)), most_modes=0)
     assert (counted.report.status is Status.BUCKLED) == buckles
 

@@ -17,6 +17,7 @@ from rodshell.output import read
 from rodshell.output.archive import json_text
 from rodshell.output.verdict import verdict
 from rodshell.solve.report import Status
+from tests.properties.altered import with_report
 
 SIZE = 0.2
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -48,7 +49,7 @@ def altered_pop_up(**changes):
 
     def pop_up(*arguments, **options):
         popped = rs.pop_up(*arguments, **options)
-        return replace(popped, report=replace(popped.report, **changes))
+        return with_report(popped, **changes)
 
     return pop_up
 
@@ -177,7 +178,7 @@ def test_a_layout_beside_the_target_is_refused():
 
 
 @pytest.mark.parametrize(("method", "status", "times"), [
-    (rs.Gravity(), Status.STALLED, 1), (rs.Bound(), Status.STALLED, 0), (rs.Gravity(), Status.SLID_OFF, 1)
+    (rs.Gravity(), Status.STALLED, 1), (rs.Bound(), Status.STALLED, 0), (rs.Gravity(), Status.LOST_CONTACT, 1)
 ])  # fmt: skip
 def test_a_drape_by_weight_that_fails_is_told_of_the_bound_one_once(method, status, times):
     draped = hemisphere_form().draped
@@ -252,9 +253,9 @@ def test_a_mild_target_that_does_not_converge_blames_no_curvature():
 def test_a_gravity_drape_that_slides_off_is_kept_too(tmp_path):
     layout = layout_of(rods=(9, 9), length=0.9, edge=0.05)
     form = rs.find_form(HEMISPHERE, layout, ROD, method=rs.Gravity(), anchor=(0.05, 0.02))
-    assert form.status == f"drape {Status.SLID_OFF.sentence}"
+    assert form.status == f"drape {Status.LOST_CONTACT.sentence}"
     kept = read(form.save(tmp_path / "slid"))
-    assert kept.result["drape"]["status"] == "slid off"
+    assert kept.result["drape"]["status"] == "lost contact"
     assert len(kept.states["draped"]) == len(kept.states["flat"]) == form.draped.mesh.node_count
 
 

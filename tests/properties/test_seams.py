@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import rodshell as rs
-from rodshell.checks import self_weight, settled_shell
+from rodshell.checks import self_weight
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.families import LEAVE_OUT, choose_families
@@ -198,7 +198,8 @@ def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> 
     form = sewn("two bumps, in the valley")
     archive = form.archive()
     for ends, weighed in archive.result["self_weight"].items():
-        own = [self_weight(*settled_shell(one.popped[ends])) for one in form.found.values()]
+        popped = [patch.popped[ends] for patch in form.found.values()]
+        own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
         assert weighed["load_factor"] == min(one.load_factor for one in own)
     assert archive.summary().count("(weakest patch, its seam held)") == 2
 

@@ -11,6 +11,7 @@ from rodshell.nets import nearby
 from rodshell.nets.chebyshev import chebyshev_net
 from rodshell.nets.compass import march
 from rodshell.nets.nearby import march_near
+from tests.properties.altered import at_positions
 
 SIZE = 0.2
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -154,7 +155,7 @@ def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last)
     """Half inside out: from there Newton's method finds the shell that is popped down, stable too, or nothing."""
     for form in (last, rs.find_form(HEMISPHERE, layout_of(), ROD, ends=("pinned",))):
         popped, trimmed = form.popped["pinned"], form.trimmed
-        down = replace(popped, positions=popped.positions * [1.0, 1.0, -0.85])
+        down = at_positions(popped, popped.positions * [1.0, 1.0, -0.85])
         again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", start=down)
         assert again.report.stable
         assert largest(again.positions - popped.positions) < SETTLED

@@ -89,7 +89,7 @@ def run(
     from rodshell.output.archive import ARCHIVE
     from rodshell.output.files import reserved
     from rodshell.output.inputs import kept_case, read_inputs
-    from rodshell.solve.time_series import NAMES
+    from rodshell.solve.simulate import NAMES
 
     kinds = wanted_kinds(only)
     inputs = read_inputs(case.to_toml())

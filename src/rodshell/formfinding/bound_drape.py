@@ -29,7 +29,8 @@ from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.apron import with_apron
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.mixed_newton import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
+from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
+from rodshell.solve.path import going_on
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
@@ -82,7 +83,7 @@ def bound_drape(
         constraint=_bind(target, mesh, start),
         length=target.size,
         inextensible=True,
-        places=shell.places,
+        flat_coordinates=shell.places,
     )
     found = _in_layers(
         problem, target, mesh, corrected, eccentricity,
@@ -179,7 +180,7 @@ def _in_layers(
             strain = float(np.abs(_between_layers(target, mesh, state, eccentricity) / lengths - 1.0).max())
         if strain < STRAIN_TOLERANCE or not found.report.converged or len(reports) == MOST_SOLVES:
             return replace(found, report=found.report.after(*reports[:-1]))
-        problem = replace(problem, elements=found.elements, pattern=found.pattern)
+        problem = going_on(problem, found)
 
 
 def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentricity: float) -> Floats:

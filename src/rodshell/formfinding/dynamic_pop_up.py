@@ -11,7 +11,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.methods import require_coupling
-from rodshell.formfinding.popup import FIRST_RISE, aligned, arched
+from rodshell.formfinding.popup import FIRST_RISE, arched, laid_below
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
@@ -19,13 +19,12 @@ from rodshell.geometry.vectors import dot
 from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.constraint import Supports
 from rodshell.solve.forces import Damping
 from rodshell.solve.implicit_euler import Motion
-from rodshell.solve.simulate import simulate
-from rodshell.solve.step_limit import step_limit
-from rodshell.solve.summed import narrow_or_dissected
-from rodshell.solve.time_series import Moment
+from rodshell.solve.linear_stability import step_limit
+from rodshell.solve.newton_matrix import narrow_or_dissected
+from rodshell.solve.problem import Supports
+from rodshell.solve.simulate import Sample, simulate
 from rodshell.validation import not_negative, positive
 
 BALANCED = 1e-3  # out-of-balance force on a node, of EI over the square of the shell's half-width
@@ -113,7 +112,7 @@ def dynamic_pop_up(
     mesh = footprint.mesh
     shell = Shell.of(mesh, rod, joint=joint, coupling=settings.coupling)
     ends = mesh.ends.ravel()
-    flat = aligned(mesh.flat, mesh.flat[ends], boundary.points)
+    flat = laid_below(mesh, boundary.points, float(boundary.points[:, 2].mean()))
     state = shell.state(arched(footprint, flat, flat[ends], boundary))
 
     def supports(time: float) -> Supports:
@@ -126,7 +125,7 @@ def dynamic_pop_up(
     unit_force = rod.bend_stiffness / (0.5 * float(np.ptp(boundary.points, axis=0).max())) ** 2
     stop = _stop_check(shell, settings.moving_time, BALANCED * unit_force, progress)
     matrix, steps, refused = narrow_or_dissected(shell.places), 0, 0
-    last = Moment(0.0, state, np.zeros_like(state), motion)
+    last = Sample(0.0, state, np.zeros_like(state), motion)
     for rate, until in zip(settings.drags, (settings.moving_time, settings.duration), strict=True):
         if until <= last.time:
             break
@@ -145,22 +144,22 @@ def dynamic_pop_up(
     return DynamicPopUp(shell.positions(last.state), rest)
 
 
-def _activity(shell: Shell, moment: Moment) -> tuple[float, float]:
+def _activity(shell: Shell, moment: Sample) -> tuple[float, float]:
     """Kinetic energy [J] and largest out-of-balance force on a free node [N]."""
     force = out_of_balance(moment.motion, moment.state, np.zeros_like(moment.state))
     free = np.delete(np.arange(shell.node_count), shell.ends)
     return moment.motion.kinetic_energy(moment.velocity), float(np.sqrt(dot(force[free], force[free]).max()))
 
 
-def _rests(moment: Moment, energy: float, force: float, least: float) -> bool:
+def _rests(moment: Sample, energy: float, force: float, least: float) -> bool:
     return force < least and energy < STILL * moment.motion.elastic_energy(moment.state)
 
 
-def _stop_check(shell: Shell, moving_time: float, least: float, progress: Progress) -> Callable[[Moment], bool]:
+def _stop_check(shell: Shell, moving_time: float, least: float, progress: Progress) -> Callable[[Sample], bool]:
     """Called after each step: reports progress, and from time to time checks whether the grid is at rest."""
     count = 0
 
-    def stop(moment: Moment) -> bool:
+    def stop(moment: Sample) -> bool:
         nonlocal count
         count += 1
         if count % CHECKS:

@@ -24,14 +24,12 @@ from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.contact_euler import ContactEuler
 from rodshell.solve.forces import Damping, GravityForce
-from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.implicit_euler import ContactEuler, Motion
+from rodshell.solve.linear_stability import NO_NODES, REMEDY, ExplicitTies, step_limit
+from rodshell.solve.newton_matrix import narrow_or_dissected
 from rodshell.solve.report import SolveReport, Status
-from rodshell.solve.simulate import simulate
-from rodshell.solve.step_limit import NO_NODES, REMEDY, ExplicitTies, step_limit
-from rodshell.solve.summed import narrow_or_dissected
-from rodshell.solve.time_series import End, Moment, TimeSeries
+from rodshell.solve.simulate import End, Sample, TimeSeries, simulate
 from rodshell.targets import Target
 
 STILL = 1e-7  # kinetic energy, of weight times size
@@ -78,7 +76,7 @@ def fall_drape(
     assert series.last is not None
     positions = middle_surface(mesh, shell.mesh, shell.positions(series.last.state))
     if not report.reason and lost_contact(mesh, positions, layout, top, target):
-        report = replace(report, status=Status.SLID_OFF)
+        report = replace(report, status=Status.LOST_CONTACT)
     angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
     figures = DrapeFigures(
         max_gap=float(max(0.0, -target.contact(positions).distance.min())),
@@ -159,7 +157,7 @@ class _FallSimulation:
         """The touching nodes that lose their whole velocity at each step."""
         return touching if self._law.stops_wholly else NO_NODES
 
-    def _refuse_unstable(self, moment: Moment) -> None:
+    def _refuse_unstable(self, moment: Sample) -> None:
         """Raise StabilityError where the step is beyond the limit of explicit ties with the nodes that touch now."""
         free = self.touching.freedom(moment.state)
         if self._ties is None:
@@ -172,11 +170,11 @@ class _FallSimulation:
                 f"{self._ties.limit():.4g} s: {REMEDY}"
             )
 
-    def _stop_check(self) -> Callable[[Moment], bool]:
+    def _stop_check(self) -> Callable[[Sample], bool]:
         """Called after each step: reports progress, and from time to time checks whether the grid is at rest."""
         count = 0
 
-        def stop(moment: Moment) -> bool:
+        def stop(moment: Sample) -> bool:
             nonlocal count
             count += 1
             if count % CHECKS:
@@ -200,7 +198,7 @@ class _FallSimulation:
         assert self.stepper.last is not None
         return self.stepper.last  # type: ignore[return-value]
 
-    def activity(self, moment: Moment) -> tuple[float, float]:
+    def activity(self, moment: Sample) -> tuple[float, float]:
         """Kinetic energy [J] and largest out-of-balance force [N]."""
         energy = moment.motion.kinetic_energy(moment.velocity)
         return energy, unbalanced_force(moment.motion, moment.state, self.load, self.touching)
@@ -215,7 +213,7 @@ class _FallSimulation:
         force = rest.force_residual / (BALANCED * self._heaviest)
         return rest_advice(self._energies, still, force, usual, self.fall.drag)
 
-    def contact_pulls(self, last: Moment) -> int:
+    def contact_pulls(self, last: Sample) -> int:
         """Number of touching nodes that the target would have to pull."""
         push = out_of_balance(last.motion, last.state, self.load)[self.touching.nodes]
         return int(np.count_nonzero(dot(push, self.touching.normals) < 0))

@@ -22,9 +22,8 @@ from rodshell.joints import Joint
 from rodshell.layout import GridLayout, GridMesh, mesh_grid
 from rodshell.model import Freedom, Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target
 
@@ -164,7 +163,7 @@ def _equilibrium(
     state, forces, reports = shell.state(start, normals=normals), np.zeros(len(mesh.edges)), list[SolveReport]()
     for update in range(CONTACT_UPDATES):
         problem = Problem(
-            (*shell.elements, contact), shell.stretch, supports, target.size, load=load, places=shell.places
+            (*shell.elements, contact), shell.stretch, supports, target.size, load=load, flat_coordinates=shell.places
         )
         most = MOST_COLD if cold and update == 0 else MOST_WARM
         found = find_equilibrium(
@@ -185,7 +184,7 @@ def _equilibrium(
     if found.report.converged and depth >= DEPTH * target.size:
         status = Status.STALLED
     if not found.report.reason and lost_contact(mesh, shell.positions(state), layout, top, target):
-        status = Status.SLID_OFF
+        status = Status.LOST_CONTACT
     report = replace(found.report.after(*reports[:-1]), status=status)
     return replace(found, report=report), contact
 

@@ -12,7 +12,7 @@ from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.methods import Bound, Method
-from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
+from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.section_limits import flat_warnings, section_rotation
 from rodshell.formfinding.trim import (
@@ -56,7 +56,7 @@ class FoundForm:
     draped: Draped
     trimmed: Trimmed
     footprint: Footprint
-    popped: dict[Ends, Popped]
+    popped: dict[Ends, PopUp]
     agreement: dict[Ends, Agreement]
     ends: tuple[Ends, ...]
 
@@ -88,7 +88,7 @@ class PoppedTable:
     joint: Joint
     footprint: Footprint
     boundary: Boundary
-    popped: dict[Ends, Popped]
+    popped: dict[Ends, PopUp]
     dropped: tuple[tuple[str, str], ...]
 
     @property
@@ -128,7 +128,7 @@ def find_stages(
     )  # fmt: skip
     trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
     footprint = map_back(trimmed)
-    popped, last = dict[Ends, Popped](), start.popped if start else {}
+    popped, last = dict[Ends, PopUp](), start.popped if start else {}
     for end in ends if draped.converged else ():
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
@@ -194,7 +194,7 @@ def _spans(grid: FlatGrid) -> float:
     return float(np.median(gaps)) if gaps else min(rod.length for rod in grid.rods)
 
 
-def _popped_status(popped: dict[Ends, Popped]) -> str:
+def _popped_status(popped: dict[Ends, PopUp]) -> str:
     for ends, shell in popped.items():
         if not shell.report.converged:
             return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
@@ -234,7 +234,7 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     )
 
 
-def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
     """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
     for ends, shell in popped.items():
         angles = section_rotation(shell.shell, shell.state) if shell.report.converged else None

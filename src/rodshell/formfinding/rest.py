@@ -10,7 +10,7 @@ from rodshell.contact.modified_mass import Touching
 from rodshell.geometry.vectors import dot
 from rodshell.model import Freedom, Shell
 from rodshell.solve.implicit_euler import Motion
-from rodshell.solve.modes import slowest_modes
+from rodshell.solve.linear_stability import slowest_modes
 from rodshell.targets import Target
 
 MODES = 4

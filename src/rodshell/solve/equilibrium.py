@@ -12,16 +12,18 @@ The steps are those of `newton_step`.
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.rods.elements import Elements
-from rodshell.solve.linear import SingularError
 from rodshell.solve.newton_step import HopelessError, NewtonStep
-from rodshell.solve.problem import Pattern, Problem
+from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.sparse_ldl import SingularError
+from rodshell.solve.tangent import Tangent, TangentAssembly
 
 Progress = Callable[[int, float], None]
 
@@ -32,22 +34,48 @@ LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A state (n, 3), its axial forces (e,) [N], its gradient (n, 3) [N] without constraint forces, and figures.
+    """How a solve ended: a state with its axial forces.
 
-    The twist angles of the state belong to the source frames of `elements`, which are at the state. `pattern` serves
-    the next solve of this shell, and keeps the factors alive. Where the state is not stable, `mode` (n, 3) is the
-    direction of the most negative curvature, its largest displacement being 1.
+    Parameters
+    ----------
+    problem : what was solved, the source frames of its elements being at the state (its twist angles belong to them),
+        with the pattern that serves the next solve of this structure.
+    state : (n, 3) [m, at twist angles rad].
+    forces : (e,) axial forces [N].
+    gradient : (n, 3) of energy and load, without constraint forces [N].
+    report : figures of the solve.
+    mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest displacement
+        being 1; else None.
     """
 
+    problem: Problem
     state: Floats
     forces: Floats
     gradient: Floats
     report: SolveReport
-    elements: tuple[Elements, ...]
-    pattern: Pattern
     mode: Floats | None = None
+
+    @property
+    def elements(self) -> tuple[Elements, ...]:
+        """Every energy but the stretch, with its source frames at the state."""
+        return self.problem.elements
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy less the work of the load [J]."""
+        return self.problem.potential(self.state)
+
+    @cached_property
+    def tangent(self) -> Tangent:
+        """The tangent stiffness at this state, which is factorised when it is first asked for.
+
+        Raises
+        ------
+        SingularError : some motion has no stiffness.
+        """
+        return TangentAssembly(self.problem, self.state).tangent(self.elements, self.state, self.forces)
 
 
 def find_equilibrium(
@@ -56,7 +84,7 @@ def find_equilibrium(
     forces: Floats,
     *,
     descend: bool = False,
-    cut: bool = False,
+    limit_steps: bool = False,
     most_modes: int | None = None,
     most_iterations: int = MOST_ITERATIONS,
     progress: Progress | None = None,
@@ -68,11 +96,12 @@ def find_equilibrium(
     Parameters
     ----------
     descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
-    cut : for a start from afar: cut the steps that were too long. Not on a path, which has steps of its own to cut.
+    limit_steps : for a start from afar: take only a part of steps that were too long. Not on a path, whose own steps
+        are shortened instead.
     most_modes : where the start has more negative modes, it is given up at once (BUCKLED); None: never.
     """
     begin = time.perf_counter()
-    step = NewtonStep(problem, state, cut=cut, most_modes=most_modes)
+    step = NewtonStep(problem, state, limit_steps=limit_steps, most_modes=most_modes)
     status, steps, reason = Status.STALLED, list[float](), ""
     while step.iterations + step.counts <= most_iterations:
         new = step.counts
@@ -118,7 +147,8 @@ def find_equilibrium(
     )
     mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
     step.refresh(state)
-    return Equilibrium(state, forces, gradient, report, step.elements, step.pattern, mode)
+    solved = replace(problem, elements=step.elements, pattern=step.pattern)
+    return Equilibrium(solved, state, forces, gradient, report, mode)
 
 
 def _in_circles(steps: list[float]) -> bool:
@@ -132,7 +162,7 @@ def find_stable(
     state: Floats,
     forces: Floats,
     *,
-    cut: bool = False,
+    limit_steps: bool = False,
     most_modes: int | None = None,
     most_iterations: int = MOST_ITERATIONS,
     progress: Progress | None = None,
@@ -143,7 +173,13 @@ def find_stable(
     The report counts the work of all solves.
     """
     first = find_equilibrium(
-        problem, state, forces, cut=cut, most_modes=most_modes, most_iterations=most_iterations, progress=progress
+        problem,
+        state,
+        forces,
+        limit_steps=limit_steps,
+        most_modes=most_modes,
+        most_iterations=most_iterations,
+        progress=progress,
     )
     tries = [first]
     if first.mode is not None:
@@ -151,7 +187,7 @@ def find_stable(
             start = first.state + side * NUDGE * problem.length * first.mode
             tries.append(
                 find_equilibrium(
-                    replace(problem, elements=first.elements, pattern=first.pattern),
+                    first.problem,
                     start,
                     first.forces,
                     descend=True,

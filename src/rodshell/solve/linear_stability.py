@@ -1,4 +1,4 @@
-"""The longest stable time step of a motion with explicit ties.
+"""Linear stability of a motion about a state: the longest stable time step with explicit ties, and its slowest modes.
 
 Implicit Euler with the forces of some springs K_e frozen at the start of the step, the others K_i implicit, is for
 small motions  M (x+ - 2x + x-) + h^2 K_i x+ + h^2 K_e x = 0.  A mode x -> z x of it with the mass m, and k_i, k_e along
@@ -19,18 +19,21 @@ inertias I tied by C2.
 """
 
 import numpy as np
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csc_matrix, diags, eye, triu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, StabilityError
 from rodshell.model import Assembly, Freedom
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.implicit_euler import Motion
-from rodshell.solve.linear import Qdldl, SingularError
+from rodshell.solve.sparse_ldl import Factors, Qdldl, SingularError
 
 NO_NODES = np.empty(0, dtype=np.intp)
 LONGEST, SHORTEST = 1e6, 1e-15  # [s]; what is stable beyond has no limit, what is not even below never is
 DIGITS = 1e-10  # of the limit
+SHIFT = 10.0  # [1/s2]: first guess of a shift below all slowest modes
+GROWTH = 10.0  # of the shift, until nothing is below it
 
 
 class ExplicitTies:
@@ -42,14 +45,15 @@ class ExplicitTies:
     """
 
     def __init__(self, motion: Motion, free: Freedom) -> None:
-        self._blocks = [one.blocks for one in (*motion.elements, *motion.explicit)]
+        self._blocks = [element.blocks for element in (*motion.elements, *motion.explicit)]
         self._assembly = Assembly.of(self._blocks, free)
         self._solver = Qdldl(self._assembly.indptr, self._assembly.indices)
+        self._factors: Factors | None = None
 
     def look(self, motion: Motion, state: Floats, free: Freedom, stopped: Ints = NO_NODES) -> None:
         """Look at a state (N, 3) whose blocks `stopped` (k,) lose all their velocity at each step."""
-        implicit, explicit = (_hessians(some, state) for some in (motion.elements, motion.explicit))
-        self._data = self._assembly.assemble([*implicit, *(-one for one in explicit)], self._blocks, free)
+        implicit, explicit = (_hessians(elements, state) for elements in (motion.elements, motion.explicit))
+        self._data = self._assembly.assemble([*implicit, *(-hessians for hessians in explicit)], self._blocks, free)
         weight = np.full((len(state), 1), 4.0)
         weight[stopped] = 2.0
         self._mass, self._blocked = free.reduce_diagonal(weight * motion.mass), free.blocked
@@ -60,9 +64,10 @@ class ExplicitTies:
         data[diagonal] += self._mass / step**2
         data[diagonal[self._blocked]] = 1.0
         try:
-            return self._solver.factor(data) > 0
+            self._factors = self._solver.factor(data, reuse=self._factors)
         except SingularError:
             return True
+        return self._factors.negative > 0
 
     def limit(self) -> float:
         """Longest step [s] at which nothing grows; infinite where nothing ever does.
@@ -117,9 +122,37 @@ def refuse_unstable(motion: Motion, state: Floats, step: float) -> None:
 REMEDY = "use a smaller step, softer ties, or coupling=SharedDofs()"
 
 
+def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Floats, count: int) -> Floats:
+    """The slowest modes K x = s M x of a body about an equilibrium: (count,) lowest s [1/s2], ascending.
+
+    A negative one grows as exp(sqrt(-s) t), others swing at sqrt(s)
+    rad/s.
+
+    Parameters
+    ----------
+    motion : its source frames at `state`; all free directions must have mass.
+    free : the free directions, without blocked ones.
+    curvature : (N, 3, 3) what constraints that turn with the state add to the stiffness [N/m].
+    """
+    elements: tuple[Elements, ...] = (*motion.elements, *motion.explicit, _Curvature(curvature))
+    stiffness = tangent_stiffness(elements, state, free)
+    root = 1.0 / np.sqrt(free.reduce_diagonal(motion.mass))
+    scaled = csc_matrix(diags(root) @ stiffness @ diags(root))
+    identity, shift = eye(free.size, format="csc"), SHIFT
+    upper = triu(scaled + shift * identity, format="csc")
+    solver = Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64))
+    while (factors := solver.factor(upper.data)).negative:
+        shift *= GROWTH
+        upper = triu(scaled + shift * identity, format="csc")
+    inverse = LinearOperator(scaled.shape, matvec=factors.solve, dtype=float)
+    start = np.sin(1.0 + np.arange(free.size) ** 2)  # the same at every run
+    values = eigsh(scaled, k=count, sigma=-shift, OPinv=inverse, v0=start, tol=1e-6, return_eigenvectors=False)
+    return np.sort(values)
+
+
 def tangent_stiffness(elements: tuple[Elements, ...], state: Floats, free: Freedom) -> csc_matrix:
     """Hessian in the free directions, whole."""
-    blocks = [one.blocks for one in elements]
+    blocks = [element.blocks for element in elements]
     assembly = Assembly.of(blocks, free)
     data = assembly.assemble(_hessians(elements, state), blocks, free)
     upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(free.size, free.size))
@@ -128,8 +161,23 @@ def tangent_stiffness(elements: tuple[Elements, ...], state: Floats, free: Freed
 
 def _hessians(elements: tuple[Elements, ...], state: Floats) -> list[Floats]:
     scrap = np.zeros_like(state)
-    widths = [3 * one.blocks.shape[1] for one in elements]
-    hessians = [np.zeros((len(one.blocks), width, width)) for one, width in zip(elements, widths, strict=True)]
-    for one, values in zip(elements, hessians, strict=True):
-        one.evaluate(state, scrap, values)
+    widths = [3 * element.blocks.shape[1] for element in elements]
+    hessians = [np.zeros((len(e.blocks), width, width)) for e, width in zip(elements, widths, strict=True)]
+    for element, values in zip(elements, hessians, strict=True):
+        element.evaluate(state, scrap, values)
     return hessians
+
+
+class _Curvature:
+    """Given (N, 3, 3) blocks as an energy, so that they are summed with the others."""
+
+    def __init__(self, full: Floats) -> None:
+        self.blocks: Ints = np.arange(len(full))[:, None]
+        self._full = full
+
+    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        hessians[:] = self._full
+        return 0.0
+
+    def refreshed(self, state: Floats) -> "_Curvature":
+        return self

@@ -1,12 +1,14 @@
-"""Symmetric banded systems: LDL^T without pivoting in O(n b^2), b being the half bandwidth.
+"""The matrix of a Newton iteration: summed from element Hessians in the free directions, factorised, solved.
 
-A rod whose unknowns stand in the order x_0, theta_0, x_1, theta_1, ... has b = 10, whatever its length. The order is
-found by reverse Cuthill-McKee on the chains of blocks that the stencils are, so that a ring (b about twice as large),
-supports and other numberings need nothing else. Elements are summed straight into the band. Without pivots the band
-does not grow, and the signs of D are the inertia.
+As a band (`Banded`) by LDL^T without pivoting in O(n b^2), b being the half bandwidth: a rod whose unknowns stand in
+the order x_0, theta_0, x_1, theta_1, ... has b = 10, whatever its length. The order is found by reverse Cuthill-McKee
+on the chains of blocks that the stencils are, so that a ring (b about twice as large), supports and other numberings
+need nothing else. Elements are summed straight into the band. Without pivots the band does not grow, and the signs of
+D are the inertia. Matrices of any other pattern go to a sparse solver (`SparseSum`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numba as nb
 import numpy as np
@@ -14,10 +16,35 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodshell.arrays import Floats, Ints
-from rodshell.model import Freedom
-from rodshell.solve.linear import SingularError
+from rodshell.model import Assembly, Freedom
+from rodshell.solve.sparse_ldl import Factors, LinearSolver, Multifrontal, Qdldl, SingularError
 
+WIDEST = 64  # half bandwidth beyond which a fill-reducing ordering wins over the band
 LANES = 4  # rows of the band are as long as whole vectors of so many numbers
+
+
+class SummedMatrix(Protocol):
+    """A symmetric matrix in the free directions. The counts of free directions stay; the directions may turn."""
+
+    def clear(self) -> None:
+        """Set it to zero."""
+        ...
+
+    def add(self, which: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
+        """Add the Hessians (m, 3k, 3k) of the elements, or of a part, `blocks` (m, k) of the set number `which`."""
+        ...
+
+    def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
+        """Add to each block itself: diagonal (N, 3), and a matrix, full (N, 3, 3) or empty; one where blocked."""
+        ...
+
+    def factor(self) -> int:
+        """Factorise; the number of negative pivots. Raises SingularError where a pivot vanishes or is not finite."""
+        ...
+
+    def solve(self, field: Floats, free: Freedom) -> Floats:
+        """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them."""
+        ...
 
 
 class Banded:
@@ -94,6 +121,62 @@ class Banded:
             self._plain[narrow] = (along[narrow] | (np.arange(3) >= free.count[narrow, None])).all(axis=1)
             self._axes[narrow] = free.directions[narrow]
             self._free = free
+
+
+class SparseSum:
+    """A matrix of any pattern, by a sparse solver."""
+
+    def __init__(
+        self, element_blocks: Sequence[Ints], free: Freedom, solver: Callable[..., LinearSolver] = Qdldl
+    ) -> None:
+        everywhere = np.arange(len(free.count))[:, None]
+        self._last = len(element_blocks)
+        self._everywhere = everywhere
+        self._assembly = Assembly.of([*element_blocks, everywhere], free)
+        self._solver = solver(self._assembly.indptr, self._assembly.indices)
+        self._data = np.zeros(len(self._assembly.indices))
+        self._factors: Factors | None = None
+
+    def clear(self) -> None:
+        self._data[:] = 0.0
+
+    def add(self, which: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
+        self._assembly.add(which, hessians, blocks, free, self._data)
+
+    def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
+        blocks = diagonal[:, :, None] * np.eye(3)
+        self.add(self._last, blocks + full if len(full) else blocks, self._everywhere, free)
+        self._data[self._assembly.diagonal[free.blocked]] = 1.0
+
+    def factor(self) -> int:
+        self._factors = self._solver.factor(self._data, reuse=self._factors)
+        return self._factors.negative
+
+    def solve(self, field: Floats, free: Freedom) -> Floats:
+        assert self._factors is not None
+        return free.expand(self._factors.solve(free.reduce(field)))
+
+
+def narrow_or_sparse(element_blocks: Sequence[Ints], free: Freedom) -> SummedMatrix:
+    """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell."""
+    banded = Banded(element_blocks, free, widest=WIDEST)
+    return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free)
+
+
+def narrow_or_dissected(coordinates: Floats) -> Callable[[Sequence[Ints], Freedom], SummedMatrix]:
+    """`Banded` where the band is narrow; else by the multifrontal solver.
+
+    coordinates : (N, d) where the blocks lie [m], by which they are ordered.
+    """
+
+    def make(element_blocks: Sequence[Ints], free: Freedom) -> SummedMatrix:
+        banded = Banded(element_blocks, free, widest=WIDEST)
+        if banded.half_bandwidth <= WIDEST:
+            return banded
+        of_unknowns = np.repeat(coordinates, free.count, axis=0)
+        return SparseSum(element_blocks, free, lambda start, rows: Multifrontal(start, rows, of_unknowns))
+
+    return make
 
 
 def _chain_order(element_blocks: Sequence[Ints], count: int) -> Ints:

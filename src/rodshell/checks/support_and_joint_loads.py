@@ -1,8 +1,12 @@
-"""What the joints carry: the force and the moment between the two rods of each crossing, and how far they scissor.
+"""What supports and joints carry: reactions and their balance; the forces and moments between crossing rods.
 
-The force on a rod at a joint is what balances the rod's own stretch, bending and twist there; the moment about the
-joint is that of the joint's energy: of the forces on the nodes next to it and of the torques on the edges' twist
-angles. Both are resultants, whatever the joint is made of.
+*Reactions.* The gradient of the elastic energy at a held end is the force of its support. A clamp acts on the ghost
+node past the end too: its force there is the clamp's moment about the end. No part of this sees the balance, so the
+sums check it: they vanish only if every free node is in equilibrium.
+
+*Joint loads.* The force on a rod at a joint is what balances the rod's own stretch, bending and twist there; the moment
+about the joint is that of the joint's energy: of the forces on the nodes next to it and of the torques on the edges'
+twist angles. Both are resultants, whatever the joint is made of.
 """
 
 from dataclasses import dataclass, replace
@@ -16,6 +20,71 @@ from rodshell.joints.crossings import Places
 from rodshell.joints.linkers import LinkerBend
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
+from rodshell.solve.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """Forces and moments of the supports on both ends of each rod in turn.
+
+    Parameters
+    ----------
+    points : (2m, 3) where they act [m].
+    forces : (2m, 3) [N].
+    moments : (2m, 3), each about its own point [N m]; zero where the ends are pinned.
+    """
+
+    points: Floats
+    forces: Floats
+    moments: Floats
+
+    @property
+    def sum_of_forces(self) -> Floats:
+        """(3,) [N]"""
+        return np.asarray(self.forces.sum(axis=0))
+
+    @property
+    def about_middle(self) -> Floats:
+        """(2m, 3) moments about the middle of all points [N m]."""
+        return np.asarray(np.cross(self.points - self.points.mean(axis=0), self.forces) + self.moments)
+
+    @property
+    def sum_of_moments(self) -> Floats:
+        """(3,) about the middle of all points [N m]."""
+        return np.asarray(self.about_middle.sum(axis=0))
+
+    @property
+    def force_imbalance(self) -> float:
+        """Size of the sum of forces over the largest force."""
+        return _share(self.sum_of_forces, self.forces)
+
+    @property
+    def moment_imbalance(self) -> float:
+        """Size of the sum of moments over the largest moment about the middle."""
+        return _share(self.sum_of_moments, self.about_middle)
+
+
+def reactions(shell: Shell, found: Equilibrium) -> Reactions:
+    """Reactions of a shell without loads whose ends are held.
+
+    Parameters
+    ----------
+    shell : with its source frames at the equilibrium.
+    found : the equilibrium; its gradient at the held ends is what the supports exert.
+    """
+    state, gradient = found.state, found.gradient
+    points = state[shell.ends]
+    forces, moments = gradient[shell.ends], np.zeros_like(points)
+    if len(shell.ghosts):
+        at_ghosts = gradient[shell.ghosts]
+        forces = forces + at_ghosts
+        moments = np.cross(state[shell.ghosts] - points, at_ghosts)
+    return Reactions(points, forces, moments)
+
+
+def _share(total: Floats, parts: Floats) -> float:
+    largest = float(np.linalg.norm(parts, axis=1).max(initial=0.0))
+    return float(np.linalg.norm(total)) / largest if largest > 0 else 0.0
 
 
 @dataclass(frozen=True)

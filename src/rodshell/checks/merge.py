@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.checks.check import Checks
-from rodshell.checks.contact import Contact, joined_contact
+from rodshell.checks.contact import Contact, worst_contact
 from rodshell.checks.deployment import Deployment
 from rodshell.checks.other_shapes import OtherShapes
 from rodshell.checks.self_weight import weakest
@@ -15,7 +15,7 @@ from rodshell.formfinding.popup import Ends
 
 
 @dataclass(frozen=True)
-class JoinedChecks(Checks):
+class MergedChecks(Checks):
     """The checks of several shells, which are `named`, as of one."""
 
     named: Mapping[str, Checks] = field(kw_only=True)
@@ -32,7 +32,7 @@ class JoinedChecks(Checks):
         return (*late, *words, *self.tight)
 
 
-def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> JoinedChecks:
+def merged_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> MergedChecks:
     """Of shells that share nothing: what all were checked for, one after the other.
 
     The deployment has the stages that all were followed through. Each shell bears its own weight by itself, what they
@@ -56,7 +56,7 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
     bending, held, joints = each("bending"), each("reactions"), each("joints")
     ways = [part.deployment for part in parts if part.deployment is not None]
     if len(ways) < len(parts):
-        return JoinedChecks(
+        return MergedChecks(
             bending, held, joints, None, (), weighed, contact, (), others, None, late, missing, named=named
         )
     shared = [share for share in ways[0].share.tolist() if all(share in one.share for one in ways)]
@@ -68,8 +68,8 @@ def joined_checks(named: Mapping[str, Checks], contacts: Mapping[Ends, Contact])
     found = {
         name: [part.contact_on_the_way[k] for k in row] for (name, part), row in zip(named.items(), rows, strict=True)
     }
-    met = tuple(joined_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
-    return JoinedChecks(
+    met = tuple(worst_contact({name: stages[k] for name, stages in found.items()}) for k in range(len(shared)))
+    return MergedChecks(
         bending, held, joints, way, bent, weighed, contact, met, others, turned, late, missing, named=named
     )
 
