@@ -11,11 +11,10 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.domain import Disc, Rectangle
 from rodshell.targets.formula import parse_formula
-from rodshell.targets.heights import Heights
+from rodshell.targets.height_function import Heights, climb, relative_radius, require_smooth, sample, trusted_region
 from rodshell.targets.jet import Jet
-from rodshell.targets.soundness import climb, relative_radius, require_smooth, sample, trusted_region
-from rodshell.targets.standing import Standing
 from rodshell.targets.target import Implicit
+from rodshell.targets.wall_below_rim import WalledTarget
 from rodshell.units import shown
 
 TIE = 1e-6  # of the size: peaks that are equally high
@@ -23,7 +22,7 @@ SAME = 1e-3  # of the size: refined peaks this close are one
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeightField(Standing):
+class HeightField(WalledTarget):
     """z = f(x, y), ending at the edge of its domain.
 
     The formula goes on past the edge. Where it stops being finite or turns steep (slope 4, or twice the
@@ -69,7 +68,7 @@ class HeightField(Standing):
         hessian[:, 0, 1] = hessian[:, 1, 0] = -jet.dxy
         return Implicit(x[:, 2] - jet.value, gradient, hessian)
 
-    def height(self, xy: Floats) -> Floats:
+    def height_at(self, xy: Floats) -> Floats:
         z = self._heights.jet(xy[:, 0], xy[:, 1]).value
         return np.array(np.broadcast_to(z, len(xy)))
 
@@ -81,7 +80,7 @@ class HeightField(Standing):
         symmetry.
         """
         peaks = climb(self._heights, self.domain)
-        z = self.height(peaks)
+        z = self.height_at(peaks)
         tied = peaks[z >= z.max() - TIE * self.size]
         best = peaks[int(np.argmax(z))]
         on_edge = relative_radius(self.domain, *tied.T).max() > 1 - 1e-9

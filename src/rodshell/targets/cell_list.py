@@ -1,6 +1,6 @@
-"""Neighbours of points: points of a surface in the cells of a lattice, looked up by compiled loops.
+"""Neighbours of points: points of a surface sorted into the cells of a lattice, searched by compiled loops.
 
-Points of a surface lie evenly, which is all that a lattice of cells needs to beat a tree.
+Points of a surface lie evenly, so that cells of one size are faster than a tree.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ MOST_CELLS = 64  # for each point
 
 
 @dataclass(frozen=True, eq=False)
-class Buckets:
+class CellList:
     """Points (n, 3) sorted into cells.
 
     Parameters
@@ -31,10 +31,10 @@ class Buckets:
     order: Ints
 
     @staticmethod
-    def of(points: Floats, cell: float) -> "Buckets":
+    def of(points: Floats, cell: float) -> "CellList":
         """Into cells of the width `cell` [m], or wider ones where there would be too many."""
         low, shape, cell = _lattice_over(points, cell)
-        return Buckets(points, low, shape, cell, *_sorted(points, low, shape, cell))
+        return CellList(points, low, shape, cell, *_sorted(points, low, shape, cell))
 
     @property
     def _lattice(self) -> tuple[Floats, Floats, Ints, float, Ints, Ints]:
