@@ -221,7 +221,7 @@ def test_names_and_comments_may_be_written_in_any_usual_code(code, bowl, tmp_pat
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [("noise.dxf", b"\x00\xff noise", "drawing of curves: it is damaged or of another format; export it again"),
-     ("beyond.obj", b"v 0 0 0\nl 1 2 99999\n", "drawing of curves: it is damaged or of another format; export it again"),
+     ("beyond.obj", b"v 0 0 0\nl 1 2 99999\n", "drawing of curves: it is damaged or of another format; export it"),
      ("no.dxf", None, "there is no file named .*: check the path")],
 )  # fmt: skip
 def test_curves_that_cannot_be_read_are_refused_in_plain_words(name, content, said, tmp_path):

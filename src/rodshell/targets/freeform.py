@@ -183,7 +183,7 @@ class Freeform(Target):
         margins = [rim.distance(x) for rim in self.rims]
         if self.base is not None:
             margins.append(x[:, 2] - self.base)
-        return np.min(margins, axis=0)
+        return np.asarray(np.min(margins, axis=0))
 
     def section(self, z: float) -> Rim:
         """The loops in which the plane at height `z` [m] cuts the surface, counter-clockwise seen from above."""

@@ -13,8 +13,19 @@ from rodshell.errors import InputError
 from rodshell.targets.domain import Disc, Rectangle
 from rodshell.targets.jet import Jet, differences
 
+Region = Disc | Rectangle
+
 NUDGE = 1e-5  # of the size: a 0/0 leaves round-off of 1e-16 / (nudge size)^2 in curvature, Taylor hardly less
-DIFFERENCE = 2e-3  # of the size: step of the differences; truncation and round-off both some 1e-10 in curvature
+DIFFERENCE = 2e-3  # of the size: step of the differences; truncation and round-off are both about 1e-10 in curvature
+
+ROWS, COLUMNS = 65, 193  # of the lattice of samples: about 3 mm apart on a target of 0.4 m
+STEEPEST = 1e3  # slope that counts as infinite (89.94 degrees)
+SHARPEST = 1e-2  # change of slope at a point that counts as a crease (0.6 degrees)
+SUSPECTS, HALVINGS = 64, 26  # pairs of neighbours searched for a crease, down to 1e-8 of their distance
+TIGHTEST = 1e-4  # of the size: a smaller radius of curvature counts as a crease
+BAND = 1.6  # half extents: as far as the function is examined; the net is marched past the edge
+TAME = 4.0  # slope up to which a formula is followed past the edge (76 degrees), or twice the steepest inside
+CLIMBERS = 500
 
 
 @dataclass(frozen=True)
@@ -23,22 +34,31 @@ class Heights:
 
     Parameters
     ----------
-    function : of x and y; takes jets where `exact`, plain arrays alone where not.
+    function : of x and y; takes jets where `exact`, otherwise only plain arrays.
     size : half the larger width of its domain [m].
-    exact : derivatives by jets; otherwise by differences.
-    trusted : where the function is taken as it is; None for everywhere. Beyond, every normal of the region's
-        edge carries the function's Taylor polynomial of second degree in that direction (beyond a corner of a
-        rectangle, in both). The continued surface has continuous curvature, and its derivatives are exact:
-        those of the polynomial's coefficients come from jets of jets.
+    exact : whether derivatives are taken from jets; otherwise by differences.
+    trusted : where the function is evaluated as it is; None for everywhere. Outside, along every normal of the
+        region's edge, it is continued by its Taylor polynomial of second degree in that direction (in both directions
+        outside a corner of a rectangle). The continued surface has continuous curvature, and its derivatives are exact:
+        those of the polynomial's coefficients are taken from jets of jets.
     """
 
     function: Callable[[Any, Any], Any]
     size: float
     exact: bool = True
-    trusted: Disc | Rectangle | None = None
+    trusted: Region | None = None
 
     def jet(self, x: Floats, y: Floats) -> Jet:
-        """z with its first and second derivatives at the points (n,); parts may be single floats."""
+        """Evaluate z with its first and second derivatives.
+
+        Parameters
+        ----------
+        x, y : (n,) points of the plan [m].
+
+        Returns
+        -------
+        A jet, whose parts are (n,), or single floats where they are constant.
+        """
         with np.errstate(all="ignore"):
             if self.trusted is None:
                 return self._inside(x, y)
@@ -58,7 +78,7 @@ class Heights:
         total = np.asarray(jet.value + jet.dxx + jet.dyy)
         if isfinite(float(np.add.reduce(total, axis=None))):
             return jet
-        # 0/0 at a point of a smooth surface, as cos(sqrt(x^2 + y^2)) has: step aside, and back by Taylor
+        # 0/0 at a point of a smooth surface, as in cos(sqrt(x^2 + y^2)): step aside, and back by Taylor
         broken = np.flatnonzero(~np.isfinite(np.broadcast_to(total, x.shape)))
         h, k = NUDGE * self.size, 0.7 * NUDGE * self.size
         near = self._evaluate(x[broken] + h, y[broken] + k)
@@ -76,13 +96,13 @@ class Heights:
         return jet if isinstance(jet, Jet) else Jet(jet)
 
     @staticmethod
-    def _beyond(trusted: Disc | Rectangle, x: Floats, y: Floats) -> Bools:
+    def _beyond(trusted: Region, x: Floats, y: Floats) -> Bools:
         a, b = trusted.half_extent
         if isinstance(trusted, Disc):
             return x * x + y * y > a * a
         return (np.abs(x) > a) | (np.abs(y) > b)
 
-    def _outside(self, trusted: Disc | Rectangle, x: Jet, y: Jet) -> Jet:
+    def _outside(self, trusted: Region, x: Jet, y: Jet) -> Jet:
         a, b = trusted.half_extent
         if isinstance(trusted, Disc):
             inward = a / np.sqrt(x * x + y * y)
@@ -111,22 +131,17 @@ def _put(parts: Floats, where: Any, jet: Jet) -> None:
         row[where] = part
 
 
-Region = Disc | Rectangle
-
-ROWS, COLUMNS = 65, 193  # of the lattice: some 3 mm apart on a target of 0.4 m
-STEEPEST = 1e3  # slope that counts as infinite (89.94 degrees)
-SHARPEST = 1e-2  # change of slope at a point that counts as a crease (0.6 degrees)
-SUSPECTS, HALVINGS = 64, 26  # pairs of neighbours searched for a crease; down to 1e-8 of their distance
-TIGHTEST = 1e-4  # of the size: a smaller radius of curvature counts as a crease
-BAND = 1.6  # half extents; the net is marched past the edge
-TAME = 4.0  # slope to which a formula is followed past the edge (76 degrees), or twice the steepest inside
-CLIMBERS = 500
-
-
 def sample(heights: Heights, domain: Region) -> Floats:
-    """(8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy on a lattice that ends on the domain's edge.
+    """Sample a height function on a lattice up to the domain's edge.
 
-    Rows of a disc are circles, from the centre to the edge.
+    Parameters
+    ----------
+    heights : the function.
+    domain : rows of the lattice of a disc are circles, from the centre to the edge.
+
+    Returns
+    -------
+    (8, rows, columns) x, y, z, z_x, z_y, z_xx, z_xy, z_yy.
     """
     a, b = domain.half_extent
     if isinstance(domain, Disc):
@@ -134,18 +149,25 @@ def sample(heights: Heights, domain: Region) -> Floats:
         x, y = radius * np.cos(angle), radius * np.sin(angle)
     else:
         x, y = np.meshgrid(np.linspace(-a, a, COLUMNS), np.linspace(-b, b, ROWS))
-    return _look(heights, np.stack([x.ravel(), y.ravel()])).reshape(8, ROWS, COLUMNS)
+    return _evaluated(heights, np.stack([x.ravel(), y.ravel()])).reshape(8, ROWS, COLUMNS)
 
 
 def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str) -> None:
-    """Finite height, slope and curvature everywhere in the domain, and neither steps nor creases.
+    """Refuse a function without finite height, slope and curvature everywhere in the domain, or with steps or creases.
+
+    Parameters
+    ----------
+    heights : the function.
+    domain : of the target.
+    samples : as `sample` returns them.
+    name : of the target, for the message.
 
     Raises
     ------
-    InputError : names the place and what would do.
+    InputError : names the place and a remedy.
     """
     _refuse(samples.reshape(8, -1), domain, name)
-    if heights.exact:  # differences round off a crease
+    if heights.exact:  # differences smooth a crease
         tight = _tighten(heights, domain, samples.reshape(8, -1))
         _refuse(tight, domain, name)
         p, q = _close_in(heights, samples)
@@ -166,16 +188,34 @@ def require_smooth(heights: Heights, domain: Region, samples: Floats, name: str)
 
 
 def trusted_region(heights: Heights, domain: Region, samples: Floats, name: str) -> Region | None:
-    """The largest of the growing domains in which the heights are finite and tame; None: all of the band."""
+    """The largest region around the domain in which the function can be evaluated as it is.
+
+    There it is finite, and not steeper than slope 4 or twice its steepest inside.
+
+    Parameters
+    ----------
+    heights : the function.
+    domain : of the target.
+    samples : as `sample` returns them.
+    name : of the target, for the message.
+
+    Returns
+    -------
+    None where that is all of 1.6 times the domain.
+
+    Raises
+    ------
+    InputError : a function without exact derivatives cannot be continued, and needs to be.
+    """
     edge = _edge(domain)
     limit = max(TAME, 2 * float(np.hypot(samples[3], samples[4]).max()))
     growth = np.linspace(1.0, BAND, 61)
     for before, now in pairwise(growth):
-        at = _look(heights, now * edge)
+        at = _evaluated(heights, now * edge)
         if not np.all(np.isfinite(at).all(axis=0) & (np.hypot(at[3], at[4]) <= limit)):
             if not heights.exact:
                 raise InputError(
-                    f"{name} must be smooth to {BAND} times its domain, and is not at {now:.2f} times: use a "
+                    f"{name} must be smooth up to {BAND} times its domain, and is not at {now:.2f} times: use a "
                     "smaller domain, or numpy functions alone, which can be continued"
                 )
             return grown(domain, float(before))
@@ -183,16 +223,21 @@ def trusted_region(heights: Heights, domain: Region, samples: Floats, name: str)
 
 
 def climb(heights: Heights, domain: Region) -> Floats:
-    """Points (n, 2) of the domain and its edge, from which no step leads up; the highest is among them."""
+    """Climb from many samples to local peaks.
+
+    Returns
+    -------
+    Points (n, 2) of the domain and its edge from which no step leads up [m]; the highest is among them.
+    """
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent
     pitch = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)
-    # a peak lies at most so much above the lattice's points next to it
+    # a peak is at most so much higher than the lattice's points next to it
     hidden = 0.5 * np.abs(at[5:]).max() * pitch**2
     high = np.flatnonzero(at[2] >= at[2].max() - hidden)
     xy = at[:2, [np.argmax(at[2]), *high[:: len(high) // CLIMBERS + 1]]].T
     for _ in range(60):  # Newton; where the peak is flat (x^4) it converges linearly
-        _, _, _, zx, zy, zxx, zxy, zyy = _look(heights, xy.T)
+        _, _, _, zx, zy, zxx, zxy, zyy = _evaluated(heights, xy.T)
         bend, axes = np.linalg.eigh(np.moveaxis(np.array([[zxx, zxy], [zxy, zyy]]), 2, 0))
         along = np.einsum("nij,ni->nj", axes, np.stack([zx, zy], axis=1))
         step = np.einsum("nij,nj->ni", axes, along / np.maximum(np.abs(bend), 1e-9 / max(a, b)))
@@ -207,21 +252,22 @@ def climb(heights: Heights, domain: Region) -> Floats:
 
 
 def grown(domain: Region, factor: float) -> Region:
+    """The domain scaled by a factor."""
     if isinstance(domain, Disc):
         return replace(domain, radius=factor * domain.radius)
     return replace(domain, size=(factor * domain.size[0], factor * domain.size[1]))
 
 
 def relative_radius(domain: Region, x: Floats, y: Floats) -> Floats:
-    """1 on the edge, 0 at the centre."""
+    """Relative distance from the centre of the domain: 0 there, 1 on the edge."""
     a, b = domain.half_extent
     if isinstance(domain, Disc):
         return np.asarray(np.hypot(x, y) / a)
     return np.maximum(np.abs(x) / a, np.abs(y) / b)
 
 
-def _look(heights: Heights, xy: Floats) -> Floats:
-    """(8, n) x, y and all parts of the jet at the points (2, n)."""
+def _evaluated(heights: Heights, xy: Floats) -> Floats:
+    """(8, n) x, y and all parts of the jet at points (2, n)."""
     jet = heights.jet(xy[0], xy[1])
     parts = (jet.value, jet.dx, jet.dy, jet.dxx, jet.dxy, jet.dyy)
     return np.stack([*xy, *(np.broadcast_to(np.asarray(part, dtype=float), xy[0].shape) for part in parts)])
@@ -257,7 +303,7 @@ def _nearest_centre(at: Floats, domain: Region) -> tuple[float, float]:
 
 
 def _smaller(domain: Region, x: float, y: float) -> str:
-    """A domain that ends before the place."""
+    """Words for a domain that ends before a point."""
     within = 0.95 * float(relative_radius(domain, np.array(x), np.array(y)))
     if within < 0.2:
         return "another formula there"
@@ -268,23 +314,23 @@ def _smaller(domain: Region, x: float, y: float) -> str:
 
 
 def _close_in(heights: Heights, at: Floats) -> tuple[Floats, Floats]:
-    """The pairs of neighbours (8, k) whose heights and slopes fit each other least, brought together.
+    """Pairs of neighbours (8, k) whose heights and slopes fit each other least, with their distances halved repeatedly.
 
-    Halved again and again, towards the worse half: what is smooth fits ever better, a singularity never does.
+    The worse half is kept each time: smooth functions fit ever better, a singularity never does.
     """
     p = np.hstack([at[:, :-1].reshape(8, -1), at[:, :, :-1].reshape(8, -1)])
     q = np.hstack([at[:, 1:].reshape(8, -1), at[:, :, 1:].reshape(8, -1)])
     worst = np.argsort(_misfit(p, q))[-SUSPECTS:]
     p, q = p[:, worst], q[:, worst]
     for _ in range(HALVINGS):
-        middle = _look(heights, 0.5 * (p[:2] + q[:2]))
+        middle = _evaluated(heights, 0.5 * (p[:2] + q[:2]))
         first = ~(_misfit(p, middle) < _misfit(middle, q))
         p, q = np.where(first, p, middle), np.where(first, middle, q)
     return p, q
 
 
 def _tighten(heights: Heights, domain: Region, at: Floats) -> Floats:
-    """Points (8, k) of strongest curvature nearby: a sharp point between the samples shows in its growth."""
+    """Points (8, k) of strongest curvature nearby: at a sharp point between the samples it grows."""
     a, b = domain.half_extent
     at = at[:, np.argsort(_bend(at))[-SUSPECTS:]]
     step = np.array([[i, j] for i in (0, 1, -1) for j in (0, 1, -1)], dtype=float)
@@ -292,7 +338,7 @@ def _tighten(heights: Heights, domain: Region, at: Floats) -> Floats:
     while reach > 1e-6 * max(a, b):  # closer to a smooth 0/0 there is only round-off
         xy = at[:2, None, :] + 0.5 * reach * step.T[:, :, None]
         xy /= np.maximum(1.0, relative_radius(domain, *xy))
-        around = _look(heights, xy.reshape(2, -1)).reshape(8, len(step), -1)
+        around = _evaluated(heights, xy.reshape(2, -1)).reshape(8, len(step), -1)
         best = np.argmax(_bend(around), axis=0)
         at = np.take_along_axis(around, best[None, None, :], axis=1)[:, 0]
         reach *= 0.6
@@ -304,7 +350,7 @@ def _bend(at: Floats) -> Floats:
 
 
 def _misfit(p: Floats, q: Floats) -> Floats:
-    """How far z and its slope miss the trapezoidal rule between two points, both as slopes."""
+    """By how much z and its slope deviate from the trapezoidal rule between two points, both as slopes."""
     x, y = q[:2] - p[:2]
     apart = np.maximum(np.hypot(x, y), 1e-300)
     mean = 0.5 * (p + q)

@@ -16,14 +16,21 @@ CORNER = 0.5  # cosine of 60 degrees between edges of a loop: it is not rounded 
 POINTS = 1500  # on each loop
 IN_A_BALL = 32  # of these
 
+# jagged edges
+SHARP = 0.35  # [rad], 20 degrees: an edge between two such turns to opposite sides is a jog
+FEWEST = 4  # successive jogs that make an edge jagged: a real corner or notch has fewer
+RUN = 2.5  # times sqrt(n): edges between successive jogs; a lattice cut along a circle of n edges has 1.1 sqrt(n)
+MOST, RMS = 1.0, 0.35  # edge lengths by which a vertex may be moved; steps of a lattice deviate by 0.29 rms
+HALVINGS = 20
+
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """Closed polylines on a surface, fine enough to be taken for smooth curves.
+    """Closed polylines on a surface, fine enough to replace smooth curves; make one with `Rim.of`.
 
     Parameters
     ----------
-    points : (n, 3) of all loops in a row [m].
+    points : (n, 3) points of all loops, one loop after the other [m].
     inward : (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
     after : (n,) index of the next point of the loop.
     """
@@ -34,7 +41,14 @@ class Rim:
 
     @staticmethod
     def of(loops: Sequence[Floats], onto: Callable[[Floats], Floats], normal: Callable[[Floats], Floats]) -> "Rim":
-        """Loops (n, 3), the shell on the left seen from outside; `onto` puts points on the surface."""
+        """Refine loops into a rim, by cubics between corners.
+
+        Parameters
+        ----------
+        loops : closed polylines (n, 3) with the shell on their left, seen from outside [m].
+        onto : moves points (n, 3) onto the surface.
+        normal : outward unit normals (n, 3) of the surface at points.
+        """
         points, edges, after, count = list[Floats](), list[Floats](), list[Ints](), 0
         for loop in loops:
             x = onto(_rounded(loop))
@@ -46,8 +60,12 @@ class Rim:
         x, along = np.vstack(points), np.vstack(edges)
         return Rim(x, unit(cross(normal(x + 0.5 * along), along)), np.concatenate(after))
 
+    def __repr__(self) -> str:
+        return f"Rim({len(self.points)} points in {self.loops} loop{'s' * (self.loops != 1)})"
+
     @property
     def loops(self) -> int:
+        """Number of loops."""
         return int(np.count_nonzero(self.after <= np.arange(len(self.after))))
 
     @cached_property
@@ -58,7 +76,7 @@ class Rim:
 
     @cached_property
     def _balls(self) -> tuple[Ints, Floats, Floats]:
-        """Balls around a few points in a row each: where these begin (k + 1,), centres (k, 3) and radii (k,) [m]."""
+        """Balls, each around a run of points: where the runs begin (k + 1,), centres (k, 3) and radii (k,) [m]."""
         start = np.append(np.arange(0, len(self.points), IN_A_BALL), len(self.points))
         parts = [self.points[a:b] for a, b in pairwise(start.tolist())]
         centres = np.array([part.mean(axis=0) for part in parts])
@@ -66,34 +84,43 @@ class Rim:
         return start, centres, np.array(radii)
 
     def distance(self, x: Floats) -> Floats:
-        """Signed distance (n,) of points near the surface to the nearest loop [m], positive inside."""
+        """Signed distance (n,) [m] of points `x` (n, 3) near the surface to the nearest loop, positive inside."""
         result = np.empty(len(x))
         _distance(x, self.points, self.inward, self.after, self._before, *self._balls, result)
         return result
 
     def feet(self, x: Floats) -> tuple[Ints, Floats]:
-        """The edge (n,) nearest to each point (n, 3), and the share (n,) of it that lies before the nearest point."""
+        """The closest points of the rim, as `at` takes them.
+
+        Parameters
+        ----------
+        x : (n, 3) points [m].
+
+        Returns
+        -------
+        Index (n,) of the nearest edge, and the fraction (n,) of it before the closest point.
+        """
         edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
         _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
         return edge, share
 
     def at(self, edge: Ints, share: Floats) -> Floats:
-        """Points (n, 3) on the edges [m]."""
+        """Points (n, 3) [m] on the edges (n,), at fractions `share` (n,) of their lengths."""
         first = self.points[edge]
         return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
 
 
 @njit(cache=True, error_model="numpy")
 def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
-    """From the nearest edge; beside a corner both edges count."""
+    """Distances from the nearest edge; from the mean of both edges where a corner is nearest."""
     edge = 0
     for n in range(len(x)):
         edge, along = _nearest(x, n, points, after, before, start, centres, radii, edge)
         ex, ey, ez = _edge(points, edge, after[edge])
         ix, iy, iz = inward[edge]
         if along <= 0.0 or along >= 1.0:
-            beside = before[edge] if along <= 0.0 else after[edge]
-            ix, iy, iz = ix + inward[beside, 0], iy + inward[beside, 1], iz + inward[beside, 2]
+            other = before[edge] if along <= 0.0 else after[edge]
+            ix, iy, iz = ix + inward[other, 0], iy + inward[other, 1], iz + inward[other, 2]
         ox, oy, oz = (
             x[n, 0] - along * ex - points[edge, 0],
             x[n, 1] - along * ey - points[edge, 1],
@@ -112,8 +139,8 @@ def _feet(x, points, after, before, start, centres, radii, edges, shares):  # ty
 
 @njit(cache=True, error_model="numpy")
 def _nearest(x, n, points, after, before, start, centres, radii, guess):  # type: ignore[no-untyped-def]
-    """That edge of those two that meet in the point nearest to the n-th which is nearer, and the share of it that lies
-    before the foot. Where the `guess` is near, most balls are too far away to be looked into."""
+    """The nearer of the two edges that meet in the rim's point nearest to the n-th point, and the fraction of it before
+    the closest point. With a near `guess` most balls are too far away to be searched."""
     px, py, pz = x[n, 0], x[n, 1], x[n, 2]
     nearest, least = guess, _square(px, py, pz, points, guess)
     far = np.sqrt(least)
@@ -168,24 +195,21 @@ def _piece(points: Floats, pieces: int) -> Floats:
     return on_curve(s, points, fine)
 
 
-SHARP = 0.35  # [rad], 20 degrees: an edge between two such turns to opposite sides is a jog
-FEWEST = 4  # jogs in a row that make an edge jagged: a real corner or notch has fewer
-RUN = 2.5  # times sqrt(n): edges between jogs of a row; a lattice cut along a circle of n edges has runs of 1.1 sqrt(n)
-MOST, RMS = 1.0, 0.35  # edges by which a vertex may be moved; uniform steps of a lattice are 0.29 off their mean, rms
-HALVINGS = 20
-
-
 def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
-    """The loop (n, 3) with its jagged parts smoothed, or None if it has none.
+    """Smooth the jagged parts of a mesh's edge, such as missing faces leave.
 
-    Of all curves that keep within an edge length of the vertices, and in the mean within what the steps of a lattice
-    explain, it is the smoothest: a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink
-    a circle. Vertices outside of jagged parts stay where they are.
+    The result is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle. It is
+    the smoothest whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain.
+    Vertices outside of jagged parts do not move.
 
     Parameters
     ----------
     loop : (n, 3) closed polyline [m].
     normals : (n, 3) of the surface there.
+
+    Returns
+    -------
+    (n, 3) the smoothed loop, or None if no part is jagged.
     """
     free = _jagged(loop, normals)
     if not free.any():
@@ -205,7 +229,7 @@ def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
 
 
 def _jagged(loop: Floats, normals: Floats) -> Bools:
-    """(n,) vertices of jagged parts: of rows of jogs that follow each other closely."""
+    """(n,) which vertices are in jagged parts: rows of jogs at short distances."""
     count = len(loop)
     ahead = np.roll(loop, -1, axis=0) - loop
     before = np.roll(ahead, 1, axis=0)
@@ -220,7 +244,7 @@ def _jagged(loop: Floats, normals: Floats) -> Bools:
 
 
 def _rows(jogs: Ints, count: int) -> list[Ints]:
-    """The jogs of a closed loop in rows whose gaps are short; the last may go on past `count`."""
+    """The jogs of a closed loop in rows with short gaps; indices of the last may be larger than `count`."""
     if len(jogs) == 0:
         return []
     gaps = np.diff(jogs, append=jogs[0] + count)

@@ -199,7 +199,7 @@ class Target(ABC):
         """Signed distance (n,) [m] of the points `x` (n, 3) [m] to the continued surface, positive outside."""
         y, gradient = self._closest(x)
         away = x - y
-        return np.copysign(np.linalg.norm(away, axis=1), np.einsum("ij,ij->i", away, gradient))
+        return np.asarray(np.copysign(np.linalg.norm(away, axis=1), np.einsum("ij,ij->i", away, gradient)))
 
     def gap(self, x: Floats) -> Gap:
         """Signed distance of the points `x` (n, 3) [m] to the continued surface, with gradient and Hessian."""
