@@ -68,7 +68,7 @@ def meshed(target: rs.HeightField, rng: np.random.Generator) -> Freeform:
         :, 2
     ]
     plan = plan * [a, b]
-    return Freeform.of(np.column_stack([plan, target.height(plan)]), faces[np.abs(area) > 1e-9])
+    return Freeform.of(np.column_stack([plan, target.height_at(plan)]), faces[np.abs(area) > 1e-9])
 
 
 def outcome(seed: int) -> Outcome:

@@ -15,10 +15,10 @@ from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.families import LEAVE_OUT, choose_families
 from rodshell.formfinding.patches import carried_heading, patches_of
 from rodshell.formfinding.seams import End, in_a_row
+from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.side_by_side import side_by_side
 from rodshell.output import read
-from rodshell.targets.curvefile import closed_loops, joined
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Seam
 
 Floats = NDArray[np.float64]
 
@@ -416,7 +416,7 @@ def test_grids_side_by_side_are_the_same_grids() -> None:
 def test_strokes_are_joined_at_both_ends() -> None:
     x = np.column_stack([np.arange(7.0), np.zeros((7, 2))])
     middle_last = [x[[2, 1, 0]], x[4:7], x[2:5]]
-    (line,) = joined(middle_last)
+    (line,) = join_end_to_end(middle_last)
     assert len(line) == 7
     assert abs(line[0, 0] - line[-1, 0]) == 6.0
     assert closed_loops(middle_last) == []

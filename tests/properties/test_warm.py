@@ -7,10 +7,10 @@ import pytest
 
 import rodshell as rs
 from rodshell.formfinding.warm_start import corresponding_rods, transferred_edges, transferred_nodes
-from rodshell.nets import nearby
+from rodshell.nets import net_refinement
 from rodshell.nets.chebyshev import chebyshev_net
 from rodshell.nets.compass import march
-from rodshell.nets.nearby import march_near
+from rodshell.nets.net_refinement import march_near
 from tests.properties.altered import at_positions
 
 SIZE = 0.2
@@ -79,7 +79,7 @@ def test_a_bad_guess_of_the_net_does_no_harm(worse):
 
 def test_what_has_not_settled_is_marched(monkeypatch):
     """After one round from a rough net no node has."""
-    monkeypatch.setattr(nearby, "ROUNDS", 1)
+    monkeypatch.setattr(net_refinement, "ROUNDS", 1)
     anchor, heading = np.array([0.0, 0.0, SIZE]), np.array([1.0, 0.0, 0.0])
     u, rough = lines(0.3, 0.01), lines(0.32, 0.04)
     found = march_near(HEMISPHERE, u, u, anchor, heading, march(HEMISPHERE, rough, rough, anchor, heading)).points

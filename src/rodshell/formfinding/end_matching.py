@@ -18,7 +18,7 @@ from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.cuts import inside_nodes
-from rodshell.nets.nearby import interpolated
+from rodshell.nets.net_refinement import interpolated
 from rodshell.targets import Target
 
 Point = tuple[float, float]

@@ -28,8 +28,7 @@ from rodshell.layout.side_by_side import SideBySide, side_by_side
 from rodshell.rods.section import Rod
 from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
-from rodshell.targets.patch import Patch
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Patch, Seam
 from rodshell.units import shown
 from rodshell.validation import choices_of
 

@@ -16,7 +16,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted
 from rodshell.joints.crossings import Places
 from rodshell.joints.sections import by_edge, carried, edge_tangents, frame, of_edge, spread, stencils
-from rodshell.layout.layers import sides
+from rodshell.layout.flatgrid import sides
 from rodshell.rods.elements import NO_HESSIANS
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -143,7 +143,7 @@ def _heights(target: Target, points: Floats) -> Floats:
     """(m,) the target's greatest height over the chord of each rod [m]."""
     t = np.linspace(0.02, 0.98, 49)[:, None]
     ends = points.reshape(-1, 2, 3)
-    return np.array([np.nanmax(target.height((a + t * (b - a))[:, :2])) - min(a[2], b[2]) for a, b in ends])
+    return np.array([np.nanmax(target.height_at((a + t * (b - a))[:, :2])) - min(a[2], b[2]) for a, b in ends])
 
 
 def _orbits(target: Target, lines: tuple[FlatRod, ...], points: Floats) -> Ints:

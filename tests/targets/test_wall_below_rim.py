@@ -5,8 +5,8 @@ import pytest
 
 import rodshell as rs
 from rodshell.targets import Freeform
-from rodshell.targets.footing import Outline
 from rodshell.targets.rim import Rim
+from rodshell.targets.wall_below_rim import RimPlan
 from tests.acceptance.cases import ROD
 from tests.targets.meshes import Floats, capped_sphere, disc, lattice, sheet
 from tests.targets.test_rim import flat, ring, up
@@ -76,7 +76,7 @@ def test_a_grid_may_fall_on_a_mesh_from_high_above():
 
 
 def test_an_outline_is_the_region_that_it_encloses():
-    round_one = Outline(Rim.of([ring(RADIUS, 200)], flat, up))
+    round_one = RimPlan(Rim.of([ring(RADIUS, 200)], flat, up))
     xy = np.random.default_rng(1).uniform(-0.4, 0.4, (500, 2))
     xy = xy[np.hypot(*xy.T) > 0.05]
     found, exact = round_one.distance(xy), rs.Disc(RADIUS).distance(xy)
@@ -86,7 +86,7 @@ def test_an_outline_is_the_region_that_it_encloses():
     assert found[2][outer] == pytest.approx(exact[2][outer], abs=0.05 / RADIUS)
     assert np.array_equal(round_one.holds(xy), rs.Disc(RADIUS).holds(xy))
     corners = np.array([[0.3, 0.2, 0], [-0.3, 0.2, 0], [-0.3, -0.2, 0], [0.3, -0.2, 0]])
-    square = Outline(Rim.of([corners], flat, up))
+    square = RimPlan(Rim.of([corners], flat, up))
     assert square.half_extent == (0.3, 0.2)
     far = np.random.default_rng(2).uniform(-0.6, 0.6, (500, 2))
     far = far[np.abs(np.abs(far[:, 0]) - np.abs(far[:, 1]) - 0.1) > 0.01]  # off the diagonals, where normals jump

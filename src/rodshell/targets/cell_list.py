@@ -1,6 +1,6 @@
-"""Neighbours of points: points of a surface in the cells of a lattice, looked up by compiled loops.
+"""Neighbours of points: points of a surface sorted into the cells of a lattice, searched by compiled loops.
 
-Points of a surface lie evenly, which is all that a lattice of cells needs to beat a tree.
+Points of a surface lie evenly, so that cells of one size are faster than a tree.
 """
 
 from dataclasses import dataclass
@@ -14,13 +14,17 @@ MOST_CELLS = 64  # for each point
 
 
 @dataclass(frozen=True, eq=False)
-class Buckets:
-    """Points (n, 3) sorted into cells.
+class CellList:
+    """Points sorted into cells; make one with `CellList.of`.
 
     Parameters
     ----------
-    low : (3,) corner of the first cell [m]; shape : (3,) number of cells; cell : their width [m].
-    start : where the points of each cell begin in `order`, cells counted with z fastest; order : (n,) points by cell.
+    points : (n, 3) [m].
+    low : (3,) corner of the first cell [m].
+    shape : (3,) number of cells along each axis.
+    cell : width of a cell [m].
+    start : (cells + 1,) where the points of each cell begin in `order`; cells are counted with z fastest.
+    order : (n,) indices of the points, cell by cell.
     """
 
     points: Floats
@@ -31,28 +35,44 @@ class Buckets:
     order: Ints
 
     @staticmethod
-    def of(points: Floats, cell: float) -> "Buckets":
-        """Into cells of the width `cell` [m], or wider ones where there would be too many."""
+    def of(points: Floats, cell: float) -> "CellList":
+        """Sort points (n, 3) [m] into cells of the width `cell` [m], wider where there would be too many."""
         low, shape, cell = _lattice_over(points, cell)
-        return Buckets(points, low, shape, cell, *_sorted(points, low, shape, cell))
+        return CellList(points, low, shape, cell, *_sorted(points, low, shape, cell))
 
     @property
     def _lattice(self) -> tuple[Floats, Floats, Ints, float, Ints, Ints]:
         return self.points, self.low, self.shape, self.cell, self.start, self.order
 
     def nearest(self, x: Floats, count: int = 1, limit: float = np.inf) -> tuple[Floats, Ints]:
-        """Distances and indices (n, count) of the points nearest to each of (n, 3), nearest first.
+        """The nearest points, nearest first.
 
-        Those further than `limit` [m] need not be found; their distance is then infinite.
+        Parameters
+        ----------
+        x : (n, 3) points whose neighbours are wanted [m].
+        count : of neighbours of each.
+        limit : neighbours further away need not be found; their distance is then infinite [m].
+
+        Returns
+        -------
+        Distances (n, count) [m] and indices (n, count).
         """
         distance, index = np.full(len(x) * count, np.inf), np.zeros(len(x) * count, dtype=np.intp)
         _nearest(x, *self._lattice, count, limit, distance, index)
         return np.sqrt(distance).reshape(-1, count), index.reshape(-1, count)
 
     def within(self, x: Floats, radius: float, *, ordered: bool = False) -> tuple[Ints, Ints, Floats]:
-        """Points within `radius` [m] of each of (m, 3), nearest first if `ordered`.
+        """All points within a radius.
 
-        Returns where each list begins (m + 1,), the lists in a row, and how far these points are [m].
+        Parameters
+        ----------
+        x : (m, 3) points whose neighbours are wanted [m].
+        radius : [m].
+        ordered : whether the nearest come first.
+
+        Returns
+        -------
+        Where the list of each point begins (m + 1,), the lists one after the other (k,), and the distances (k,) [m].
         """
         most = _most_within(x, *self._lattice, radius)
         begin, near, away = np.zeros(len(x) + 1, dtype=np.intp), np.empty(most, dtype=np.intp), np.empty(most)
@@ -60,7 +80,7 @@ class Buckets:
         return begin, near[: begin[-1]], away[: begin[-1]]
 
     def spread(self, distance: float) -> Ints:
-        """Indices of points no two of which are closer than `distance` [m], every other being closer to one."""
+        """Indices of points at least `distance` [m] apart, such that every other point is closer to one of them."""
         free = np.ones(len(self.points), dtype=bool)
         _thin(*self._lattice, distance, free)
         return np.flatnonzero(free)
@@ -82,19 +102,19 @@ def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _sorted(points, low, shape, cell):  # type: ignore[no-untyped-def]
-    """Points counted into their cells."""
-    own = np.zeros(len(points), dtype=np.intp)
+    """Sort points into their cells, by counting."""
+    cells = np.zeros(len(points), dtype=np.intp)
     start = np.zeros(shape[0] * shape[1] * shape[2] + 1, dtype=np.intp)
     for n in range(len(points)):
         for k in range(3):
-            own[n] = own[n] * shape[k] + int(np.floor((points[n, k] - low[k]) / cell))
-        start[own[n] + 1] += 1
+            cells[n] = cells[n] * shape[k] + int(np.floor((points[n, k] - low[k]) / cell))
+        start[cells[n] + 1] += 1
     for k in range(1, len(start)):
         start[k] += start[k - 1]
     place, order = start[:-1].copy(), np.empty(len(points), dtype=np.intp)
     for n in range(len(points)):
-        order[place[own[n]]] = n
-        place[own[n]] += 1
+        order[place[cells[n]]] = n
+        place[cells[n]] += 1
     return start, order
 
 
@@ -112,13 +132,13 @@ def _box(x, n, low, shape, cell, reach):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _square(x, n, points, c):  # type: ignore[no-untyped-def]
-    """Of the distance between the n-th and the c-th point."""
+    """Square of the distance between the n-th and the c-th point."""
     return (x[n, 0] - points[c, 0]) ** 2 + (x[n, 1] - points[c, 1]) ** 2 + (x[n, 2] - points[c, 2]) ** 2
 
 
 @njit(cache=True)
 def _keep(distance, index, first, last, d, c):  # type: ignore[no-untyped-def]
-    """Insert c at the distance d into the places `first` to `last`, which are in order; the last is given up."""
+    """Insert c at the distance d into the entries `first` to `last`, which are in order; the last one is dropped."""
     k = last
     while k > first and distance[k - 1] > d:
         distance[k], index[k] = distance[k - 1], index[k - 1]
@@ -128,7 +148,7 @@ def _keep(distance, index, first, last, d, c):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, index):  # type: ignore[no-untyped-def]
-    """Squares of distances. What lies within as many widths as there are cells looked at each way is nearest."""
+    """Squares of distances. A neighbour is final once it is nearer than the cells that were not searched."""
     for n in range(len(x)):
         if not np.isfinite(x[n, 0] + x[n, 1] + x[n, 2]):
             continue
@@ -156,7 +176,7 @@ def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, 
 
 @njit(cache=True)
 def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ignore[no-untyped-def]
-    """How many entries all lists together cannot exceed."""
+    """An upper bound of the entries of all lists together."""
     count, reach = 0, int(np.ceil(radius / cell))
     for n in range(len(x)):
         i_from, i_stop, j_from, j_stop, k_from, k_stop = _box(x, n, low, shape, cell, reach)
@@ -169,7 +189,7 @@ def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ig
 
 @njit(cache=True)
 def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, near, away):  # type: ignore[no-untyped-def]
-    """List the neighbours one after the other, where each list begins in `begin` (n + 1,)."""
+    """List the neighbours one after the other; each list begins at `begin` (n + 1,)."""
     reach = int(np.ceil(radius / cell))
     for n in range(len(x)):
         last = begin[n]
@@ -187,7 +207,7 @@ def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, n
 
 @njit(cache=True)
 def _thin(points, low, shape, cell, start, order, distance, free):  # type: ignore[no-untyped-def]
-    """Each point in turn that is still free takes the later ones that are too close to it."""
+    """Each point that is still free removes the later ones that are too close to it."""
     reach = int(np.ceil(distance / cell))
     for n in range(len(points)):
         if not free[n]:

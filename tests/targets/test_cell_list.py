@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rodshell.targets.buckets import Buckets
+from rodshell.targets.cell_list import CellList
 from tests.targets.meshes import Floats
 
 
@@ -29,7 +29,7 @@ def apart(x: Floats, points: Floats) -> Floats:
 def test_the_nearest_are_those_of_all_pairs(cell, count):
     points, x = surface(), places()
     exact = apart(x, points)
-    distance, index = Buckets.of(points, cell).nearest(x, count)
+    distance, index = CellList.of(points, cell).nearest(x, count)
     assert np.array_equal(index, np.argsort(exact, axis=1)[:, :count])
     assert distance == pytest.approx(np.sort(exact, axis=1)[:, :count], rel=1e-14)
 
@@ -37,12 +37,12 @@ def test_the_nearest_are_those_of_all_pairs(cell, count):
 def test_up_to_a_limit_the_nearest_are_found_and_what_is_no_point_has_none():
     points, x = surface(), places()
     exact = apart(x, points).min(axis=1)
-    distance = Buckets.of(points, 0.05).nearest(x, limit=0.2)[0][:, 0]
+    distance = CellList.of(points, 0.05).nearest(x, limit=0.2)[0][:, 0]
     near = exact <= 0.2
     assert 20 < near.sum() < len(x) - 20
     assert distance[near] == pytest.approx(exact[near], rel=1e-14)
     assert (distance[~near] > 0.2).all()
-    assert Buckets.of(points, 0.05).nearest(np.array([[np.nan, 0.0, 0.0]]))[0] == np.inf
+    assert CellList.of(points, 0.05).nearest(np.array([[np.nan, 0.0, 0.0]]))[0] == np.inf
 
 
 @pytest.mark.parametrize("radius", [0.01, 0.15, 0.6])
@@ -50,7 +50,7 @@ def test_lists_within_a_radius_are_those_of_all_pairs(radius):
     points, x = surface(), places()
     exact = apart(x, points)
     for ordered in (False, True):
-        begin, near, away = Buckets.of(points, 0.1).within(x, radius, ordered=ordered)
+        begin, near, away = CellList.of(points, 0.1).within(x, radius, ordered=ordered)
         assert begin[0] == 0
         assert begin[-1] == len(near) == len(away) == np.count_nonzero(exact <= radius)
         for n in range(len(x)):
@@ -62,7 +62,7 @@ def test_lists_within_a_radius_are_those_of_all_pairs(radius):
 
 def test_spread_points_are_apart_and_every_other_is_near_one():
     points = surface()
-    chosen = Buckets.of(points, 0.1).spread(0.1)
+    chosen = CellList.of(points, 0.1).spread(0.1)
     own = apart(points[chosen], points[chosen]) + np.eye(len(chosen))
     assert own.min() > 0.1
     assert apart(points, points[chosen]).min(axis=1).max() <= 0.1
@@ -71,6 +71,6 @@ def test_spread_points_are_apart_and_every_other_is_near_one():
 
 def test_points_along_a_line_get_wider_cells_and_no_more_of_them():
     points = np.column_stack([np.linspace(0, 1, 50), np.linspace(0, 1, 50), np.linspace(0, 1, 50)])
-    buckets = Buckets.of(points, 1e-3)
+    buckets = CellList.of(points, 1e-3)
     assert np.prod(buckets.shape) <= 64 * 50
     assert np.array_equal(buckets.nearest(points)[1][:, 0], np.arange(50))

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from rodshell.arrays import Floats, Ints
-from rodshell.targets.buckets import Buckets
+from rodshell.targets.cell_list import CellList
 from rodshell.targets.target import Implicit
 
 WIDTH = 0.5  # of the spacing of centres: weights of the blend
@@ -26,15 +26,15 @@ TERMS = 10  # of a cubic in two variables
 
 
 @dataclass(frozen=True, eq=False)
-class PatchField:
-    """Cubics over the tangent planes at `centres`.
+class SmoothField:
+    """A smooth implicit function F, blended from cubics over tangent planes.
 
     Parameters
     ----------
-    centres : (m, 3) [m], about `spacing` [m] apart.
-    frames : (m, 3, 3), rows: two tangents and the outward normal.
+    centres : (m, 3) points of the surface, about `spacing` apart [m].
+    frames : (m, 3, 3) whose rows are two tangents and the outward normal.
     coefficients : (m, 10) of 1, a, b, a^2, ab, b^2, a^3, a^2 b, a b^2, b^3 in a = xi / spacing, b = eta / spacing [m].
-    spacing : [m].
+    spacing : between centres [m].
     reach : F is NaN further than this from every centre [m].
     """
 
@@ -45,34 +45,40 @@ class PatchField:
     reach: float
 
     @cached_property
-    def buckets(self) -> Buckets:
-        """The centres, to be asked for the nearest."""
-        return Buckets.of(self.centres, self.spacing)
+    def buckets(self) -> CellList:
+        """The centres, sorted for searches of the nearest."""
+        return CellList.of(self.centres, self.spacing)
 
     @property
     def _radius(self) -> float:
-        """How far from a centre those lie that can matter where it is nearest [m]."""
-        return self.spacing * (1.2 + WIDTH * NEGLIGIBLE**0.5)
+        """Distance from a centre within which others contribute to F where it is the nearest [m]."""
+        return float(self.spacing * (1.2 + WIDTH * NEGLIGIBLE**0.5))
 
     @cached_property
     def _near(self) -> tuple[Ints, Ints, Floats]:
-        """Centres that can matter where a given one is nearest, nearest first: where each list begins, the lists in
-        a row, and how far each centre is from the one whose list it is in [m]."""
-        return Buckets.of(self.centres, 0.5 * self._radius).within(self.centres, self._radius, ordered=True)
+        """For each centre, the centres that contribute where it is the nearest, nearest first: where each list begins,
+        the lists in a row, and the distances [m]."""
+        return CellList.of(self.centres, 0.5 * self._radius).within(self.centres, self._radius, ordered=True)
 
     @cached_property
     def _packed(self) -> Floats:
-        """(m, 22) all numbers of each patch in a row: centre, tangents over the spacing, normal, coefficients."""
+        """(m, 22) all numbers of each cubic: centre, tangents over the spacing, normal, coefficients."""
         tangents = self.frames[:, :2] / self.spacing
         return np.hstack([self.centres, tangents.reshape(-1, 6), self.frames[:, 2], self.coefficients])
 
     def nearest(self, x: Floats) -> tuple[Floats, Ints]:
-        """Distance (n,) [m] of the points (n, 3) to the nearest centre, and which it is."""
+        """Distance (n,) [m] of the points `x` (n, 3) to the nearest centre, and its index (n,)."""
         distance, index = self.buckets.nearest(x)
         return distance[:, 0], index[:, 0]
 
     def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
-        """F, gradient and, unless they are not needed, second derivatives at the points (n, 3)."""
+        """Evaluate F and its derivatives.
+
+        Parameters
+        ----------
+        x : (n, 3) points [m].
+        second : whether second derivatives are wanted; without them the Hessian is empty.
+        """
         distance, nearest = self.nearest(x)
         value, gradient, hessian = np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x) if second else 0, 3, 3))
         width2 = (WIDTH * self.spacing) ** 2
@@ -82,7 +88,7 @@ class PatchField:
         return Implicit(value, gradient, hessian)
 
 
-# Places of what is known of four points in one array: what a compiler needs to see to do four sums at once.
+# Offsets of the quantities of four points in one array: so the compiler does four sums at once.
 LANES = 4
 _X, _Y, _Z, _LEAST, _MOST, _D, _F, _GX, _GY, _GZ, _AX, _AY, _AZ = range(0, 13 * LANES, LANES)
 _DXX, _DXY, _DXZ, _DYY, _DYZ, _DZZ, _HXX, _HXY, _HXZ, _HYY, _HYZ, _HZZ = range(13 * LANES, 25 * LANES, LANES)
@@ -146,7 +152,7 @@ def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
-    """One patch's part of the sums of four points; see `PatchField._packed` for its numbers."""
+    """One patch's part of the sums of four points; see `SmoothField._packed` for its numbers."""
     x, y, z = p[0], p[1], p[2]
     tx, ty, tz = (x - centre[0]) * 2 / width2, (y - centre[1]) * 2 / width2, (z - centre[2]) * 2 / width2
     e0, e1, e2, e3, e4, e5, n0, n1, n2 = p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
