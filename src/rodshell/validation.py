@@ -3,9 +3,10 @@
 Every function raises InputError, which calls the argument by its `name`.
 """
 
+import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
-from math import isfinite
+from math import inf, isfinite
 from numbers import Real
 from reprlib import repr as short
 from types import UnionType
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     Floats = Floats
+MOST = sys.float_info.max
+
 Choice = TypeVar("Choice", bound=str)
 
 
@@ -48,20 +51,28 @@ def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice
     return tuple(dict.fromkeys(choice(name, word, choices) for word in words))
 
 
-def number(name: str, value: object, unit: str) -> None:
+def number(name: str, value: object, unit: str = "") -> None:
     """Refuse what is not a finite number of this `unit`."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{name} must be a number in {unit}, not {_described(value)}")
-    if not isfinite(value):
-        raise InputError(f"{name} must be finite, not {value} {unit}")
+    if not isfinite(_real(name, value, unit)):
+        raise InputError(f"{name} must be finite, not {value} {unit}".rstrip())
 
 
 def positive(name: str, value: object, unit: str) -> None:
     """Refuse what is not a finite number above 0, of this `unit`."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{name} must be a number in {unit}, not {_described(value)}")
-    if not (isfinite(value) and float(value) > 0):
+    if not 0 < _real(name, value, unit) < inf:
         raise InputError(f"{name} must be positive, not {value} {unit}")
+
+
+def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = False) -> None:
+    """Refuse what is not a number of 0 or more, of this `unit`; infinity only where it is allowed."""
+    if not 0 <= _real(name, value, unit) <= (inf if infinite else MOST):
+        raise InputError(f"{name} must be 0 or more, not {value} {unit}".rstrip())
+
+
+def _real(name: str, value: object, unit: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InputError(f"{name} must be a number{f' in {unit}' if unit else ''}, not {_described(value)}")
+    return float(value)
 
 
 def point(name: str, value: object) -> None:

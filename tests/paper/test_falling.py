@@ -25,7 +25,7 @@ TENTH = 0.1e-3  # [m]
 DRAG = 5.0  # 1/s: the hanging tails, pendulums of 0.3 m, stop swinging within two seconds
 FALLS = {
     "shared": Fall(coupling=SharedDofs(), drag=DRAG),
-    "along the normal": Fall(coupling=SharedDofs(), drag=DRAG, stopped="along the normal"),
+    "along the normal": Fall(coupling=SharedDofs(), drag=DRAG, stopped="normal"),
     "implicit": Fall(coupling=ImplicitPenalty(), drag=DRAG),
 }
 
@@ -200,7 +200,7 @@ def test_friction_holds_what_else_slides_off() -> None:
     offsets = {}
     for friction in (0.0, 0.2):
         layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)
-        fall = Fall(friction=friction, drag=DRAG, stopped="along the normal", duration=2.0)
+        fall = Fall(friction=friction, drag=DRAG, stopped="normal", duration=2.0)
         draped = rs.drape(layout, PAPER_ROD, HEMISPHERE, method="paper", anchor=(1e-3, 0.0), fall=fall)
         middle = draped.positions[np.argmin(np.linalg.norm(draped.mesh.flat, axis=1))]
         offsets[friction] = abs(float(middle[0]))

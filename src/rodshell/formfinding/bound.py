@@ -12,7 +12,7 @@ from math import degrees
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.contact.bound import BoundToTarget
+from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.natural import with_natural_ends
 from rodshell.formfinding.progress import Progress, silent

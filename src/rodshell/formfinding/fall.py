@@ -31,7 +31,7 @@ class Fall:
     height: float = 0.05
     time_step: float | None = None
     duration: float | None = None
-    stopped: Stopped = "wholly"
+    stopped: Stopped = "all"
     friction: float = 0.0
     drag: float = 0.0
     stream: str | Path | None = None

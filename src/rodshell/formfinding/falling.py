@@ -153,7 +153,7 @@ class _Falling:
 
     def _stopped(self, touching: Ints) -> Ints:
         """Of nodes that touch, those that lose their whole velocity at each step."""
-        return touching if self._law.stops_wholly else NO_NODES
+        return touching if self._law.stops_all else NO_NODES
 
     def _refuse_unstable(self, moment: Moment) -> None:
         """Raise StabilityError where the explicit ties do not bear the step with what touches now."""

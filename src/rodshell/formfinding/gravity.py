@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.contact.unilateral import UnilateralContact
+from rodshell.contact.static import UnilateralContact
 from rodshell.formfinding.draped import Draped, laid_in_layers, middle_surface, node_normals, smallest_joint_angle
 from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
 from rodshell.formfinding.progress import Progress, silent
