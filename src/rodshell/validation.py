@@ -3,7 +3,6 @@
 Every function raises InputError, which calls the argument by its `name`.
 """
 
-import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from math import inf, isfinite
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     Floats = Floats
-MOST = sys.float_info.max
-
 Choice = TypeVar("Choice", bound=str)
 
 
@@ -65,7 +62,7 @@ def positive(name: str, value: object, unit: str) -> None:
 
 def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = False) -> None:
     """Refuse what is not a number of 0 or more, of this `unit`; infinity only where it is allowed."""
-    if not 0 <= _real(name, value, unit) <= (inf if infinite else MOST):
+    if not 0 <= _real(name, value, unit) <= inf or (value == inf and not infinite):
         raise InputError(f"{name} must be 0 or more, not {value} {unit}".rstrip())
 
 

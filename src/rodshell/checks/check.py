@@ -20,8 +20,8 @@ from rodshell.formfinding import Popped
 from rodshell.formfinding.popup import UP, Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.model import Shell
-from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
+from rodshell.rods.section_stress import VON_MISES
 from rodshell.solve.constraint import Supports
 from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
@@ -131,7 +131,7 @@ def check(
     Parameters
     ----------
     stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.fibres`.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.section_stress`.
     """
     done = {ends: shell for ends, shell in popped.items() if shell.report.converged}
     settled = {ends: settled_shell(shell) for ends, shell in done.items()}

@@ -24,8 +24,7 @@ from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import Clamps, End, RodLine, Rods
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
-from rodshell.rods.isotropic_bend import IsotropicBend
-from rodshell.rods.round_bend_twist import RoundBendTwist
+from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.rods.stretch import Stretch
 from rodshell.validation import direction, finite, vector
 
@@ -58,8 +57,8 @@ class ElasticRod:
     ----------
     rest : (n, 3) rest positions of the nodes [m].
     closed : a ring; its last edge leads back to the first node.
-    elements : bending and twist: `BendTwist`; where the rod is isotropic and naturally straight `RoundBendTwist`, or
-        `IsotropicBend` where it carries no twist angles.
+    elements : bending and twist: `BendTwist`; where the rod is isotropic and naturally straight
+        `IsotropicBendTwist`, or `IsotropicBend` where it carries no twist angles.
     stretch : the edges.
     mass : (N, 3) lumped mass of each block's components: of a node [kg]; of a twist angle the rotary inertia
         [kg m2] in component 0, else 0. Ghosts have none.
@@ -117,7 +116,7 @@ class ElasticRod:
         elements: Elements
         if twist:
             state, frames = bends.rest_state(line, line.directors(director))
-            found = (RoundBendTwist if free_spin else BendTwist).starting_at(
+            found = (IsotropicBendTwist if free_spin else BendTwist).starting_at(
                 bends.blocks,
                 state,
                 frames,

@@ -29,7 +29,7 @@ from rodshell.layout import GridMesh
 from rodshell.model.freedom import Freedom
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
-from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
 from rodshell.rods.stretch import Stretch
 
