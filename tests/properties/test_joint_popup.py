@@ -10,7 +10,7 @@ from numpy.linalg import norm
 import rodshell as rs
 from rodshell.checks.joint_loads import joint_loads
 from rodshell.checks.reactions import reactions
-from rodshell.joints.crossings import Places
+from rodshell.joints.crossings import RodNodes
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import find_equilibrium
 from rodshell.solve.problem import Problem
@@ -67,7 +67,7 @@ def test_each_rod_is_in_balance_under_its_supports_and_its_joints(name, ends):
     shell = shell.with_elements(found.elements)
     loads, held = joint_loads(shell, found.state), reactions(shell, found)
     crossings, positions = shell.mesh.grid.crossings, found.state[shell.node_blocks]
-    places = Places(shell.mesh, shell.node_blocks, shell.first_angle).of_crossings
+    places = RodNodes(shell.mesh, shell.node_blocks, shell.first_angle).at_crossings
     for rod in range(len(shell.mesh.grid.rods)):
         force, moment = np.zeros(3), np.zeros(3)
         for end in (2 * rod, 2 * rod + 1):
@@ -151,7 +151,7 @@ def test_three_rods_at_one_node_have_one_kind_of_joint():
     grid = rs.straight_rods([[[-1, 0], [1, 0]], [[0, -1], [0, 1]], [[-1, -1], [1, 1]]])
     mesh = rs.mesh_grid(grid, 0.25)
     for other in (rs.Linker(), rs.Ball(), rs.Rigid()):
-        with pytest.raises(rs.InputError, match="give all of them one kind"):
+        with pytest.raises(rs.InputError, match="give all of them the same kind"):
             rs.Shell.of(mesh, ROD, joint=[rs.Pin(), rs.Pin(), other])
 
 

@@ -21,8 +21,8 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import unit
 from rodshell.joints import Ball, Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, SharedDofs, Ties
-from rodshell.joints.crossings import Places
-from rodshell.joints.elastic import elastic_joints, refuse_mixtures
+from rodshell.joints.crossings import RodNodes
+from rodshell.joints.joint_stiffness import elastic_joints, refuse_mixtures
 from rodshell.joints.linkers import Corners, LinkerBend
 from rodshell.joints.offset_tie import offset_ties
 from rodshell.layout import GridMesh
@@ -217,7 +217,7 @@ class _Builder:
         self.first_angle = n + len(self.ghosts)
         self.angles = (len(mesh.edges) + (0 if self.isotropic else len(self.ghosts))) if self.twist else 0
         self.size = self.first_angle + self.angles
-        self.places = Places(mesh, self.parts.rod_nodes, self.first_angle)
+        self.rod_nodes = RodNodes(mesh, self.parts.rod_nodes, self.first_angle)
         shared = mesh.node_count
         rest = shared + np.arange(len(self.ghosts) + self.angles)
         self.like = np.append(mesh.rod_nodes if self.apart else np.arange(shared), rest)
@@ -289,14 +289,14 @@ class _Builder:
 
     def _elastic(self) -> tuple[Elements, ...]:
         which = np.array([n for n, one in enumerate(self.joints) if not isinstance(one, Linker)], dtype=np.intp)
-        return elastic_joints(self.places, which, [self.joints[n] for n in which], self.stiffness, self.size)
+        return elastic_joints(self.rod_nodes, which, [self.joints[n] for n in which], self.stiffness, self.size)
 
     def _linkers(self) -> tuple[list[Elements], list[Elements]]:
         """Linkers, and the ties that hold those with unknowns of their own; these get their blocks here."""
         linkers, ties = list[Elements](), list[Elements]()
         for joint in {one for one in self.joints if isinstance(one, Linker)}:
             crossings = np.array([n for n, one in enumerate(self.joints) if one == joint], dtype=np.intp)
-            corners = Corners.of(self.places, crossings, joint.corners)
+            corners = Corners.of(self.rod_nodes, crossings, joint.corners)
             blocks = corners.blocks
             if self.apart:
                 blocks = self.size + np.arange(5 * len(blocks)).reshape(-1, 5)
@@ -317,11 +317,11 @@ class _Builder:
         """Between the nodes of rods at joints without linkers."""
         if not self.apart:
             return []
-        met = self.places.of_crossings
+        met = self.rod_nodes.at_crossings
         eccentric = np.array([one.eccentricity for one in self.joints])
         plain = np.array([n for n, one in enumerate(self.joints) if not (eccentric[n] or isinstance(one, Linker))])
-        ties = [self._tied(self.places.blocks[met[plain.astype(np.intp)]], 1)] if len(plain) else []
-        return [*ties, *offset_ties(self.places, eccentric, self._offset_stiffness(), self.size)]
+        ties = [self._tied(self.rod_nodes.blocks[met[plain.astype(np.intp)]], 1)] if len(plain) else []
+        return [*ties, *offset_ties(self.rod_nodes, eccentric, self._offset_stiffness(), self.size)]
 
     def _offset_stiffness(self) -> float:
         """Of eccentric ties [N/m]. A hundred thousand times stiffer ones, like a penalty's, would make a geometric
@@ -338,7 +338,7 @@ class _Builder:
         """C1 [N/m] or C2 [N m/rad]; the softest rod decides where they are not given."""
         coupling = ImplicitPenalty() if isinstance(self.coupling, SharedDofs) else self.coupling
         edge = float(np.median(self.mesh.edge_lengths))
-        of_rods = [coupling.of(rod, edge) for rod in set(self.rods)]
+        of_rods = [coupling.with_defaults(rod, edge) for rod in set(self.rods)]
         return min(float(one.C1 if which == 1 else one.C2) for one in of_rods)  # type: ignore[arg-type]
 
     def _shared_mass(self) -> Floats:
