@@ -135,7 +135,9 @@ def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
         goals = first + (share - begin) / (1 - begin) * (last - first)
         moved = state.copy()
         moved[shell.ends] = goals
-        problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, places=shell.places)
+        problem = Problem(
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, places=shell.flat_coordinates
+        )
         there = relax(problem, moved)
         assert there.report.stable
         nodes = shell.positions(there.state - state)
@@ -161,7 +163,9 @@ def test_every_stage_of_a_path_forwards_is_a_stable_equilibrium_with_its_ends_on
     assert way.share.tolist() == [(k / 8) ** 2 for k in range(9)]
     for share, places, (shell, state) in zip(way.share[1:], ends[1:], way.shells, strict=True):
         np.testing.assert_allclose(places, (1 - share) * ends[0] + share * ends[-1], atol=1e-12)
-        problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, places=shell.places)
+        problem = Problem(
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, places=shell.flat_coordinates
+        )
         found = find_equilibrium(problem, state, shell.stretch.stiffness * shell.stretch.strains(state))
         assert found.report.stable
         np.testing.assert_allclose(found.state, state, atol=1e-8)

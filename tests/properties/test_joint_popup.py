@@ -48,7 +48,9 @@ def popped(name, ends="clamped", start="draped"):
 def settled(shell, state, forces):
     """One Newton step further, for forces to round-off."""
     supports = Supports(shell.held_ends())
-    return find_equilibrium(Problem(shell.elements, shell.stretch, supports, 0.2, places=shell.places), state, forces)
+    return find_equilibrium(
+        Problem(shell.elements, shell.stretch, supports, 0.2, places=shell.flat_coordinates), state, forces
+    )
 
 
 @every_joint
@@ -132,7 +134,7 @@ def test_joints_may_differ_from_place_to_place():
     assert between.report.stable
     apart = [norm(between.positions - popped(name).positions) for name in ("ball", "rigid")]
     assert min(apart) > 0.1 * norm(popped("ball").positions - popped("rigid").positions)
-    with pytest.raises(rs.InputError, match=f"{count} crossings: give one for all, or as many, not 3"):
+    with pytest.raises(rs.InputError, match=f"{count} crossings: give one value for all, or one for each, not 3"):
         rs.pop_up(rs.map_back(cut), cut.boundary, ROD, joint=mixed[:3])
 
 

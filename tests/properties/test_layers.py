@@ -202,7 +202,9 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
     cut = rs.trim(draped)
     released = rs.Shell.of(cut.mesh, rod, joint=rs.Pin())
     state = released.state(cut.positions, normals=target.on_surface(cut.positions).normal)
-    problem = Problem(released.elements, released.stretch, Supports(released.held_ends()), 2.0, places=released.places)
+    problem = Problem(
+        released.elements, released.stretch, Supports(released.held_ends()), 2.0, places=released.flat_coordinates
+    )
     counted = find_equilibrium(problem, state, np.zeros(len(cut.mesh.edges)), most_modes=0)
     assert (counted.report.status is Status.BUCKLED) == buckles
 

@@ -216,6 +216,6 @@ def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:
     """A popped-up shell and its equilibrium, with what the pop-up does not keep of it: the gradient and the pattern."""
     shell = popped.shell
     length = 0.5 * float(np.ptp(popped.positions, axis=0).max())
-    problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), length, places=shell.places)
+    problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), length, places=shell.flat_coordinates)
     found = find_equilibrium(problem, popped.state, popped.forces)
     return shell.with_elements(found.elements), found

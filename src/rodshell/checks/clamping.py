@@ -38,7 +38,7 @@ def reached_by_turning(pinned: Popped, clamped: Popped) -> bool | None:
     def problem_at(t: float) -> Problem:
         goals = np.vstack([places, places + reach * turned(now, outward, t)])
         supports = Supports(shell.held_ends(), np.append(shell.ends, shell.ghosts), goals)
-        return Problem(elements, shell.stretch, supports, length, places=shell.places)
+        return Problem(elements, shell.stretch, supports, length, places=shell.flat_coordinates)
 
     first = find_equilibrium(problem_at(0.0), start, pinned.forces)
     if not first.report.stable:

@@ -294,7 +294,7 @@ class _Path:
 
     def _problem(self, share: float, elements: tuple[Elements, ...]) -> Problem:
         supports = Supports(self.shell.held_ends(), self.shell.ends, (1 - share) * self._first + share * self._last)
-        stretch, places = self.shell.stretch, self.shell.places
+        stretch, places = self.shell.stretch, self.shell.flat_coordinates
         return Problem(elements, stretch, supports, self._length, places=places, pattern=self._pattern)
 
 

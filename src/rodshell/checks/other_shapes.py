@@ -125,7 +125,7 @@ class _Search:
         self.length = 0.5 * float(np.ptp(self.positions, axis=0).max())
         self.problem = Problem(
             found.elements, shell.stretch, Supports(shell.held_ends()), self.length,
-            places=shell.places, pattern=found.pattern,
+            places=shell.flat_coordinates, pattern=found.pattern,
         )  # fmt: skip
         self.energy = potential(self.problem, found)
         crossed = (shell.mesh.grid.joint_counts() > 0).all()  # else no normals are known

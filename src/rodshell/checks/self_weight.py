@@ -74,7 +74,9 @@ def self_weight(
     load[:, 2] = -gravity * shell.mass[:, 2]
     supports = Supports(shell.held_ends())
     length = 0.5 * float(np.ptp(shell.positions(found.state), axis=0).max())
-    problem = Problem(shell.elements, shell.stretch, supports, length, places=shell.places, pattern=found.pattern)
+    problem = Problem(
+        shell.elements, shell.stretch, supports, length, places=shell.flat_coordinates, pattern=found.pattern
+    )
     end = first_critical(problem, found.state, found.forces, load, most=most, progress=progress)
     deflection = None
     if end.state is not None:

@@ -68,7 +68,7 @@ def bound_drape(
         constraint=_bind(target, mesh, start),
         length=target.size,
         inextensible=True,
-        places=shell.places,
+        places=shell.flat_coordinates,
     )
     found = _in_layers(
         problem, target, mesh, natural, eccentricity,

@@ -113,7 +113,7 @@ class _Falling:
         self._heaviest = float(-self.load[:, 2].min())
         self._weight = float(-self.load[:, 2].sum())
         self._law = ModifiedMass(target, massive, fall.stopped, fall.friction)
-        self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.places))
+        self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.flat_coordinates))
         self._ties: ExplicitTies | None = None
         self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
         self._late = ""

@@ -145,7 +145,7 @@ def _settle(
     state, forces, reports = shell.state(start, normals=normals), np.zeros(len(mesh.edges)), list[SolveReport]()
     for update in range(CONTACT_UPDATES):
         problem = Problem(
-            (*shell.elements, contact), shell.stretch, supports, target.size, load=load, places=shell.places
+            (*shell.elements, contact), shell.stretch, supports, target.size, load=load, places=shell.flat_coordinates
         )
         most = MOST_COLD if cold and update == 0 else MOST_WARM
         found = find_equilibrium(

@@ -155,7 +155,7 @@ class _PopUp:
         free = shell.held_ends()
         moved = np.append(shell.ends, shell.ghosts)
         supports = Supports(free) if goals is None else Supports(free, moved, goals)
-        return Problem(shell.elements, shell.stretch, supports, self.length, places=shell.places)
+        return Problem(shell.elements, shell.stretch, supports, self.length, places=shell.flat_coordinates)
 
     def upright(
         self, shell: Shell, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None

@@ -104,7 +104,7 @@ def pop_up_in_time(
     step = min(rise.time_step, OF_LIMIT * step_limit(motion, state))
     unit_force = rod.bend_stiffness / (0.5 * float(np.ptp(boundary.points, axis=0).max())) ** 2
     stop = _looking(shell, rise.moving, BALANCED * unit_force, progress)
-    matrix, steps, refused = narrow_or_dissected(shell.places), 0, 0
+    matrix, steps, refused = narrow_or_dissected(shell.flat_coordinates), 0, 0
     last = Moment(0.0, state, np.zeros_like(state), motion)
     for rate, until in zip(rise.drags, (rise.moving, rise.duration), strict=True):
         if until <= last.time:
