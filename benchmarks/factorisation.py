@@ -37,12 +37,12 @@ def system(unknowns: int) -> tuple[csc_matrix, np.ndarray]:
     shell = rs.Shell.of(trimmed.mesh, rod, joint=rs.Pin())
     state, free = shell.state(trimmed.positions), shell.held_ends()
     step = NewtonStep(
-        Problem(shell.elements, shell.stretch, Supports(free), RADIUS, flat_coordinates=shell.places), state
+        Problem(shell.elements, shell.stretch, Supports(free), RADIUS, flat_coordinates=shell.flat_coordinates), state
     )
     step.take(state, np.zeros(len(shell.stretch.blocks)), False)
     pattern = step._assembly
     matrix = csc_matrix((step._data, pattern.indices, pattern.indptr), shape=(free.size, free.size))
-    return matrix, np.repeat(shell.places, free.count, axis=0)
+    return matrix, np.repeat(shell.flat_coordinates, free.count, axis=0)
 
 
 def least(work: Callable[[], object]) -> float:

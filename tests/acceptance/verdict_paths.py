@@ -43,7 +43,7 @@ def walked(form: rs.Form, way: Deployment) -> float:
     Each step ends in what Newton's method finds from the last, or where the energy leads down to.
     """
     shell, state = way.shells[0]
-    elements, stretch, places = shell.elements, shell.stretch, shell.places
+    elements, stretch, places = shell.elements, shell.stretch, shell.flat_coordinates
     forces, final = stretch.stiffness * stretch.strains(state), form.popped["pinned"]
     first, begin, pattern = state[shell.ends].copy(), float(way.share[1]), None
     for share in np.linspace(begin, 1.0, FINE + 1)[1:]:

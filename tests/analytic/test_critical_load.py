@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rodshell.model import Freedom
-from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.stretch import Stretch
 from rodshell.solve.critical import CLOSE, first_critical
 from rodshell.solve.equilibrium import Equilibrium

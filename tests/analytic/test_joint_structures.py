@@ -182,7 +182,7 @@ def test_stiffness_of_linkers_about_the_normal_depends_on_the_mesh():
 
 def test_three_rods_at_one_joint_are_tied_by_one_kind():
     grid = rs.straight_rods([[[-cos(a), -sin(a)], [cos(a), sin(a)]] for a in (0.0, 1.0, 2.0)])
-    with pytest.raises(rs.InputError, match="some are tied by ball and some by rigid joints"):
+    with pytest.raises(rs.InputError, match="some tied by ball and some by rigid joints"):
         rs.Shell.of(rs.mesh_grid(grid, 0.5), STRIP, joint=[rs.Ball(), rs.Rigid(), rs.Rigid()])
 
 

@@ -7,7 +7,7 @@ from scipy.special import ellipk
 import rodshell as rs
 from rodshell.formfinding import popup as popup_module
 from rodshell.model import Freedom
-from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.stretch import Stretch
 from rodshell.solve import relax as relax_module
 from rodshell.solve.implicit_euler import ImplicitEuler

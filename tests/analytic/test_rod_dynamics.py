@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 import rodshell as rs
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS
-from rodshell.rods.round_bend_twist import RoundBendTwist
+from rodshell.rods.isotropic import IsotropicBendTwist
 from rodshell.solve.implicit_euler import ImplicitEuler, Refused
 from rodshell.solve.newton_matrix import Banded
 from rodshell.solve.problem import Supports
@@ -580,7 +580,7 @@ def test_motion_that_makes_no_sense_is_refused_with_its_reason(options, said):
 def test_step_of_a_smooth_swing_costs_the_same_for_each_node(nodes, monkeypatch):
     """One factorisation of a band of ten, two solutions, one Hessian, one more gradient: whatever the length."""
     counts = {"factor": 0, "solve": 0, "hessian": 0, "gradient": 0}
-    bend_twist, factor, solve = RoundBendTwist.evaluate, Banded.factor, Banded.solve
+    bend_twist, factor, solve = IsotropicBendTwist.evaluate, Banded.factor, Banded.solve
 
     def evaluate(self, state, gradient, hessians=NO_HESSIANS):
         counts["hessian" if len(hessians) else "gradient"] += 1
@@ -595,7 +595,7 @@ def test_step_of_a_smooth_swing_costs_the_same_for_each_node(nodes, monkeypatch)
         counts["solve"] += 1
         return solve(self, field, free)
 
-    monkeypatch.setattr(RoundBendTwist, "evaluate", evaluate)
+    monkeypatch.setattr(IsotropicBendTwist, "evaluate", evaluate)
     monkeypatch.setattr(Banded, "factor", factored)
     monkeypatch.setattr(Banded, "solve", solved)
     rest = np.column_stack([0.01 * np.arange(nodes), np.zeros(nodes), np.zeros(nodes)])

@@ -449,7 +449,7 @@ FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
         (lambda: rs.ElasticRod.of([["a", "b", "c"]] * 3, ROUND), "must be numbers"),
         (lambda: rs.ElasticRod.of(straight(4) * [np.nan, 1, 1], ROUND), "must be finite"),
         (lambda: rs.ElasticRod.of([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]], ROUND), "folds back on itself after edge 0"),
-        (lambda: rs.ElasticRod.of(straight(4), lambda s: None), "made of Rod"),
+        (lambda: rs.ElasticRod.of(straight(4), lambda s: None), "must be a rodshell Rod"),
         (lambda: rs.ElasticRod.of(straight(4), FLAT, natural="curly"), "curly"),
         (lambda: rs.ElasticRod.of(straight(4), FLAT, natural=np.zeros((2, 2))), r"shape \(3, 2\)"),
         (lambda: rs.ElasticRod.of(straight(4), FLAT, natural=(np.nan, 0.0)), "natural curvatures must be finite"),

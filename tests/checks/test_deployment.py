@@ -136,7 +136,7 @@ def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
         moved = state.copy()
         moved[shell.ends] = goals
         problem = Problem(
-            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.places
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.flat_coordinates
         )
         there = relax(problem, moved)
         assert there.report.stable
@@ -164,7 +164,7 @@ def test_every_stage_of_a_path_forwards_is_a_stable_equilibrium_with_its_ends_on
     for share, places, (shell, state) in zip(way.share[1:], ends[1:], way.shells, strict=True):
         np.testing.assert_allclose(places, (1 - share) * ends[0] + share * ends[-1], atol=1e-12)
         problem = Problem(
-            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.places
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.flat_coordinates
         )
         found = find_equilibrium(problem, state, shell.stretch.stiffness * shell.stretch.strains(state))
         assert found.report.stable

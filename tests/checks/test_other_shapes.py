@@ -85,7 +85,7 @@ def test_which_shape_comes_from_flat_depends_on_the_side_to_which_it_is_lifted()
         other = min(other_shapes(shell, found, most_factorizations=count).found, key=lambda one: one.distance)
         start = shell.state(other.positions)
         problem = Problem(
-            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.places
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.flat_coordinates
         )
         there = find_equilibrium(problem, start, shell.stretch.stiffness * shell.stretch.strains(start))
         assert there.report.stable

@@ -40,7 +40,7 @@ class Particles:
         *,
         elements: tuple[Elements, ...] = (),
         free: Freedom | None = None,
-        stopped: Stopped = "wholly",
+        stopped: Stopped = "all",
         friction: float = 0.0,
         matrix: MakeMatrix = narrow_or_sparse,
     ) -> None:

@@ -25,7 +25,7 @@ TENTH = 0.1e-3  # [m]
 DRAG = 5.0  # 1/s: the hanging tails, pendulums of 0.3 m, stop swinging within two seconds
 FALLS = {
     "shared": Fall(coupling=SharedDofs(), drag=DRAG),
-    "along the normal": Fall(coupling=SharedDofs(), drag=DRAG, stopped="along the normal"),
+    "along the normal": Fall(coupling=SharedDofs(), drag=DRAG, stopped="normal"),
     "implicit": Fall(coupling=ImplicitPenalty(), drag=DRAG),
 }
 

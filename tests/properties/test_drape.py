@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 import rodshell as rs
-from rodshell.contact.bound import BoundToTarget
+from rodshell.contact.static import BoundToTarget
 from rodshell.model import Assembly, Shell
 from rodshell.rods.stretch import Stretch
 

@@ -7,7 +7,7 @@ import pytest
 from elastic_twins import ElasticTwin
 
 import rodshell as rs
-from rodshell.contact.unilateral import UnilateralContact
+from rodshell.contact.static import UnilateralContact
 from rodshell.errors import InputError
 from rodshell.solve.report import Status
 

@@ -353,7 +353,9 @@ def test_long_steps_are_cut_and_lead_to_the_same_shell_in_a_fraction_of_the_fact
     assert cut.report.stable
     assert cut.report.factorizations < 20
     shell = Shell.of(trimmed.mesh, lath, clamped=False, joint=joint)
-    problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), 5.0, flat_coordinates=shell.places)
+    problem = Problem(
+        shell.elements, shell.stretch, Supports(shell.held_ends()), 5.0, flat_coordinates=shell.flat_coordinates
+    )
     draped = trimmed.boundary.draped
     normals = node_normals(trimmed.mesh, draped) if shell.angles else None
     whole = find_stable(problem, shell.state(draped, None, normals), np.zeros(len(trimmed.mesh.edges)))

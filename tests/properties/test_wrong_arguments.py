@@ -45,7 +45,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.Fall(drag=np.nan), "the fall's drag must be 0 or more, not nan 1/s"),
         (lambda: rs.Fall(coupling="implicit"), r"coupling must be rodshell.SharedDofs\(\), .*, not \"implicit\""),
         (lambda: rs.Fall(coupling=rs.ImplicitPenalty), r"coupling must be rodshell.SharedDofs\(\), .*, not a type"),
-        (lambda: rs.Fall(stopped="partly"), 'stopped must be "wholly" or "along the normal", not "partly"'),
+        (lambda: rs.Fall(stopped="partly"), 'stopped must be "all" or "normal", not "partly"'),
         (lambda: rs.Fall(every=0), "every must be a number of steps, 1 or more, not 0"),
         (lambda: rs.Fall(stream=3), "stream must be the path of a folder, not 3"),
         (lambda: rs.Fall(settle="no"), 'settle must be True or False, not "no"'),

@@ -18,8 +18,8 @@ from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.model.shell import UP
-from rodshell.rods.fibres import VON_MISES
 from rodshell.rods.section import Rod
+from rodshell.rods.section_stress import VON_MISES
 from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.units import length_text, stress_text
 
@@ -126,7 +126,7 @@ def check(
     Parameters
     ----------
     stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.fibres`.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.section_stress`.
     """
     done = {ends: shape for ends, shape in popped.items() if shape.report.converged}
     bent = {ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()}

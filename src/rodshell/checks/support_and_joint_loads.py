@@ -16,7 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.layers import joint_normals, joint_tangents
 from rodshell.geometry.vectors import cross, dot, unit
-from rodshell.joints.crossings import Places
+from rodshell.joints.crossings import RodNodes
 from rodshell.joints.linkers import LinkerBend
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
@@ -130,7 +130,7 @@ class JointLoads:
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:
     """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric."""
     mesh, positions = shell.mesh, shell.positions(state)
-    met = Places(mesh, shell.node_blocks, shell.first_angle).of_crossings
+    met = RodNodes(mesh, shell.node_blocks, shell.first_angle).at_crossings
     normals = joint_normals(mesh, positions)
     between, moments = _between(shell, state, met)
     forces = _on_places(shell, state)[met] + between

@@ -12,7 +12,7 @@ from math import degrees
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.contact.bound import BoundToTarget
+from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.draped import Draped, DrapeFigures
 from rodshell.formfinding.end_correction import corrected_ends
 from rodshell.formfinding.layers import thickness_warnings
@@ -83,7 +83,7 @@ def bound_drape(
         constraint=_bind(target, mesh, start),
         length=target.size,
         inextensible=True,
-        flat_coordinates=shell.places,
+        flat_coordinates=shell.flat_coordinates,
     )
     found = _in_layers(
         problem, target, mesh, corrected, eccentricity,

@@ -124,7 +124,7 @@ def dynamic_pop_up(
     step = min(settings.time_step, OF_LIMIT * step_limit(motion, state))
     unit_force = rod.bend_stiffness / (0.5 * float(np.ptp(boundary.points, axis=0).max())) ** 2
     stop = _stop_check(shell, settings.moving_time, BALANCED * unit_force, progress)
-    matrix, steps, refused = narrow_or_dissected(shell.places), 0, 0
+    matrix, steps, refused = narrow_or_dissected(shell.flat_coordinates), 0, 0
     last = Sample(0.0, state, np.zeros_like(state), motion)
     for rate, until in zip(settings.drags, (settings.moving_time, settings.duration), strict=True):
         if until <= last.time:

@@ -114,7 +114,7 @@ class _FallSimulation:
         self._heaviest = float(-self.load[:, 2].min())
         self._weight = float(-self.load[:, 2].sum())
         self._law = ModifiedMass(target, massive, fall.stopped, fall.friction)
-        self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.places))
+        self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.flat_coordinates))
         self._ties: ExplicitTies | None = None
         self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
         self._out_of_time = ""
@@ -155,7 +155,7 @@ class _FallSimulation:
 
     def _stopped(self, touching: Ints) -> Ints:
         """The touching nodes that lose their whole velocity at each step."""
-        return touching if self._law.stops_wholly else NO_NODES
+        return touching if self._law.stops_all else NO_NODES
 
     def _refuse_unstable(self, moment: Sample) -> None:
         """Raise StabilityError where the step is beyond the limit of explicit ties with the nodes that touch now."""

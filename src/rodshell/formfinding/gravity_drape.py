@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.contact.unilateral import UnilateralContact
+from rodshell.contact.static import UnilateralContact
 from rodshell.formfinding.draped import Draped, DrapeFigures, smallest_joint_angle
 from rodshell.formfinding.initial_placement import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
 from rodshell.formfinding.layers import middle_surface, node_normals, place_in_layers
@@ -163,7 +163,12 @@ def _equilibrium(
     state, forces, reports = shell.state(start, normals=normals), np.zeros(len(mesh.edges)), list[SolveReport]()
     for update in range(CONTACT_UPDATES):
         problem = Problem(
-            (*shell.elements, contact), shell.stretch, supports, target.size, load=load, flat_coordinates=shell.places
+            (*shell.elements, contact),
+            shell.stretch,
+            supports,
+            target.size,
+            load=load,
+            flat_coordinates=shell.flat_coordinates,
         )
         most = MOST_COLD if cold and update == 0 else MOST_WARM
         found = find_equilibrium(

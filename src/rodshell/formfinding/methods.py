@@ -79,7 +79,7 @@ class Fall:
     coupling: Coupling = field(default_factory=SharedDofs)
     time_step: float | None = None
     duration: float | None = None
-    stopped: Stopped = "wholly"
+    stopped: Stopped = "all"
     friction: float = 0.0
     drag: float = 0.0
     stream: str | Path | None = None

@@ -147,7 +147,7 @@ class Problem:
             shell.stretch,
             supports,
             half_width(points),
-            flat_coordinates=shell.places,
+            flat_coordinates=shell.flat_coordinates,
             pattern=pattern,
         )
 

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.vectors import cross, unit
+from rodshell.model import Freedom
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
-from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements

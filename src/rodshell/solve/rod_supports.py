@@ -10,8 +10,8 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.model import Freedom
 from rodshell.model.elastic_rod import ElasticRod
-from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
 from rodshell.solve.problem import Supports
 from rodshell.validation import direction, finite, vector

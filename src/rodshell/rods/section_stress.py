@@ -1,10 +1,10 @@
-"""Stress over a rod's section: bending, stretch and torsion together, at the places where the sum can be largest.
+"""Stress over a rod's section: bending, stretch and torsion together, at the points where the sum can be largest.
 
     sigma = E (eps + kappa1 x + kappa2 y),   tau = G theta' l(x, y),   s = sqrt(sigma^2 + (w tau)^2)
 
 x and y run along the directors m1 and m2; theta' is the twist per length, l [m] Saint-Venant's shear stress over
 G theta' [Timoshenko and Goodier, Theory of Elasticity, sections 105 and 109]. The weight w is the strength over the
-shear strength: sqrt(3) makes s the stress of von Mises, for isotropic materials; of timber and fibre composites the
+shear strength: sqrt(3) makes s the stress of von Mises, for isotropic materials; for timber and fibre composites the
 two strengths are given, and s over the strength is the criterion of Tsai and Hill for stress along the fibres.
 
 The largest s lies on the outline: sigma is linear, and tau the gradient of a function of constant Laplacian, so that
@@ -25,9 +25,9 @@ TERMS = np.arange(1, 200, 2)  # of the series of a rectangle, which fall as n^-2
 
 
 def fibre_distance(rod: Rod) -> float | None:
-    """Distance [m] of the outermost fibre from the axis about which a rod bends, whichever that is.
+    """Distance [m] of the outermost fibre from the axis of bending, for bends in any direction.
 
-    Of a section that is not round this is its farthest point: the stress is then an upper bound. None for a
+    Where the section is not round it is that of its farthest point: the stress is then an upper bound. None for a
     given section without fibre distances.
     """
     section = rod.section
@@ -39,13 +39,17 @@ def fibre_distance(rod: Rod) -> float | None:
         return max(section.a, section.b)
     if isinstance(section, RectangularSection):
         return 0.5 * float(np.hypot(section.width, section.height))
-    raise InputError(f"the fibres of a section of kind {type(section).__name__} are not known")
+    raise InputError(f"the outermost fibre of a section of kind {type(section).__name__} is not known")
 
 
 def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
-    """Largest bending strain over the section for curvatures towards m1 and m2 [1/m].
+    """Largest bending strain over the section [-].
 
-    Exact for each shape; of a given section that of the corner of the box that its fibre distances span.
+    Exact for each shape; for a given section that of the corner of the box that its fibre distances span.
+
+    Parameters
+    ----------
+    kappa1, kappa2 : (n,) curvatures towards m1 and m2 [1/m].
 
     Raises
     ------
@@ -59,14 +63,18 @@ def fibre_strain(rod: Rod, kappa1: Floats, kappa2: Floats) -> Floats:
     if isinstance(section, RectangularSection):
         x, y = 0.5 * section.width, 0.5 * section.height
     elif section.fibre_distances is None:
-        raise InputError("a given section has no fibres: its strain is not known; give its fibre_distances")
+        raise InputError("the strain of a given section without fibre_distances is not known: give them")
     else:
         x, y = section.fibre_distances
     return np.asarray(x * np.abs(kappa1) + y * np.abs(kappa2))
 
 
 def torsion_stress(rod: Rod, twist_rate: Floats) -> Floats:
-    """Largest shear stress of torsion over the section [Pa] at a twist per length `twist_rate` [rad/m].
+    """Largest shear stress of torsion over the section [Pa].
+
+    Parameters
+    ----------
+    twist_rate : (n,) twist per length [rad/m].
 
     Raises
     ------
@@ -78,18 +86,18 @@ def torsion_stress(rod: Rod, twist_rate: Floats) -> Floats:
 def largest_stress(
     rod: Rod, kappa1: Floats, kappa2: Floats, axial: Floats, twist_rate: Floats, *, weight: float = VON_MISES
 ) -> Floats:
-    """Largest s over the section [Pa], see above.
+    """Largest s over the section [Pa], as the module defines it.
 
     Parameters
     ----------
-    kappa1, kappa2 : curvatures towards m1 and m2 [1/m].
-    axial : strain of the axis [-].
-    twist_rate : twist per length [rad/m].
-    weight : of the shear stress against the normal stress.
+    kappa1, kappa2 : (n,) curvatures towards m1 and m2 [1/m].
+    axial : (n,) strain of the axis [-].
+    twist_rate : (n,) twist per length [rad/m].
+    weight : w, of the shear stress against the normal stress [-].
 
     Raises
     ------
-    InputError : of a given section something is missing that the stress needs.
+    InputError : the stress of a given section needs a value that is missing.
     """
     modulus = fibre_modulus(rod)
     bent, drawn, twist = fibre_strain(rod, kappa1, kappa2), np.abs(axial), np.abs(twist_rate)
@@ -99,7 +107,7 @@ def largest_stress(
     if isinstance(rod.section, Circle | Tube):
         kappa1, kappa2 = np.hypot(kappa1, kappa2), np.zeros_like(kappa2)
     across, within = np.abs(kappa1), np.abs(kappa2)
-    for x, y, shear in zip(*_outline(rod), strict=True):  # all four quarters are alike: that of equal signs is worst
+    for x, y, shear in zip(*_outline(rod), strict=True):  # in the quarter of equal signs, the worst of four
         normal = modulus * (x * across + y * within + drawn)
         result = np.maximum(result, np.hypot(normal, weight * shear * twist))
     return result
@@ -110,25 +118,31 @@ def fibre_modulus(rod: Rod) -> float:
 
     Raises
     ------
-    InputError : a given section does not say it.
+    InputError : a given section without fibre_modulus or fibre_distances.
     """
     if isinstance(rod.section, GivenSection):
-        refuse_unknown_stress(rod, twisted=False)
+        require_known_stress(rod, twisted=False)
         assert rod.section.fibre_modulus is not None
         return rod.section.fibre_modulus
     assert rod.material is not None
     return rod.material.youngs_modulus
 
 
-def knows_stress(rod: Rod, *, twisted: bool) -> bool:
-    """Whether its stress can be told, with that of torsion if it is `twisted`."""
+def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
+    """Whether the stress of a rod is known, with that of torsion if it is `twisted`."""
     return not _missing(rod, twisted)
 
 
-def refuse_unknown_stress(rod: Rod, *, twisted: bool) -> None:
-    """InputError where the stress of a given section cannot be told from what is given of it.
+def require_known_stress(rod: Rod, *, twisted: bool) -> None:
+    """Refuse a given section whose stress is not known.
 
-    twisted : whether its rods can be: by joints that turn them, or since they bend about two unlike axes.
+    Parameters
+    ----------
+    twisted : whether the rods can be twisted: by joints, or because their two bending stiffnesses differ.
+
+    Raises
+    ------
+    InputError : values are missing that the stress needs.
     """
     if missing := _missing(rod, twisted):
         needed = " and ".join([", ".join(missing[:-1]), missing[-1]] if missing[1:] else missing)
@@ -139,7 +153,7 @@ def refuse_unknown_stress(rod: Rod, *, twisted: bool) -> None:
 
 
 def _missing(rod: Rod, twisted: bool) -> list[str]:
-    """What a given section does not say, but its stress needs."""
+    """Values that the stress of a given section needs and that are missing."""
     if not isinstance(rod.section, GivenSection):
         return []
     needed = ["fibre_distances", "fibre_modulus", *(["torsion_modulus"] if twisted else [])]
@@ -147,14 +161,14 @@ def _missing(rod: Rod, twisted: bool) -> list[str]:
 
 
 def _outline(rod: Rod) -> tuple[Floats, Floats, Floats]:
-    """Places x, y >= 0 of the outline [m], (p,) each, and the shear stress there over the twist per length [Pa m]."""
+    """Points x, y >= 0 of the outline [m], (p,) each, and the shear stress there over the twist per length [Pa m]."""
     section = rod.section
     if isinstance(section, GivenSection):
-        refuse_unknown_stress(rod, twisted=True)
+        require_known_stress(rod, twisted=True)
         assert section.fibre_distances is not None
         assert section.torsion_modulus is not None
         farthest = section.fibre_distances
-        # where the largest shear stress acts is not known: at the farthest fibre is the worst that it can be
+        # where the largest shear stress acts is not known: at the farthest fibre is the worst case
         return np.array(farthest[:1]), np.array(farthest[1:]), np.array([section.GJ / section.torsion_modulus])
     assert rod.material is not None
     if isinstance(section, Circle | Tube):
