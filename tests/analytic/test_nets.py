@@ -253,6 +253,7 @@ def sphere_error(net: ChebyshevNet, furthest: float = np.inf) -> float:
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ON_SPHERES)
 def test_rod_ends_are_those_of_the_similarity_equation(name):
     error = sphere_error(net_on_sphere(name))
@@ -358,6 +359,7 @@ TWINS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TWINS)
 def test_rod_ends_are_those_of_the_twin(name):
     case = TWINS[name]

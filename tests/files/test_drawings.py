@@ -62,6 +62,7 @@ def covered(drawing: Drawing) -> list[tuple[str, str]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
     plan = flat_plan(named(name))
@@ -69,6 +70,7 @@ def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
         assert covered(drawing) == [], drawing.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_sheet_cover_each_other(name: str) -> None:
     sheets, paper = sheet_set(named(name), flat_plan(named(name)))
@@ -100,6 +102,7 @@ def pdf_pages(data: bytes) -> list[str]:
     return [zlib.decompress(stream).decode("cp1252") for stream in streams]
 
 
+@pytest.mark.slow
 def test_pdf_is_true_to_scale(tmp_path: Path) -> None:
     """The longest strip of the first strip sheet, in points of the page, is the rod over the sheet's scale."""
     dome = archive("dome")
@@ -252,6 +255,7 @@ def apart(point: np.ndarray, lines: np.ndarray) -> np.ndarray:
     return np.linalg.norm(start + share[:, None] * along - point, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "share"), [("dome", 0.7), ("roof", 1.0), ("opening", 1.0), ("sewn", 0.45)])
 def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -> None:
     """Nearly all of them find room, where cells are not too thin; between joints, rods are taken to be straight."""
@@ -287,6 +291,7 @@ def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[st
     assert elevations_drawing(replace(made, states=longer), plan.text).texts[0].text != spans[0]
 
 
+@pytest.mark.slow
 def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:
     """Strips, both schedules, the PDF's tables and the pieces of stock: 12 mm of allowance before the rod's start."""
     made = wished()
@@ -337,6 +342,7 @@ def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> No
     assert {tuple(np.round(point, 6)) for point in footprint} == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*TARGETS, "wished"])
 def test_dxf_of_every_drawing_passes_the_audit(name: str, tmp_path: Path) -> None:
     names = export(named(name), tmp_path, ["dxf"])

@@ -24,6 +24,7 @@ def demonstrated(demonstration, joint, coupling):
     return run(demonstration, JOINTS[joint], COUPLINGS[coupling], until=UNTIL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coupling", COUPLINGS)
 @pytest.mark.parametrize(
     ("demonstration", "joint"), [("twisting", "linker"), ("bending", "linker"), ("twisting", "pin")]
@@ -71,6 +72,7 @@ def test_in_statics_rod_2_is_where_rod_1_is(demonstration, coupling):
     assert np.allclose(np.linalg.norm(np.diff(one.nodes, axis=2), axis=-1), LENGTH / 4, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_figure_is_written_with_its_tables(tmp_path):
     figure = make(lambda *_: None, turns=0.05)
     figure.save(tmp_path / "fig4")

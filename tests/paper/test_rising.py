@@ -27,6 +27,7 @@ def risen(name: str) -> Risen:
     return pop_up_in_time(found.footprint, found.trimmed.boundary, PAPER_ROD, rise=rise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(COUPLINGS))
 def test_in_time_and_by_statics_the_shell_pops_up_alike(name: str) -> None:
     result = risen(name)

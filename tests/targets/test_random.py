@@ -9,6 +9,7 @@ import rodshell as rs
 from tests.acceptance.targets_random import ROD, outcome, random_case, unbalanced
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 6, 11, 15, 20])
 def test_a_random_target_converges_truly_or_says_why_not(seed):
     result = outcome(seed)
