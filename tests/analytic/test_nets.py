@@ -280,6 +280,7 @@ def test_rods_lie_at_the_offsets_of_the_layout(name):
         assert 0.0 in [*virtual, *(rod.offset for rod in built)]  # the axis is there, built or not
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ON_SPHERES)
 def test_error_estimate_on_spheres_is_the_error_before_extrapolation(name):
     """Of the finer march alone, to 3 %; what is left after extrapolation is a hundredth of it."""

@@ -95,6 +95,7 @@ def test_no_line_to_a_name_crosses_another_or_runs_through_a_name(name: str) -> 
         assert min(float(off(box, along).min()) for box in boxes) > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["roof", "opening"])
 def test_names_stand_outside_the_shell(name: str) -> None:
     """Beyond the sides of the roof, or in the opening: on no rod."""

@@ -89,6 +89,7 @@ def test_the_check_sees_labels_that_cover_each_other() -> None:
     assert covered(pencil.done("", "", 10)) == [("U01", "V01")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dome", "ridge"])
 def test_every_rod_and_joint_is_labelled_on_the_plan(name: str) -> None:
     plan = flat_plan(archive(name))
@@ -229,6 +230,7 @@ def test_diagonals_are_those_of_the_largest_rectangle() -> None:
     assert area == pytest.approx(best)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMED)
 def test_each_grid_is_set_out_by_two_diagonals_with_their_lengths(name: str) -> None:
     """Each patch of a sewn shell has its own; along them every cell is there, so that none runs over an opening."""

@@ -57,6 +57,7 @@ def test_the_fall_comes_to_rest_where_statics_does(name: str) -> None:
     assert draped.max_gap < 1e-9  # nodes are on the planes of their closest points, which lie outside a sphere
 
 
+@pytest.mark.slow
 def test_stiff_springs_part_by_little_and_shared_unknowns_by_nothing() -> None:
     shared, implicit = fallen("shared").rest, fallen("implicit").rest
     assert shared is not None

@@ -37,6 +37,7 @@ def test_rod_2_turns_as_fast_as_rod_1(demonstration, joint, coupling):
         assert np.abs(one.lag[len(one.lag) // 2 :]).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("demonstration", ["twisting", "bending"])
 def test_explicit_ties_start_up_as_implicit_ones_do_with_the_same_step(demonstration):
     explicit = demonstrated(demonstration, "linker", "explicit")

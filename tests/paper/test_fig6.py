@@ -38,6 +38,7 @@ def test_the_net_that_g0_is_held_against_is_the_spheres_exact_one() -> None:
         np.testing.assert_allclose(np.abs(net), rs.sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
 
 
+@pytest.mark.slow
 def test_of_the_bound_drape_its_own_ends_are_shown_which_tend_to_the_nets_as_the_spacing() -> None:
     """It starts from the net; where its own lines cross the target's end is found again from its positions."""
     fine = drape_all([replace(CASE, rods=(13, 13), spacing=0.03, edge=0.015)], lambda *told: None, methods=["bound"])

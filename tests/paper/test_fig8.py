@@ -48,6 +48,7 @@ def test_bare_solves_take_as_long_as_there_are_rods() -> None:
         assert few.spent > 40 * less
 
 
+@pytest.mark.slow
 def test_the_ratio_is_that_of_the_two_times_in_the_table(tmp_path: Path) -> None:
     figure().save(tmp_path / "fig8")
     result = json.loads((tmp_path / "fig8" / "result.json").read_text())

@@ -29,6 +29,7 @@ def test_the_base_case_changes_nothing() -> None:
         assert statics()[changed, 1.0].on == "7x7, statics"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.1, 10.0, 100.0])
 def test_modulus_and_gravity_count_by_their_ratio_alone(factor: float) -> None:
     """Weight over stiffness is all that statics knows: E times f is g over f."""

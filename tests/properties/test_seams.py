@@ -87,6 +87,7 @@ def test_both_patches_end_at_the_same_points(name: str) -> None:
         np.testing.assert_array_equal(place_of(form, first), meeting.point)
 
 
+@pytest.mark.slow
 @every_case
 def test_these_points_lie_on_target_and_seam(name: str) -> None:
     form = sewn(name)
