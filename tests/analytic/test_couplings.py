@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import eigh
 
 import rodshell as rs
-from rodshell.solve.step_limit import step_limit
+from rodshell.solve.linear_stability import step_limit
 from tests.analytic.coupling_problems import (
     DECADES,
     KINDS,

@@ -7,12 +7,11 @@ from scipy.special import ellipk
 import rodshell as rs
 from rodshell.formfinding import popup as popup_module
 from rodshell.model import Freedom
-from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.stretch import Stretch
 from rodshell.solve import relax as relax_module
-from rodshell.solve.constraint import Supports
 from rodshell.solve.implicit_euler import ImplicitEuler
-from rodshell.solve.problem import Problem
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.relax import relax
 
 PINNED, SLIDING, PLANE = ((), ((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))

@@ -13,15 +13,14 @@ import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.joints import Joint, joint_parameters
 from rodshell.output import Archive
-from rodshell.output.drawing import LETTER, Drawing
+from rodshell.output.drawing import LETTER, TEXT, Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.sheets import MARGIN, TEXT, fitted, parts, tiled
+from rodshell.output.drawings.sheets import MARGIN, fitted, parts, tiled
 from rodshell.output.drawings.titleblock import title_block
+from rodshell.output.fonts import CAPITAL
 from rodshell.output.plan import flat_plan
 from rodshell.output.takeaway import PAPERS, DrawingStyle
-
-CAPITAL = 0.718  # height of Helvetica's capitals over its size [Adobe's font metrics]
 
 
 def sheets(made: Archive) -> list[Drawing]:

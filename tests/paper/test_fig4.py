@@ -41,7 +41,7 @@ def test_rod_2_turns_as_fast_as_rod_1(demonstration, joint, coupling):
 @pytest.mark.parametrize("demonstration", ["twisting", "bending"])
 def test_explicit_ties_start_up_as_implicit_ones_do_with_the_same_step(demonstration):
     explicit = demonstrated(demonstration, "linker", "explicit")
-    same = rs.ExplicitPenalty().of(ROD, LENGTH / 4)
+    same = rs.ExplicitPenalty().with_defaults(ROD, LENGTH / 4)
     ties = rs.ImplicitPenalty(C1=same.C1, C2=same.C2)
     implicit = run(demonstration, rs.Linker(), ties, until=0.1, step=explicit.step)
     every = round(STEP / explicit.step)

@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import rodshell as rs
-from rodshell.checks import self_weight, settled_shell
+from rodshell.checks import self_weight
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.families import LEAVE_OUT, choose_families
 from rodshell.formfinding.patches import carried_heading, patches_of
 from rodshell.formfinding.seams import End, in_a_row
+from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.side_by_side import side_by_side
 from rodshell.output import read
-from rodshell.targets.curvefile import closed_loops, joined
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Seam
 
 Floats = NDArray[np.float64]
 
@@ -202,7 +202,8 @@ def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> 
     form = sewn("two bumps, in the valley")
     archive = form.archive()
     for ends, weighed in archive.result["self_weight"].items():
-        own = [self_weight(*settled_shell(one.popped[ends])) for one in form.found.values()]
+        popped = [patch.popped[ends] for patch in form.found.values()]
+        own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
         assert weighed["load_factor"] == min(one.load_factor for one in own)
     assert archive.summary().count("(weakest patch, its seam held)") == 2
 
@@ -422,7 +423,7 @@ def test_grids_side_by_side_are_the_same_grids() -> None:
 def test_strokes_are_joined_at_both_ends() -> None:
     x = np.column_stack([np.arange(7.0), np.zeros((7, 2))])
     middle_last = [x[[2, 1, 0]], x[4:7], x[2:5]]
-    (line,) = joined(middle_last)
+    (line,) = join_end_to_end(middle_last)
     assert len(line) == 7
     assert abs(line[0, 0] - line[-1, 0]) == 6.0
     assert closed_loops(middle_last) == []

@@ -280,8 +280,8 @@ def doubled(mesh: Mesh, shift: float) -> Mesh:
 
 REFUSED = {
     r"no faces": (np.eye(3), np.zeros((0, 3), int)),
-    r"no numbers": (np.array([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]]), np.array([[0, 1, 2]])),
-    r"names vertex 7 of 3": (np.eye(3), np.array([[0, 1, 7]])),
+    r"coordinates that are not finite": (np.array([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]]), np.array([[0, 1, 2]])),
+    r"refers to vertex 7 of 3": (np.eye(3), np.array([[0, 1, 7]])),
     r"no extent": (np.ones((3, 3)), np.array([[0, 1, 2]])),
     r"no area": (np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2]])),
     r"not manifold: three faces": fin(),

@@ -1,11 +1,11 @@
 """The drawing set: each drawing at 1:1 for DXF and SVG, and all of them on sheets of paper for the PDF."""
 
 from rodshell.output.archive import Archive
-from rodshell.output.drawing import Drawing
+from rodshell.output.drawing import TEXT, Drawing
 from rodshell.output.drawings.bracing import bracing_drawing
 from rodshell.output.drawings.final import elevations_drawing, erection_drawing
 from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, parts, room, table
+from rodshell.output.drawings.sheets import SCALES, Compose, Sheet, bound, fitted, parts, room, table
 from rodshell.output.drawings.strips import per_sheet, strips_drawing
 from rodshell.output.drawings.supports import supports_drawing
 from rodshell.output.drawings.titleblock import title_block, with_title
