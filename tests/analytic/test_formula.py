@@ -710,6 +710,7 @@ SUMMITS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formula", SUMMITS)
 @pytest.mark.parametrize("domain", [DISC, Rectangle((0.4, 0.36))], ids=["disc", "rectangle"])
 def test_the_summit_is_the_one_highest_point_inside_or_the_centre(formula, domain):

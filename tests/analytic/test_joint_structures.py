@@ -107,6 +107,7 @@ def test_equilibrium_under_a_small_load_is_the_small_response():
 # A ring of several rods
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rods", [3, 4, 8])
 def test_ring_of_several_rods_leaves_its_plane_at_michells_twist(rods):
     errors = [michell_twist(edges, rods) - 1 for edges in (96, 192)]

@@ -253,6 +253,7 @@ def sphere_error(net: ChebyshevNet, furthest: float = np.inf) -> float:
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ON_SPHERES)
 def test_rod_ends_are_those_of_the_similarity_equation(name):
     error = sphere_error(net_on_sphere(name))
@@ -279,6 +280,7 @@ def test_rods_lie_at_the_offsets_of_the_layout(name):
         assert 0.0 in [*virtual, *(rod.offset for rod in built)]  # the axis is there, built or not
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ON_SPHERES)
 def test_error_estimate_on_spheres_is_the_error_before_extrapolation(name):
     """Of the finer march alone, to 3 %; what is left after extrapolation is a hundredth of it."""
@@ -358,6 +360,7 @@ TWINS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TWINS)
 def test_rod_ends_are_those_of_the_twin(name):
     case = TWINS[name]

@@ -69,6 +69,7 @@ def test_twisted_rod_swings_back_at_its_torsional_frequency():
 # Order, energy, momenta
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twist", [False, True])
 def test_swing_is_of_first_order_in_the_step(twist):
     assert swing_order(twist) == pytest.approx(1.0, abs=0.1)
@@ -183,6 +184,7 @@ def test_angular_momentum_of_a_curved_strip_is_conserved_to_first_order_in_the_s
     assert order(1 / counts, lost) == pytest.approx(1.0, abs=0.15)  # 0.89: its stiffest waves are not resolved yet
 
 
+@pytest.mark.slow
 def test_spinning_strip_loses_angular_momentum_by_its_rotary_inertia_only():
     """ERRATA E7: the equations leave out the moment that turns the axis of a spinning edge."""
     with_it, without = (

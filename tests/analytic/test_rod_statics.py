@@ -136,6 +136,7 @@ def test_localised_hump_is_van_der_heijden_and_thompsons():
     assert m * exact.ei / exact.gj + 4 * np.arccos(m / (2 * sqrt(t))) == pytest.approx(exact.turn, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_stretched_and_twisted_rod_localises_as_bergou_says():
     exact, edges = Localised(), (400, 800, 1600)
     assert exact.length / exact.width > 20  # so that the ends do not feel the hump

@@ -106,6 +106,7 @@ def energy_of(shell: Shell, state: np.ndarray) -> float:
     return sum(one.evaluate(state, unused) for one in (*shell.elements, shell.stretch))
 
 
+@pytest.mark.slow
 def test_a_shell_that_rises_by_itself_is_not_said_to_need_a_push() -> None:
     """The path backwards has gaps; another path forwards, from arches and with other steps, ends in this very shell."""
     form, way = wave(), deployed(wave(), 8)
@@ -123,6 +124,7 @@ def snapping() -> tuple[rs.Form, Deployment]:
     return form, deployed(form, 8)
 
 
+@pytest.mark.slow
 def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
     """From the stage before it, in steps of 1/200 down the steepest descent: it snaps there."""
     form, way = snapping()
@@ -192,6 +194,7 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
     )
 
 
+@pytest.mark.slow
 def test_the_worst_bend_may_be_on_the_way() -> None:
     """The wave ends flatter than it is on its way: the final state alone would hide it."""
     form = wave()

@@ -76,6 +76,7 @@ def test_the_bistable_cap_pops_down_to_below_the_surface_that_its_rim_spans() ->
     assert other.positions[crown, 2] < rim[crown, 2] < square_cap().popped["pinned"].positions[crown, 2]
 
 
+@pytest.mark.slow
 def test_which_shape_comes_from_flat_depends_on_the_side_to_which_it_is_lifted() -> None:
     """Both shapes of the cap do; of two shapes of a random target one does, and the other ends in that one."""
     for case, count, reached in ((square_cap(), 300, True), (random_form(35), 600, False)):
@@ -181,6 +182,7 @@ def test_the_mirror_image_of_a_shell_that_rises_from_flat_does_so_too() -> None:
     assert [one.from_flat for one in others.found if one.mirror] == [True]
 
 
+@pytest.mark.slow
 def test_a_second_shape_of_a_random_target_is_found() -> None:
     """0.065 of the size away, at 0.953 times the energy: the same as from flat by arches [formfinding/popup.py]."""
     form = random_form(1)
@@ -240,6 +242,7 @@ def test_kicks_are_along_the_softest_modes() -> None:
     np.testing.assert_allclose(quotients, exact, rtol=0.3)  # four sweeps: 0.7 % and, of the last, 26 % measured
 
 
+@pytest.mark.slow
 def test_two_shapes_of_a_search_are_never_the_same() -> None:
     form = random_form(11)
     popped = form.popped["pinned"]

@@ -183,6 +183,7 @@ def test_a_sharp_bend_does_not_touch_itself() -> None:
     assert contact(mesh, places, round_rod(8e-3)).pairs == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_nearest_rods_of_a_shell_are_those_of_a_search_over_all_pairs(ends: str) -> None:
     popped, mesh = dome().popped[ends], dome().footprint.mesh  # type: ignore[index]

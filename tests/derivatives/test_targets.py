@@ -131,6 +131,7 @@ def dense_surface(target: Target, past: float) -> Floats:
     return target.lift(plan)
 
 
+@pytest.mark.slow
 @every_target
 def test_closest_point_is_really_closest(name):
     target, rng = TARGETS[name], np.random.default_rng(3)
@@ -188,6 +189,7 @@ def rim_points(target: Target, rng: np.random.Generator, count: int) -> Floats:
     return np.column_stack([plan, z])
 
 
+@pytest.mark.slow
 @every_target
 def test_contact_distance_never_changes_faster_than_the_point_moves(name):
     """Straight paths around the rim: over the surface, down the wall, inside; a jump is a force out of nothing.

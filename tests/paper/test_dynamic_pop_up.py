@@ -28,6 +28,7 @@ def popped_up(name: str) -> DynamicPopUp:
     return dynamic_pop_up(found.footprint, found.trimmed.boundary, PAPER_ROD, settings=settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(COUPLINGS))
 def test_in_time_and_by_statics_the_shell_pops_up_alike(name: str) -> None:
     result = popped_up(name)

@@ -46,6 +46,7 @@ def apart(one: Draped, other: Draped) -> float:
     return float(np.linalg.norm(one.positions - other.positions, axis=1)[on].max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(FALLS))
 def test_the_fall_comes_to_rest_where_statics_does(name: str) -> None:
     draped = fallen(name)
@@ -56,6 +57,7 @@ def test_the_fall_comes_to_rest_where_statics_does(name: str) -> None:
     assert draped.figures.max_gap < 1e-9  # nodes are on the planes of their closest points, which lie outside a sphere
 
 
+@pytest.mark.slow
 def test_stiff_springs_part_by_little_and_shared_unknowns_by_nothing() -> None:
     shared, implicit = fallen("shared").rest, fallen("implicit").rest
     assert shared is not None
@@ -64,6 +66,7 @@ def test_stiff_springs_part_by_little_and_shared_unknowns_by_nothing() -> None:
     assert 0.0 < implicit.joint_gap < 1e-6
 
 
+@pytest.mark.slow
 def test_explicit_springs_part_by_the_force_over_their_stiffness() -> None:
     """Half as stiff, twice the gap: the forces at the joints are the same to first order."""
     gaps = []
@@ -93,6 +96,7 @@ def test_a_fall_that_is_cut_short_says_that_it_is_not_at_rest() -> None:
     assert "NOT AT REST after 0.3 s" in draped.warnings[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["drag", "duration"])
 def test_what_a_fall_that_is_not_at_rest_asks_for_brings_it_to_rest(key: str) -> None:
     short = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=Fall(drag=1.0, duration=2.5))
@@ -195,6 +199,7 @@ def test_a_case_writes_frames_nowhere_else(frames: str) -> None:
         load_case("hemisphere", {"drape.method": "paper", "drape.frames": frames})
 
 
+@pytest.mark.slow
 def test_friction_holds_what_else_slides_off() -> None:
     """Started 1 mm off the middle: with friction it stays, without it the offset grows."""
     offsets = {}

@@ -130,6 +130,7 @@ def test_three_rows_times_a_vector():
     assert y[3] == 0.0
 
 
+@pytest.mark.slow
 def test_the_same_without_the_compiler():
     """The twins in NumPy do what the kernels do."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}

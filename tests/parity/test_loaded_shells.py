@@ -50,6 +50,7 @@ def twin(name: str, ends: str) -> LoadedTwin:
     return LoadedTwin(form.popped[ends], form.rod)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ENDS)
 @pytest.mark.parametrize("name", SHELLS)
 def test_equilibrium_inertia_and_reactions_agree(name, ends):
@@ -64,6 +65,7 @@ def test_equilibrium_inertia_and_reactions_agree(name, ends):
     assert other.factored(other.state)[1] == popped.report.negative_modes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHELLS)
 def test_the_share_of_its_own_weight_that_a_shell_bears_agrees(name):
     popped = shell(name).popped["pinned"]

@@ -133,6 +133,7 @@ def test_lines_and_lengths_that_the_layout_leaves_open_are_found():
     assert all(whole[rod.name].start < rod.start < rod.end < whole[rod.name].end for rod in cut)
 
 
+@pytest.mark.slow
 def test_off_the_middle_the_grid_slides_off_and_this_is_said():
     """Nothing holds a frictionless grid but its anchor: at half the radius it turns about it and slides down."""
     draped = rs.drape(layout_of(edge=0.05 / 3), rod_of(), HEMISPHERE, method=rs.Gravity(), anchor=(0.1, 0.0))

@@ -58,6 +58,7 @@ def test_every_joint_pops_up_to_a_stable_shell(name):
     assert report.stable
 
 
+@pytest.mark.slow
 @every_joint
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_each_rod_is_in_balance_under_its_supports_and_its_joints(name, ends):

@@ -96,6 +96,7 @@ def test_stresses_of_two_layers_are_those_of_rods_along_their_own_lines():
     assert stress[1] == pytest.approx(stress[0], rel=0.1)
 
 
+@pytest.mark.slow
 def test_two_layers_rise_from_flat_to_the_state_that_the_drape_releases_to():
     found = form("hemisphere")
     for ends in ("pinned", "clamped"):
@@ -128,6 +129,7 @@ def test_an_eccentric_spring_that_lets_rods_roll_is_refused():
         assert rs.Spring(0.1, *stiffness, eccentricity=1e-3).holds_normals
 
 
+@pytest.mark.slow
 def test_the_archive_shows_both_layers_and_joints_between_them():
     archive = form("ellipsoid").archive()
     mesh = form("ellipsoid").footprint.mesh
@@ -230,6 +232,7 @@ def test_laths_that_buckle_everywhere_are_given_up_at_once_with_the_cause():
     assert "dips" not in words
 
 
+@pytest.mark.slow
 def test_popup_of_a_result_in_two_layers_is_refused(tmp_path):
     folder = form("ellipsoid").archive().save(tmp_path / "oval", kinds=())
     with pytest.raises(rs.InputError, match="two layers 4 mm apart, and popup joins its rods at one point"):

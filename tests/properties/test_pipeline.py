@@ -124,6 +124,7 @@ def of_laths(section, joint=None):
     return rs.find_form(cap, layout_of(spacing=0.04), replace(ROD, section=section), joint=joint, ends=("pinned",))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "joint", "degrees"),
     [(STANDING, None, 90), (LYING, None, 0), (STANDING, rs.Pin(), 0), (LYING, rs.Pin(), 0), (ROD.section, None, 0)],
@@ -135,6 +136,7 @@ def test_laths_that_lie_down_are_warned_of(section, joint, degrees):
     assert [f"up to {degrees} (pinned" in text for text in found] == [True] * (degrees > 0)
 
 
+@pytest.mark.slow
 def test_laid_either_way_a_lath_takes_the_same_shape_where_nothing_holds_it():
     standing, lying = (of_laths(section).popped["pinned"].positions for section in (STANDING, LYING))
     np.testing.assert_allclose(standing, lying, rtol=0, atol=1e-9 * SIZE)
@@ -225,6 +227,7 @@ def hurried(monkeypatch):
     monkeypatch.setattr(bound_drape, "find_equilibrium", partial(bound_drape.find_equilibrium, most_iterations=2))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("hurried")
 def test_a_drape_that_does_not_converge_leaves_a_partial_result_that_is_saved(tmp_path):
     form = rs.find_form(GAUSSIAN, layout_of(spacing=0.03, edge=0.01), ROD)
@@ -250,6 +253,7 @@ def test_a_mild_target_that_does_not_converge_blames_no_curvature():
     assert form.warnings == ()
 
 
+@pytest.mark.slow
 def test_a_gravity_drape_that_slides_off_is_kept_too(tmp_path):
     layout = layout_of(rods=(9, 9), length=0.9, edge=0.05)
     form = rs.find_form(HEMISPHERE, layout, ROD, method=rs.Gravity(), anchor=(0.05, 0.02))
@@ -267,6 +271,7 @@ def plain(value):
     return json.loads(json_text(value))
 
 
+@pytest.mark.slow
 @every_form
 def test_save_and_read_give_back_every_number(form, tmp_path):
     form = form()
@@ -290,6 +295,7 @@ def test_save_and_read_give_back_every_number(form, tmp_path):
     assert kept.case_toml == form.archive().case_toml
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", [("pinned",), ("clamped",), ("pinned", "clamped")])
 def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
     from rodshell.case import load_case
@@ -306,6 +312,7 @@ def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
         assert built.drape_options["ends"] == form.ends == tuple(form.popped) == ends
 
 
+@pytest.mark.slow
 def test_the_kept_case_gives_the_same_form_again(tmp_path):
     from rodshell.case import load_case
 
@@ -422,6 +429,7 @@ def ripple(x, y):
     return 0.1 * np.cos(6 * np.sqrt(x * x + y * y + 1e-4))
 
 
+@pytest.mark.slow
 def test_a_python_function_is_a_target_like_its_formula(tmp_path):
     formula = "0.1*cos(6*sqrt(x^2 + y^2 + 0.0001))"
     targets = [
@@ -488,6 +496,7 @@ def test_a_table_with_eccentric_joints_is_refused():
         table_of(hemisphere_form(), joint=rs.Pin(eccentricity=0.004))
 
 
+@pytest.mark.slow
 def test_table_by_default_takes_six_edges_between_joints(tmp_path):
     table = table_of(hemisphere_form())
     lengths = table.footprint.mesh.edge_lengths

@@ -174,6 +174,7 @@ def test_from_flat_and_from_draped_one_arrives_at_the_same_shell(name, ends):
     np.testing.assert_allclose(flat.positions, popped_on(name, ends).positions, rtol=0, atol=1e-9 * SIZE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["draped", "flat"])
 @both_ends
 def test_a_bowl_pops_down_as_its_mirror_image_pops_up(ends, start):

@@ -118,6 +118,7 @@ def last():
     return rs.find_form(OVAL, layout_of(), ROD, anchor=(0.02, 0.01))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_form_found_from_the_last_one_is_the_form_found_from_nothing(change, last):
     target, layout, options = CHANGES[change]

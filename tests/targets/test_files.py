@@ -120,6 +120,7 @@ def test_a_nurbs_patch_is_met_and_its_trim_bounds_it(tmp_path):
     assert target.margin(0.17 * ring) == pytest.approx(-0.02, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_command_line_takes_a_mesh_and_writes_a_case_that_gives_it_again(bowl, tmp_path, capsys):
     (tmp_path / "roof.obj").write_bytes(WRITERS["obj"](20 * bowl[0], bowl[1]))
     out = tmp_path / "out"
@@ -172,6 +173,7 @@ def test_a_surface_with_nothing_inside_its_edge_is_told_why(bowl, tmp_path):
         rs.surface_from(tmp_path / "bowl.obj", unit=MM, base=100.0)
 
 
+@pytest.mark.slow
 def test_broken_files_are_refused_in_one_sentence(tmp_path):
     """A tenth of those that `make accept-targets` tries, every kind of fault among them in some format."""
     for what, arguments in list(broken_files(tmp_path))[3::10]:

@@ -180,6 +180,7 @@ def test_of_a_half_ball_with_its_floor_and_of_a_thick_shell_the_dome_is_taken():
         assert "creases" in target.warnings[0]
 
 
+@pytest.mark.slow
 def test_a_closed_curve_bounds_the_shell_and_a_second_one_opens_it():
     x, faces = sheet(lambda x, y: 0.1 - x**2 - 0.5 * y**2, 0.25, 60)
     angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)

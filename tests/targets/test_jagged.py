@@ -37,6 +37,7 @@ def turned(loop):
     return np.arccos(np.clip(np.sum(along * np.roll(along, 1, axis=0), axis=1), -1, 1)).sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("middle", [(0.0, 0.0), (0.013, 0.006)])
 @pytest.mark.parametrize("count", [21, 45, 91])
 @pytest.mark.parametrize("name", LATTICES)

@@ -69,6 +69,7 @@ def test_far_from_every_patch_there_is_no_field():
     assert np.isnan(patches.implicit(far).value).tolist() == [True, False, True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "order"), [("value", 4), ("normal", 3), ("curvature", 2)])
 def test_fit_to_a_sphere_converges(kind, order):
     """Cubics miss a sphere by the fourth power of their size, its normals by the third, its curvature by the second.

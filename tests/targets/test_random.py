@@ -8,6 +8,7 @@ from tests.acceptance.targets_random import ROD, outcome, random_case, unbalance
 from tests.properties.altered import at_positions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 6, 11, 15, 20])
 def test_a_random_target_converges_truly_or_says_why_not(seed):
     result = outcome(seed)

@@ -41,6 +41,7 @@ def test_a_face_is_its_surface(tmp_path):
     assert target.margin(edge) == pytest.approx(exact, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_splines_with_inner_knots_are_met(tmp_path):
     """A plane as a cubic of two spans each way, raised at the control point in the middle."""
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
@@ -54,6 +55,7 @@ def test_splines_with_inner_knots_are_met(tmp_path):
     assert target.height_at(np.zeros((1, 2))) == pytest.approx(0.8 * 0.5**2, abs=1e-4)  # the middle spline is 1/2 there
 
 
+@pytest.mark.slow
 def test_a_face_ends_where_its_edge_is(tmp_path):
     """On a sphere at the circle that bounds it, on a plane at the trim; the file is in millimetres."""
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
@@ -73,6 +75,7 @@ def test_a_face_ends_where_its_edge_is(tmp_path):
         assert disc.margin(radius * ring) == pytest.approx(0.15 - radius, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_of_several_faces_one_is_chosen_by_name_or_number(tmp_path):
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     file = saddle(name="roof")

@@ -65,6 +65,7 @@ def test_far_from_a_mesh_too_contact_is_that_with_its_formula(name):
     assert mesh.contact(x[away]).distance == pytest.approx(exact.contact(x[away]).distance, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_grid_may_fall_on_a_mesh_from_high_above():
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, edge=0.03, length=0.9)
     ends = []
