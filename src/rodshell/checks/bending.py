@@ -122,7 +122,7 @@ def bending(
 
 def rod_frames(shell: Shell) -> BendTwist | None:
     """The elements that carry the rods' material frames; None where no twist angles are carried."""
-    return next((one for one in shell.within if isinstance(one, BendTwist)), None)
+    return next((element for element in shell.within if isinstance(element, BendTwist)), None)
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:

@@ -199,4 +199,4 @@ def find_stable(
                 break
     last = tries[-1].report
     best = tries[-1] if last.stable or last.status is Status.OUT_OF_TIME else first
-    return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))
+    return replace(best, report=best.report.after(*(tried.report for tried in tries if tried is not best)))

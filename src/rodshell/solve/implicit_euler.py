@@ -97,7 +97,7 @@ class Motion:
         """
         given = body.freedom() if constraint is None else constraint
         supports = Supports(given) if isinstance(given, Freedom) else given
-        implicit = [one for one in body.elements if all(one is not other for other in body.explicit)]
+        implicit = [element for element in body.elements if all(element is not other for other in body.explicit)]
         return cls((*implicit, body.stretch), body.mass, supports, forces, body.explicit)
 
     def constraint_at(self, time: float) -> Constraint:

@@ -72,10 +72,10 @@ def follow(
             step = 0.4 * min(step, there - t)
         if found.report.status is Status.OUT_OF_TIME:
             break
-        if t < 1.0 and (step < SMALLEST_STEP or sum(one.iterations for one in reports) > MOST_OF_ALL):
+        if t < 1.0 and (step < SMALLEST_STEP or sum(report.iterations for report in reports) > MOST_OF_ALL):
             break
     ended = last or found
-    report = ended.report.after(*(one for one in reports if one is not ended.report))
+    report = ended.report.after(*(report for report in reports if report is not ended.report))
     if t >= 1.0:
         return replace(ended, report=report)
     late = found.report.status is Status.OUT_OF_TIME

@@ -74,7 +74,7 @@ class SolveReport:
         """This report with the work of earlier solves added."""
         return replace(
             self,
-            iterations=self.iterations + sum(one.iterations for one in earlier),
-            factorizations=self.factorizations + sum(one.factorizations for one in earlier),
-            seconds=self.seconds + sum(one.seconds for one in earlier),
+            iterations=self.iterations + sum(report.iterations for report in earlier),
+            factorizations=self.factorizations + sum(report.factorizations for report in earlier),
+            seconds=self.seconds + sum(report.seconds for report in earlier),
         )
