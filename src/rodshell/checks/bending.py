@@ -143,7 +143,7 @@ def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
 
 def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
     """(k,) curvature [1/m] at each entry of `rod_nodes`."""
-    return np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1)
+    return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
 
 
 def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:

@@ -295,7 +295,7 @@ class _Edges:
     def _sines(self) -> Floats:
         """(c,) sine of the angle between the rods at each crossing."""
         tangents = [self.tangent[self._edge_at(self.crossings.rods[:, k], self.crossings.at[:, k])] for k in (0, 1)]
-        return np.linalg.norm(cross(*tangents), axis=1)
+        return np.asarray(np.linalg.norm(cross(*tangents), axis=1))
 
     def _edge_at(self, rods: Ints, at: Floats) -> Ints:
         """Edge of each rod at a material coordinate."""
@@ -303,7 +303,7 @@ class _Edges:
         keys = self.rods * span + (self.station + 0.5 * self.lengths - low)
         after = np.searchsorted(keys, rods * span + (at - low))
         first, stop = (np.searchsorted(self.rods, rods, side=side) for side in ("left", "right"))
-        return np.clip(after, first, stop - 1)
+        return np.asarray(np.clip(after, first, stop - 1))
 
 
 def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[Floats, Floats]:

@@ -124,7 +124,7 @@ class JointLoads:
     @property
     def out_of_plane_moments(self) -> Floats:
         """(c,) size of the moment about the axes in the joint's plane [N m]."""
-        return np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1)
+        return np.asarray(np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1))
 
 
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:

@@ -71,7 +71,12 @@ class SolveReport:
         return self.converged and self.negative_modes == 0
 
     def after(self, *earlier: "SolveReport") -> "SolveReport":
-        """This report with the work of earlier solves added."""
+        """This report with the work of earlier solves added.
+
+        Parameters
+        ----------
+        earlier : reports of the solves that led to this one.
+        """
         return replace(
             self,
             iterations=self.iterations + sum(report.iterations for report in earlier),

@@ -259,10 +259,11 @@ def _kernel(count: int, emit: Callable[..., None], twin: Callable[..., None]) ->
         emit(_Code(builder), *arguments)
         return context.get_dummy_value()
 
-    return intrinsic(_TYPED[count](types.void(*[types.int64] * count), generate))
+    kernel: Kernel = intrinsic(_TYPED[count](types.void(*[types.int64] * count), generate))
+    return kernel
 
 
-_TYPED = {  # an intrinsic shows its arguments by name
+_TYPED: dict[int, Callable[..., object]] = {  # an intrinsic shows its arguments by name
     3: lambda signature, generate: lambda typing, a, b, c: (signature, generate),
     5: lambda signature, generate: lambda typing, a, b, c, d, e: (signature, generate),
     7: lambda signature, generate: lambda typing, a, b, c, d, e, f, g: (signature, generate),
