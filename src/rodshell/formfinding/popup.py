@@ -28,7 +28,7 @@ from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem, half_width
 from rodshell.solve.report import SolveReport, Status
 from rodshell.units import length_text
-from rodshell.validation import choice
+from rodshell.validation import choice, instance
 
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
@@ -116,6 +116,8 @@ def pop_up(
     """
     choice("ends", ends, ENDS)
     choice("start", start, STARTS)
+    if warm_start is not None:
+        instance("warm_start", warm_start, PopUp, "what an earlier rodshell.pop_up returned")
     if warm_start is not None and start != "draped":
         raise InputError('an earlier pop-up is a first guess for start="draped" alone: leave out warm_start, or start')
     if warm_start is not None and warm_start.ends != ends:
