@@ -26,7 +26,7 @@ def instance(name: str, value: object, kind: type | UnionType, wanted: str = "")
     """Refuse a `value` that is no `kind`; `wanted` says in words what it must be, by default a rodshell `kind`."""
     if not isinstance(value, kind):
         what = wanted or f"a rodshell {getattr(kind, '__name__', kind)}"
-        raise InputError(f"{name} must be {what}, not {_described(value)}")
+        raise InputError(f"{name} must be {what}, not {described(value)}")
 
 
 def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
@@ -37,14 +37,14 @@ def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
     near = get_close_matches(value, choices, n=1) if isinstance(value, str) else []
     hint = f": did you mean {shown(near[0])}?" if near else ""
     *rest, last = map(shown, choices)
-    raise InputError(f"{name} must be {', '.join(rest)} or {last}, not {_described(value)}{hint}")
+    raise InputError(f"{name} must be {', '.join(rest)} or {last}, not {described(value)}{hint}")
 
 
 def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice, ...]:
     """`value` as a tuple of different words out of `choices`, or of none; one may come without a sequence around it."""
     words = [value] if isinstance(value, str) else list(value) if isinstance(value, Sequence) else None
     if words is None:
-        raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {_described(value)}")
+        raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {described(value)}")
     return tuple(dict.fromkeys(choice(name, word, choices) for word in words))
 
 
@@ -68,7 +68,7 @@ def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = F
 
 def _real(name: str, value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{name} must be a number{f' in {unit}' if unit else ''}, not {_described(value)}")
+        raise InputError(f"{name} must be a number{f' in {unit}' if unit else ''}, not {described(value)}")
     return float(value)
 
 
@@ -112,7 +112,9 @@ def direction(name: str, given: "ArrayLike") -> "Floats":
     return unit
 
 
-def _described(value: object) -> str:
-    """A plain value as it is, anything else by its kind."""
+def described(value: object) -> str:
+    """A plain value as it is, anything else by its kind, as a sentence names it."""
+    if isinstance(value, type):
+        return f"the class {value.__name__} itself"
     made = type(value).__name__
     return shown(value) if isinstance(value, str | int | float) else f"a{'n' * (made[0] in 'AEIOU')} {made}"

@@ -40,7 +40,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
             r'gravity = -5.0 m/s2: method "bound" has no gravity',
         ),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, fall=rs.Fall()), 'nothing falls with method "bound"'),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint="pin"), r"such as rodshell.Pin\(\), not 'pin'"),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint="pin"), r"such as rodshell.Pin\(\), not \"pin\""),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint=rs.Pin), "not the class Pin itself"),
         (lambda: rs.pop_up(None, None, ROD, ends="clampd"), 'ends must be "pinned" or "clamped", not "clampd"'),
         (lambda: rs.pop_up(None, None, ROD, start="drapped"), 'not "drapped": did you mean "draped"?'),

@@ -19,7 +19,6 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import adapted, parallel_transport
 from rodshell.geometry.vectors import unit
 from rodshell.layout import GridMesh
-from rodshell.records import brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +37,8 @@ class RodNodes:
     blocks: Ints
     first_angle: int
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return f"RodNodes({len(self.blocks)} of {len(self.mesh.rod_start)} rods)"
 
     @cached_property
     def rods(self) -> Ints:

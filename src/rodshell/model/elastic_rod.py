@@ -26,7 +26,7 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.rods.stretch import Stretch
-from rodshell.validation import choice, direction, finite, vector
+from rodshell.validation import described, direction, finite, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike
 _ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
@@ -234,7 +234,10 @@ class ElasticRod:
         InputError : an array has another shape; the rod has no twist angles; a tangent is for an end not clamped.
         """
         for end in tangents or {}:
-            choice("an end in tangents", end, self.clamps)
+            if end not in self.clamps:
+                raise InputError(f'this rod is not clamped at its "{end}", where a tangent is given: leave it out')
+        if positions is not None and np.ndim(positions) != 2:
+            raise InputError(f"the positions of this rod's nodes must be (n, 3) in m, not {described(positions)}")
         state = np.zeros((self.block_count, 3))
         nodes = self.rest if positions is None else positions
         state[self.nodes] = finite("the positions of this rod's nodes", nodes, self.node_count, 3)
