@@ -174,7 +174,7 @@ def test_linkers_stiffen_the_rods_along_themselves():
 
 
 def test_stiffness_of_linkers_about_the_normal_depends_on_the_mesh():
-    """8 EI over the edge, of two linkers, near a right angle (numerics); a `Spring` does not change."""
+    """8 EI over the edge, of two linkers, near a right angle (E10); a `Spring` does not change."""
     rod, turn = rs.Rod(rs.Circle(1e-3), rs.Material(1e6, 1e3)), 1e-3
     for edge in (2.5e-3, 5e-3):
         shear = 2 * linker_energy(pi / 2 + turn, 2, edge=edge) / turn**2

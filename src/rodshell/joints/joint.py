@@ -206,6 +206,10 @@ class Linker:
 def require_joint(joint: object) -> None:
     """Refuse a value that is neither a joint, nor a sequence of joints, nor None.
 
+    Parameters
+    ----------
+    joint : what a caller has passed.
+
     Raises
     ------
     InputError : it is something else, such as the name of a kind, or the class itself.

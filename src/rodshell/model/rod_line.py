@@ -74,6 +74,10 @@ class RodLine:
     def rods(self, rod: Rods) -> list[Rod]:
         """The rod of each edge: the same for all, one for each, or a function of the arc length of its middle [m].
 
+        Parameters
+        ----------
+        rod : one rod, a sequence of them, or a function.
+
         Raises
         ------
         InputError : they are not rods, or not as many as there are edges.
@@ -116,7 +120,13 @@ class RodLine:
         return np.asarray(self.nodes[node] + outward * self.lengths[edge] * self.clamps[end])
 
     def end_director(self, directors: Floats, end: End) -> Floats:
-        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges."""
+        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges.
+
+        Parameters
+        ----------
+        directors : (e, 3) first material directors of the edges.
+        end : the clamped end.
+        """
         order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
         (d0, d1), (t0, t1), (l0, l1) = directors[order], self.tangents[order], self.lengths[order]
         twist = signed_angle(parallel_transport(d1, t1, t0), d0, t0)  # from the inner edge to the last
@@ -194,7 +204,13 @@ class RodBends:
         return RodBends(size, angles, blocks, lengths, at_bends, like)
 
     def rest_state(self, line: RodLine, directors: Floats) -> tuple[Floats, Floats]:
-        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges."""
+        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges.
+
+        Parameters
+        ----------
+        line : the rod at rest.
+        directors : (e, 3) first material directors of its edges.
+        """
         state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
         state[: len(line.nodes)], frames[self.angles] = line.nodes, directors
         for k, end in enumerate(line.clamps):

@@ -113,7 +113,15 @@ class DrapeRun:
 def drape_all(
     cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[Method] = METHODS
 ) -> tuple[DrapeRun, ...]:
-    """Every case by every method, the falls with the settings `fall`."""
+    """Every case by every method, the falls with the settings `fall`.
+
+    Parameters
+    ----------
+    cases : targets and grids.
+    progress : is called at each iteration.
+    fall : settings of the paper's method.
+    methods : by which each case is draped.
+    """
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
 
@@ -137,7 +145,12 @@ def _drape(case: Case, method: Method, fall: Fall, progress: Progress) -> DrapeR
 
 
 def rows_svg(drapes: Sequence[DrapeRun]) -> str:
-    """A row of four panels for each drape: setup, draped, trimmed, and the flat grid with its ends."""
+    """A row of four panels for each drape: setup, draped, trimmed, and the flat grid with its ends.
+
+    Parameters
+    ----------
+    drapes : one for each row.
+    """
     rows = []
     for run in drapes:
         name, spacing = run.case.target.name, 1e3 * run.case.spacing

@@ -108,7 +108,13 @@ def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:
 
 
 def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
-    """All runs, over so many revolutions (`turns`)."""
+    """All runs, over so many revolutions (`turns`).
+
+    Parameters
+    ----------
+    progress : is called before each run.
+    turns : revolutions of rod 1 [-].
+    """
     until = turns * 2 * np.pi / RATE
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     cases: list[tuple[Joint, Coupling]] = [(Linker(), coupling) for coupling in couplings]
@@ -171,7 +177,13 @@ def animation_svg(runs: Sequence[Run]) -> str:
 
 
 def lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
-    """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows."""
+    """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows.
+
+    Parameters
+    ----------
+    runs : all of them.
+    until : end of the time axis [s].
+    """
     shown = [run for run in runs if run.step is not None and run.follows]
     looks = dict(zip(dict.fromkeys(run.name for run in shown), LOOKS, strict=False))
     lags = np.concatenate([np.degrees(run.lag[run.times <= until]) for run in shown])

@@ -127,7 +127,14 @@ class Fig8(Figure):
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float = FALLING) -> Fig8:
-    """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count."""
+    """Time everything, falls of `falling` seconds; the first run of each kind, which compiles, does not count.
+
+    Parameters
+    ----------
+    progress : is called at each time step.
+    cases : targets and grids.
+    falling : simulated time of each fall [s].
+    """
     couplings: tuple[Coupling, ...] = (ExplicitPenalty(C1=C1), SharedDofs(), ImplicitPenalty())
     for coupling in couplings:
         _fall(cases[0], coupling, USUAL_STEP, 0.05, silent)
@@ -142,7 +149,16 @@ def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, falling: float 
 
 
 def timed_fall(case: Case, coupling: Coupling, step: float, falling: float, progress: Progress) -> Timing:
-    """A fall in the paper's scheme, of `falling` seconds with the time step `step` [s]; without its bare solves."""
+    """A fall in the paper's scheme, of `falling` seconds with the time step `step` [s]; without its bare solves.
+
+    Parameters
+    ----------
+    case : target and grid.
+    coupling : how rods are tied.
+    step : time step [s].
+    falling : simulated time [s].
+    progress : is called at each time step.
+    """
     bare = BareSolves(case, coupling, step) if isinstance(coupling, ExplicitPenalty) else None
 
     def case_progress(stage: str, detail: str, residual: float) -> None:

@@ -85,7 +85,13 @@ class Figure(ABC):
 
 
 def aligned(columns: Row, rows: Sequence[Row]) -> str:
-    """A table as text, with its `columns` aligned."""
+    """A table as text, with its `columns` aligned.
+
+    Parameters
+    ----------
+    columns : heads.
+    rows : cells of each row.
+    """
     table = [columns, *rows]
     widths = [max(len(row[k]) for row in table) for k in range(len(columns))]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table)

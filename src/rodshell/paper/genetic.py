@@ -192,7 +192,14 @@ def find(
     case: Case, folder: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
     progress: Progress = silent,
 ) -> History:  # fmt: skip
-    """A whole search (see `search`), whose values are written to `folder`."""
+    """A whole search (see `search`), whose values are written to `folder`.
+
+    Parameters
+    ----------
+    case : target and grid.
+    folder : of the values.
+    seed, jobs, population, most, progress : see `search`.
+    """
     times = []
     for _ in range(REPEATS):
         begun = process_time()
@@ -207,7 +214,13 @@ def find(
 
 
 def compare(case: Case, history: History) -> Comparison:
-    """The shell of the direct method, and the best of a `history` popped up again."""
+    """The shell of the direct method, and the best of a `history` popped up again.
+
+    Parameters
+    ----------
+    case : target and grid.
+    history : of a finished search.
+    """
     direct = _direct(case)
     popped = Design.of(direct).pop_up(history.variables)
     best = agreement(popped, case.target) if popped is not None and popped.report.stable else None

@@ -101,6 +101,11 @@ class Design:
 
         None if a rod has too few joints, or after `patience` iterations. Always from flat: a shell has other stable
         states than the one that it reaches from there.
+
+        Parameters
+        ----------
+        variables : (n,) distances of the rod ends from the middle of their rods [m].
+        patience : largest number of iterations.
         """
         footprint = self.footprint(variables)
         if footprint.mesh.grid.joint_counts().min() < FEWEST_JOINTS:
@@ -124,6 +129,10 @@ class Design:
         The distance is that of nodes and of the middles of edges. A shell that is not stable counts as one at the
         distance of the target's size: a rod with fewer than three joints, no stable state with the ends on G, or none
         within `PATIENCE` iterations.
+
+        Parameters
+        ----------
+        variables : (n,) distances of the rod ends from the middle of their rods [m].
         """
         popped = self.pop_up(variables, patience=PATIENCE)
         if popped is None or not popped.report.stable:
@@ -134,6 +143,12 @@ class Design:
         """(count, n) random footprints, smooth except for a share `roughness` of the bounds at every end.
 
         Along each side of each family the share of the bounds is a parabola of Bernstein form with random coefficients.
+
+        Parameters
+        ----------
+        rng : random numbers.
+        count : of footprints.
+        roughness : share of the bounds that is random at every end [-].
         """
         sides = np.array([[f"{line.family}-", f"{line.family}+"] for line in self.lines]).ravel()
         offsets = np.repeat([line.offset for line in self.lines], 2)

@@ -82,7 +82,15 @@ def standing(target: Target, mesh: GridMesh, positions: Floats, *, hides: bool =
 
 
 def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attributes: Any) -> Iterator[str]:
-    """Every rod by its nodes' points `at` (n, 2); pale where a node of an edge is not `near` (n,)."""
+    """Every rod by its nodes' points `at` (n, 2); pale where a node of an edge is not `near` (n,).
+
+    Parameters
+    ----------
+    mesh : of the grid.
+    at : (n, 2) points of its nodes in the drawing.
+    near : (n,) bool, nodes in front; None: all.
+    attributes : further SVG attributes.
+    """
     for k, rod in enumerate(mesh.grid.rods):
         nodes = mesh.nodes_of(k)
         seen = np.ones(len(nodes) - 1, dtype=bool) if near is None else near[nodes[1:]] & near[nodes[:-1]]
@@ -96,13 +104,27 @@ def rod_lines(mesh: GridMesh, at: Floats, near: Bools | None = None, **attribute
 
 
 def dots(at: Floats, colour: str, radius: float = 2.2) -> Iterator[str]:
-    """Dots at the points `at` (n, 2)."""
+    """Dots at the points `at` (n, 2).
+
+    Parameters
+    ----------
+    at : (n, 2) points in the drawing.
+    colour : fill.
+    radius : [drawing units].
+    """
     for x, y in at.tolist():
         yield tag("circle", cx=x, cy=y, r=radius, fill=colour)
 
 
 def closed(at: Floats, colour: str, **attributes: Any) -> str:
-    """A closed curve through the points `at` (n, 2), in the order of their angle about their middle."""
+    """A closed curve through the points `at` (n, 2), in the order of their angle about their middle.
+
+    Parameters
+    ----------
+    at : (n, 2) points in the drawing.
+    colour : of the line.
+    attributes : further SVG attributes.
+    """
     apart = at - at.mean(axis=0)
     order = np.argsort(np.arctan2(apart[:, 1], apart[:, 0]))
     look = {"fill": "none", "stroke_width": 1.0} | attributes
@@ -165,7 +187,13 @@ class Chart:
 
 
 def charts_svg(charts: Sequence[Chart], words: str = "") -> str:
-    """Logarithmic charts side by side, with `words` below all of them."""
+    """Logarithmic charts side by side, with `words` below all of them.
+
+    Parameters
+    ----------
+    charts : from left to right.
+    words : a line below.
+    """
     lines = max(-(-len(chart.legend) // LEGENDS) for chart in charts)
     wide, tall = CHART
     width, height = len(charts) * (wide + CHART_EDGE) + CHART_GAP, tall + 90 + 15 * lines + (22 if words else 0)

@@ -119,7 +119,13 @@ def make(progress: Progress) -> Studies:
 
 
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
-    """E, r, g, EA and EI by gravity statics."""
+    """E, r, g, EA and EI by gravity statics.
+
+    Parameters
+    ----------
+    progress : is called before each drape.
+    layout : the grid.
+    """
     base = drape(layout, ROD, TARGET, method="gravity")
     for changed, (powers, given) in _PARAMETERS.items():
         for factor in (10.0**power for power in powers):
@@ -130,7 +136,13 @@ def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Lin
 
 
 def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> Iterator[Line]:
-    """H, by falls."""
+    """H, by falls.
+
+    Parameters
+    ----------
+    progress : is called before each fall.
+    factors : heights over the paper's [-].
+    """
     base = _fallen(Fall(drag=DRAG))
     for factor in factors:
         height = HEIGHT * factor

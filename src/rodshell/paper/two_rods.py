@@ -126,7 +126,13 @@ def run_in_time(
 
 
 def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, *, until: float = 2 * pi / RATE) -> Run:
-    """The equilibria along the motion, which is so slow that each step is one; the joint must hold both rods."""
+    """The equilibria along the motion, which is so slow that each step is one; the joint must hold both rods.
+
+    Parameters
+    ----------
+    demonstration, joint, coupling : what is run.
+    until : end of the motion [s].
+    """
     shell = _shell(joint, coupling)
     motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / SLOW))
     step = SLOW * 2 * pi / RATE / STATIC_STEPS
