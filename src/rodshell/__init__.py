@@ -33,11 +33,14 @@ if TYPE_CHECKING:
     from rodshell.form import Form, PoppedUp, Sewn, find_form, pop_up_table, sew
     from rodshell.formfinding import (
         Agreement,
+        Bound,
         Boundary,
         Draped,
+        DrapeFigures,
         Fall,
         Footprint,
-        Popped,
+        Gravity,
+        PopUp,
         Trimmed,
         agreement,
         drape,
@@ -45,7 +48,7 @@ if TYPE_CHECKING:
         pop_up,
         trim,
     )
-    from rodshell.formfinding.rising import Rise, Risen, pop_up_in_time
+    from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.joints import (
         Ball,
@@ -65,11 +68,11 @@ if TYPE_CHECKING:
     from rodshell.output.takeaway import DrawingStyle, Takeaway
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
-    from rodshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
+    from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.rod_statics import RodShape, solve_rod
-    from rodshell.solve.simulate import simulate
-    from rodshell.solve.time_series import Moment, TimeSeries
+    from rodshell.solve.rod_supports import RodLoads, RodSupports
+    from rodshell.solve.simulate import Sample, TimeSeries, simulate
     from rodshell.targets import (
         Cap,
         Disc,
@@ -93,10 +96,10 @@ _HOMES = {
     "rodshell.fabrication": ("Fabrication",),
     "rodshell.form": ("Form", "PoppedUp", "Sewn", "find_form", "pop_up_table", "sew"),
     "rodshell.formfinding": (
-        "Agreement", "Boundary", "Draped", "Fall", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
-        "pop_up", "trim",
+        "Agreement", "Bound", "Boundary", "DrapeFigures", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed",
+        "agreement", "drape", "map_back", "pop_up", "trim",
     ),
-    "rodshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
+    "rodshell.formfinding.dynamic_pop_up": ("DynamicPopUp", "DynamicPopUpSettings", "dynamic_pop_up"),
     "rodshell.formfinding.sewn": ("PatchLayout",),
     "rodshell.joints": (
         "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
@@ -109,11 +112,11 @@ _HOMES = {
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.output.archive": ("Archive", "read"),
     "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
+    "rodshell.solve.rod_supports": ("RodLoads", "RodSupports"),
     "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
-    "rodshell.solve.forces": ("Damping", "ExplicitForce", "Gravity", "ImplicitForce", "PointLoads"),
+    "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
-    "rodshell.solve.simulate": ("simulate",),
-    "rodshell.solve.time_series": ("Moment", "TimeSeries"),
+    "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
@@ -122,17 +125,17 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Archive", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
-    "Disc", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
-    "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity",
-    "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
-    "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutOfTimeError",
-    "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle",
-    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn", "SharedDofs", "Shell",
-    "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net",
-    "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table",
-    "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from",
-    "trim",
+    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError",
+    "Damping", "Disc", "DrapeFigures", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings",
+    "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid",
+    "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh",
+    "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Linker",
+    "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "Paraboloid", "PatchLayout", "Pin",
+    "Placement", "PointLoads", "PopUp", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rod", "RodLoads",
+    "RodShape", "RodStrains", "RodSupports", "RodshellError", "Sample", "Sewn", "SharedDofs", "Shell", "Spring",
+    "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape",
+    "dynamic_pop_up", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "sew",
+    "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

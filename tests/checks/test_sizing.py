@@ -68,6 +68,7 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
             assert used(thicker) > 1 / 2 or thicker.depth > room
 
 
+@pytest.mark.slow
 def test_a_lath_whose_joints_let_it_roll_is_thicker_for_it_bends_towards_its_thin_side_alone() -> None:
     target, layout = half_sphere(5.0)
     larch = rs.Material.preset("larch")
@@ -119,6 +120,7 @@ def test_a_given_strength_decides_in_place_of_the_presets() -> None:
     assert strong.section.depth > weak.section.depth
 
 
+@pytest.mark.slow
 def test_rods_leave_room_between_them_and_are_no_thicker_than_the_papers() -> None:
     flat = {"target.formula": "0.1*x*y/36", "target.radius": "6 m"}
     assert load_case("heightfield", flat).build().rod.section.depth <= 6.0 / 100
@@ -178,6 +180,7 @@ def table_of_rods(path: Path, rods: int, share: float) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rods", "share"), [(4, 0.92), (8, 0.92), (8, 0.98)])
 def test_rods_of_a_table_use_what_they_are_chosen_for_and_the_summary_says_so(
     rods: int, share: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -204,6 +207,7 @@ def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path)
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("keys", "limit"),
     [

@@ -681,6 +681,7 @@ sys.exit(main(["form", "hemisphere"]))
 """
 
 
+@pytest.mark.slow
 def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it() -> None:
     pty = pytest.importorskip("pty", reason="no terminals: run on Linux or macOS")
     ours, theirs = pty.openpty()

@@ -461,7 +461,7 @@ def test_director_along_its_edge_is_refused():
 
 
 def test_corner_of_a_flat_grid_has_the_curvature_of_its_linker():
-    """A quarter turn, |kb| = 2: from x to y with all directors along z, curvature (0, -2) and no twist."""
+    """From x to y with all directors along z: curvature (0, -2 tan 45 degrees) and no twist [HQK Eq 1]."""
     corner = chain([[1.0, 0, 0], [0, 1.0, 0]], [0.0, 0.0])
     elements = BendTwist.starting_at(np.arange(5)[None], corner, Z, bend_stiffness=1.0, twist_stiffness=1.0)
     np.testing.assert_allclose(elements.strains(corner), [[0, -2, 0]], atol=1e-15)

@@ -9,7 +9,7 @@ from rodshell.contact.modified_mass import ModifiedMass
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.summed import SparseSum
+from rodshell.solve.newton_matrix import SparseSum
 from rodshell.targets.domain import Domain, EllipseDomain
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, RADIUS, STEP, TARGETS, G, Particles, slope
 
@@ -106,7 +106,7 @@ def test_a_node_slides_down_a_slope_as_in_the_textbook() -> None:
     slides = Particles(slope(tangent), start, stopped="normal")
     slides.step(n)
     np.testing.assert_allclose(slides.velocity[0], n * STEP * G * sine * down, atol=1e-9)
-    # stopped wholly, it creeps by g sin h^2 a step, as with a drag m/h
+    # stopped in all directions, it creeps by g sin h^2 a step, as with a drag m/h
     creeps = Particles(slope(tangent), start, stopped="all")
     creeps.step(n)
     np.testing.assert_allclose(creeps.state[0], start[0] + n * STEP**2 * G * sine * down, atol=1e-9)

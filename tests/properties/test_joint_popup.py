@@ -8,12 +8,10 @@ import pytest
 from numpy.linalg import norm
 
 import rodshell as rs
-from rodshell.checks.joint_loads import joint_loads
-from rodshell.checks.reactions import reactions
+from rodshell.checks.support_and_joint_loads import joint_loads, reactions
 from rodshell.joints.crossings import RodNodes
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 SPACING = 0.05
@@ -49,7 +47,7 @@ def settled(shell, state, forces):
     """One Newton step further, for forces to round-off."""
     supports = Supports(shell.held_ends())
     return find_equilibrium(
-        Problem(shell.elements, shell.stretch, supports, 0.2, places=shell.flat_coordinates), state, forces
+        Problem(shell.elements, shell.stretch, supports, 0.2, flat_coordinates=shell.flat_coordinates), state, forces
     )
 
 
@@ -60,6 +58,7 @@ def test_every_joint_pops_up_to_a_stable_shell(name):
     assert report.stable
 
 
+@pytest.mark.slow
 @every_joint
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_each_rod_is_in_balance_under_its_supports_and_its_joints(name, ends):
@@ -139,11 +138,11 @@ def test_joints_may_differ_from_place_to_place():
 
 
 def test_a_gravity_drape_with_pins_ends_where_one_with_balls_does():
-    """Pins cost nothing (numerics.md, section 2): they scissor freely, and the rods hardly twist."""
+    """Pins turn freely about the normal, and the rods hardly twist (docs/theory.md, The gravity drape)."""
     layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=SPACING, length=0.9, edge=0.0126)
     lengths = []
     for joint in (rs.Ball(), rs.Pin()):
-        fallen = rs.drape(layout, ROD, rs.Hemisphere(radius=0.2), method="gravity", joint=joint)
+        fallen = rs.drape(layout, ROD, rs.Hemisphere(radius=0.2), method=rs.Gravity(), joint=joint)
         assert fallen.converged
         lengths.append([rod.length for rod in rs.trim(fallen).mesh.grid.rods])
     assert np.abs(np.subtract(*lengths)).max() < 2e-3 * 0.2

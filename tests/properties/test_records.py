@@ -90,7 +90,7 @@ def test_what_a_shell_and_a_rod_show_is_what_matters() -> None:
 GIVEN = {"EA": 1.0, "EI1": 1.0, "EI2": 1.0, "GJ": 1.0}
 WRONG = [
     (lambda: rs.Circle("1 mm"), 'section radius must be a number in m, not "1 mm"'),
-    (lambda: rs.Circle(None), "section radius must be a number in m, not a NoneType"),
+    (lambda: rs.Circle(None), "section radius must be a number in m, not None"),
     (lambda: rs.Tube(0.02, "3 mm"), 'section thickness must be a number in m, not "3 mm"'),
     (lambda: rs.Tube(0.01, 0.02), "tube thickness 0.02 m is larger than its radius 0.01 m"),
     (lambda: rs.Ellipse(0.1, [0.2]), "half-axis b must be a number in m, not a list"),

@@ -13,10 +13,8 @@ import numpy as np
 
 from rodshell.formfinding.popup import Ends
 from rodshell.model import Shell
-from rodshell.solve.constraint import Supports
 from rodshell.solve.critical import first_critical
-from rodshell.solve.mixed_newton import Equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import Equilibrium
 
 GRAVITY = 9.81  # [m/s2]
 MOST = 100.0  # times its own weight: what bears more is not loaded further
@@ -60,10 +58,11 @@ def self_weight(
     most: float = MOST,
     progress: Callable[[int, float], None] = lambda count, factor: None,
 ) -> SelfWeight:
-    """Load a shell in equilibrium, `found`, with its own weight until it is no longer stable.
+    """Load a shell with its own weight until it is no longer stable.
 
     Parameters
     ----------
+    found : the equilibrium of the shell without loads, its ends held.
     gravity : [m/s2].
     most : the largest factor that is of interest.
     progress : as of `first_critical`.
@@ -72,12 +71,7 @@ def self_weight(
         return SelfWeight(None, None, "no mass")
     load = np.zeros_like(found.state)
     load[:, 2] = -gravity * shell.mass[:, 2]
-    supports = Supports(shell.held_ends())
-    length = 0.5 * float(np.ptp(shell.positions(found.state), axis=0).max())
-    problem = Problem(
-        shell.elements, shell.stretch, supports, length, places=shell.flat_coordinates, pattern=found.pattern
-    )
-    end = first_critical(problem, found.state, found.forces, load, most=most, progress=progress)
+    end = first_critical(found, load, most=most, progress=progress)
     deflection = None
     if end.state is not None:
         moved = shell.positions(end.state) - shell.positions(found.state)
@@ -90,25 +84,25 @@ def self_weight(
 
 def unknown_weights(found: Mapping[Ends, SelfWeight]) -> tuple[str, ...]:
     """Sentences for what is not known of shells by their end condition."""
-    if any(one.limit == "no mass" for one in found.values()):
+    if any(weight.limit == "no mass" for weight in found.values()):
         return (
             "no mass was given, so that it is not known what share of its own weight the shell bears: "
             "give rod.section.mass",
         )
     return tuple(
-        f"with {ends} ends the shell bears at least {_share(one.load_factor or 0.0)} its own weight; above, its path "
-        "could not be followed, and nothing is known"
-        for ends, one in found.items()
-        if one.limit == "not followed"
+        f"with {ends} ends the shell bears at least {_share(weight.load_factor or 0.0)} its own weight; above, its "
+        "path could not be followed, and nothing is known"
+        for ends, weight in found.items()
+        if weight.limit == "not followed"
     )
 
 
 def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
     """Of shells that stand by themselves: the smallest factor, and the largest deflection if all bear their weight."""
-    least = min(parts, key=lambda one: one.at_least)
-    sunk = [one.deflection for one in parts]
-    deflection = None if None in sunk else max(one for one in sunk if one is not None)
-    return SelfWeight(least.load_factor, deflection, least.limit, sum(one.factorizations for one in parts))
+    least = min(parts, key=lambda part: part.at_least)
+    sunk = [part.deflection for part in parts]
+    deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
+    return SelfWeight(least.load_factor, deflection, least.limit, sum(part.factorizations for part in parts))
 
 
 def _share(factor: float) -> str:

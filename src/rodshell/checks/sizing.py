@@ -228,7 +228,7 @@ def _sharpest_of(target: Target) -> float:
     x, y = (target.summit[k] + plane.ravel() for k, plane in enumerate(np.meshgrid(side, side)))
     plan = np.column_stack([x, y])
     with np.errstate(all="ignore"):
-        points = np.column_stack([plan, target.height(plan)])
+        points = np.column_stack([plan, target.height_at(plan)])
     points = points[np.isfinite(points[:, 2])]
     points = points[target.margin(points) > 0]
     return float(np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(initial=0.0))

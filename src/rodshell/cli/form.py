@@ -89,7 +89,7 @@ def run(
     from rodshell.output.archive import ARCHIVE
     from rodshell.output.files import reserved
     from rodshell.output.inputs import kept_case, read_inputs
-    from rodshell.solve.time_series import NAMES
+    from rodshell.solve.simulate import NAMES
 
     kinds = wanted_kinds(only)
     inputs = read_inputs(case.to_toml())
@@ -116,7 +116,7 @@ def _form(
     target, layout, rod, options = case.build()
     _announce_sizes(case, target, layout, quiet=quiet)
     if case.drape.frames:
-        options["fall"] = replace(options["fall"], stream=place.new / case.drape.frames)
+        options["method"] = replace(options["method"], stream=place.new / case.drape.frames)
     from rodshell.form import find_form
 
     found = None

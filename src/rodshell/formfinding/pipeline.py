@@ -9,13 +9,12 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.agreement import Agreement, agreement
-from rodshell.formfinding.drape import Method, drape
+from rodshell.formfinding.drape import drape
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.fall import Fall
-from rodshell.formfinding.flatness import flat_warning
-from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
+from rodshell.formfinding.methods import Bound, Method
+from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.roll import roll
+from rodshell.formfinding.section_limits import flat_warnings, section_rotation
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -57,7 +56,7 @@ class FoundForm:
     draped: Draped
     trimmed: Trimmed
     footprint: Footprint
-    popped: dict[Ends, Popped]
+    popped: dict[Ends, PopUp]
     agreement: dict[Ends, Agreement]
     ends: tuple[Ends, ...]
 
@@ -68,7 +67,7 @@ class FoundForm:
             return self.draped.report.reason
         if not self.draped.converged:
             sentence = self.draped.report.status.sentence
-            weighed = self.draped.method != "bound" and "bound" not in sentence
+            weighed = not isinstance(self.draped.method, Bound) and "bound" not in sentence
             other = ', or use method = "bound", which asks for no weight' if weighed else ""
             return f"drape {sentence}{other}"
         return _popped_status(self.popped)
@@ -77,7 +76,7 @@ class FoundForm:
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
         tails = _long_tails(self.trimmed) if self.draped.converged else ()
-        flat = flat_warning(self.trimmed.positions, self.rod)
+        flat = flat_warnings(self.trimmed.positions, self.rod)
         return (*flat, *self.draped.warnings, *_stretched(self.draped), *tails, *_rolled(self.popped))
 
 
@@ -89,7 +88,7 @@ class PoppedTable:
     joint: Joint
     footprint: Footprint
     boundary: Boundary
-    popped: dict[Ends, Popped]
+    popped: dict[Ends, PopUp]
     dropped: tuple[tuple[str, str], ...]
 
     @property
@@ -107,11 +106,9 @@ def find_stages(
     layout: GridLayout,
     rod: Rod,
     *,
-    method: Method = "bound",
+    method: Method = Bound(),
     anchor: tuple[float, float] | None = None,
-    gravity: float | None = None,
     joint: Joint | None = None,
-    fall: Fall | None = None,
     ends: Ends | Sequence[Ends] = ENDS,
     start: FoundForm | None = None,
     cut: Callable[[Draped], Trimmed] = trim,
@@ -126,12 +123,12 @@ def find_stages(
     joint = joint or Ball()
     draped = drape(
         layout, rod, target,
-        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall,
-        start=start.draped if start else None, progress=progress,
+        method=method, anchor=anchor, joint=joint,
+        warm_start=start.draped if start else None, progress=progress,
     )  # fmt: skip
-    trimmed = cut(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
+    trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
     footprint = map_back(trimmed)
-    popped, last = dict[Ends, Popped](), start.popped if start else {}
+    popped, last = dict[Ends, PopUp](), start.popped if start else {}
     for end in ends if draped.converged else ():
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
@@ -197,7 +194,7 @@ def _spans(grid: FlatGrid) -> float:
     return float(np.median(gaps)) if gaps else min(rod.length for rod in grid.rods)
 
 
-def _popped_status(popped: dict[Ends, Popped]) -> str:
+def _popped_status(popped: dict[Ends, PopUp]) -> str:
     for ends, shell in popped.items():
         if not shell.report.converged:
             return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
@@ -207,7 +204,7 @@ def _popped_status(popped: dict[Ends, Popped]) -> str:
 def _stretched(draped: Draped) -> tuple[str, ...]:
     """Rods that hang stretch by weight over stiffness, in which their section's area cancels out."""
     strain = draped.report.max_strain
-    if draped.method == "bound" or not draped.converged or strain <= STRETCHED:
+    if isinstance(draped.method, Bound) or not draped.converged or strain <= STRETCHED:
         return ()
     return (
         f"on the target the rods stretch by {100 * strain:.2g} % under their own weight, so that they are cut too "
@@ -237,10 +234,10 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     )
 
 
-def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
     """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
     for ends, shell in popped.items():
-        angles = roll(shell) if shell.report.converged else None
+        angles = section_rotation(shell.shell, shell.state) if shell.report.converged else None
         if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
             return (
                 f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "

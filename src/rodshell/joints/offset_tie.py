@@ -24,7 +24,7 @@ from rodshell.joints.crossings import (
     stencils,
     with_source,
 )
-from rodshell.layout.layers import sides
+from rodshell.layout.flatgrid import sides
 from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
-from rodshell.formfinding.bound import shape_of_net
-from rodshell.formfinding.flatness import is_flat
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod
@@ -49,27 +49,27 @@ def target_table(target: Target, flat: bool) -> dict[str, Any]:
 def drape_table(draped: Draped) -> dict[str, Any]:
     """Figures of a drape."""
     drape: dict[str, Any] = {
-        "method": draped.method,
+        "method": draped.method.name,
         "status": draped.report.status.value,
         "dofs": draped.report.dofs,
         "levels": [_level(level) for level in draped.levels],
         "seconds": sum(level.seconds for level in draped.levels),
         "force_residual": draped.report.force_residual,
         "max_strain": draped.report.max_strain,
-        "max_gap": draped.max_gap,
+        "max_gap": draped.figures.max_gap,
         "negative_modes": draped.report.negative_modes,
-        "min_angle_deg": degrees(draped.min_angle),
-        "min_angle_at": list(draped.min_angle_at),
-        "contact_pulls": draped.pulls,
+        "min_angle_deg": degrees(draped.figures.min_angle),
+        "min_angle_at": list(draped.figures.min_angle_at),
+        "contact_pulls": draped.figures.contact_pulls,
     }
     if draped.rest is not None:
         drape["fall"] = asdict(draped.rest)
     if draped.eccentricity:
         drape["eccentricity"] = draped.eccentricity
-    if draped.strong_bending is not None:
-        drape["strong_bending"] = asdict(draped.strong_bending)
-    if draped.own_ends is not None:
-        off = np.abs(draped.own_ends)
+    if draped.figures.strong_bending is not None:
+        drape["strong_bending"] = asdict(draped.figures.strong_bending)
+    if draped.figures.net_deviation is not None:
+        off = np.abs(draped.figures.net_deviation)
         drape["own_ends"] = {"max": float(off.max()), "median": float(np.median(off))}
     return drape
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.formfinding import Draped, Fall, Trimmed, drape, trim
-from rodshell.formfinding.drape import Method
+from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
+from rodshell.formfinding.methods import MethodName
 from rodshell.formfinding.progress import Progress
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets import chebyshev_net
@@ -30,7 +30,7 @@ from rodshell.paper.plotting import (
 )
 
 FALL = Fall(height=HEIGHT, drag=3.0)  # shared DOFs: the paper's *mapping*
-METHODS: tuple[Method, ...] = ("paper", "gravity", "bound")
+METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")
 WORDS = {"paper": "paper's, in time", "gravity": "gravity statics", "bound": "bound to the target"}
 COLUMNS = (
     "target", "rods", "method", "unknowns", "time [s]", "ends off the net, max [mm]", "rms [mm]", "how it rests",
@@ -59,7 +59,7 @@ class DrapeRun:
     """
 
     case: Case
-    method: Method
+    method: MethodName
     draped: Draped
     trimmed: Trimmed
     seconds: float
@@ -111,7 +111,7 @@ class DrapeRun:
 
 
 def drape_all(
-    cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[Method] = METHODS
+    cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[MethodName] = METHODS
 ) -> tuple[DrapeRun, ...]:
     """Every case by every method, the falls with the settings `fall`.
 
@@ -125,21 +125,21 @@ def drape_all(
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
 
-def _drape(case: Case, method: Method, fall: Fall, progress: Progress) -> DrapeRun:
+def _drape(case: Case, method: MethodName, fall: Fall, progress: Progress) -> DrapeRun:
     def case_progress(stage: str, detail: str, residual: float) -> None:
         progress(f"({case.label}) {case.target.name}, {stage}", detail, residual)
 
     begun = perf_counter()
-    falls = fall if method == "paper" else None
-    draped = drape(case.layout, ROD, case.target, method=method, fall=falls, progress=case_progress)
+    options: dict[MethodName, Method] = {"paper": fall, "gravity": Gravity(), "bound": Bound()}
+    draped = drape(case.layout, ROD, case.target, method=options[method], progress=case_progress)
     trimmed = trim(draped)
     seconds = perf_counter() - begun
     exact: dict[str, FlatRod] = {rod.name: rod for rod in chebyshev_net(case.target, case.layout).rods}
     rods = trimmed.mesh.grid.rods
     of_net = [exact[rod.name] for rod in rods]
     ends, net = (np.array([[rod.start, rod.end] for rod in found]) for found in (rods, of_net))
-    if draped.own_ends is not None:
-        past = dict(zip([rod.name for rod in draped.rods], draped.own_ends, strict=True))
+    if draped.figures.net_deviation is not None:
+        past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
         ends += np.array([past[rod.name] for rod in rods]) * [-1.0, 1.0]
     return DrapeRun(case, method, draped, trimmed, seconds, ends, net)
 

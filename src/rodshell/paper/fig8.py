@@ -23,9 +23,9 @@ from rodshell.model import Shell
 from rodshell.paper.cases import CASES, LENGTH, ROD, Case
 from rodshell.paper.figure import Figure
 from rodshell.paper.plotting import INK, TARGET_COLOURS, Chart, Series, charts_svg
-from rodshell.solve.banded import Banded
-from rodshell.solve.constraint import NO_CURVATURE
 from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.newton_matrix import Banded
+from rodshell.solve.problem import NO_CURVATURE
 
 FALLING = 2.0  # [s]
 STEPS = {"explicit": (0.01, 0.005, 0.0025), "shared": (0.1, 0.05, 0.02, 0.01), "implicit": (0.01,)}  # [s]
@@ -185,7 +185,7 @@ def timed_fall(case: Case, coupling: Coupling, step: float, falling: float, prog
 
 def _fall(case: Case, coupling: Coupling, step: float, falling: float, progress: Progress) -> Draped:
     fall = Fall(coupling=coupling, time_step=step, duration=falling, settle=False)
-    return drape(case.layout, ROD, case.target, method="paper", fall=fall, progress=progress)
+    return drape(case.layout, ROD, case.target, method=fall, progress=progress)
 
 
 def timed_ours(case: Case) -> Timing:

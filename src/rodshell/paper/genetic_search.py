@@ -19,7 +19,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.formfinding import FoundForm, agreement, pop_up
-from rodshell.formfinding.popup import Popped
+from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.progress import Progress
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
@@ -96,7 +96,7 @@ class Design:
         low, high = np.ceil((rod.start + clear - first) / step), np.floor((rod.end - clear - first) / step)
         return [first + step * k for k in range(int(low), int(high) + 1)]
 
-    def pop_up(self, variables: Floats, *, patience: float = inf) -> Popped | None:
+    def pop_up(self, variables: Floats, *, patience: float = inf) -> PopUp | None:
         """The shell of `variables` (n,) popped up from flat, pinned.
 
         None if a rod has too few joints, or after `patience` iterations. Always from flat: a shell has other stable
@@ -178,7 +178,7 @@ def _heights(target: Target, points: Floats) -> Floats:
     """(m,) the target's greatest height over the chord of each rod [m]."""
     t = np.linspace(0.02, 0.98, 49)[:, None]
     ends = points.reshape(-1, 2, 3)
-    return np.array([np.nanmax(target.height((a + t * (b - a))[:, :2])) - min(a[2], b[2]) for a, b in ends])
+    return np.array([np.nanmax(target.height_at((a + t * (b - a))[:, :2])) - min(a[2], b[2]) for a, b in ends])
 
 
 def _orbits(target: Target, lines: tuple[FlatRod, ...], points: Floats) -> Ints:

@@ -22,10 +22,10 @@ from rodshell.joints import Coupling, ExplicitPenalty, Joint
 from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
 from rodshell.paper.cases import ROD
-from rodshell.solve.constraint import Supports
 from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.linear_stability import step_limit
+from rodshell.solve.problem import Supports
 from rodshell.solve.simulate import simulate
-from rodshell.solve.step_limit import step_limit
 
 Demonstration = Literal["twisting", "bending"]
 
