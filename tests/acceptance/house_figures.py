@@ -167,9 +167,9 @@ def described(node: ast.AST) -> bool:
 def public_records(file: SourceFile) -> Iterator[ast.ClassDef]:
     """Public classes of a module with annotated fields: records and settings."""
     for node in file.tree.body:
-        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-            if any(isinstance(child, ast.AnnAssign) for child in node.body):
-                yield node
+        public = isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+        if public and any(isinstance(child, ast.AnnAssign) for child in node.body):
+            yield node
 
 
 def is_any_dict(node: ast.AST) -> bool:
