@@ -157,8 +157,8 @@ class _Search:
         there = find_equilibrium(self.own.problem, start, forces, descend=True, limit_steps=True, most_iterations=most)
         self.factorizations += there.report.factorizations
         positions = self.shell.positions(there.state)
-        known = (self.positions, *(one.positions for one in self.shapes))
-        if there.report.stable and all(self._apart(positions, one) > SAME for one in known):
+        known = (self.positions, *(shape.positions for shape in self.shapes))
+        if there.report.stable and all(self._apart(positions, other) > SAME for other in known):
             mirror = self.image is not None and self._apart(positions, self.image) < MIRRORED
             same = mirror and not self.shell.mesh.layered  # lifted to the other side it goes to its image
             from_flat = True if same and self.reached else None
@@ -208,8 +208,8 @@ class _Search:
         """(n, 3) vectors as the plane of the supports reflects them."""
         return np.asarray(vectors - 2 * (vectors @ self.normal)[:, None] * self.normal)
 
-    def _apart(self, one: Floats, two: Floats) -> float:
-        return float(np.linalg.norm(one - two, axis=1).max()) / self.length
+    def _apart(self, here: Floats, there: Floats) -> float:
+        return float(np.linalg.norm(here - there, axis=1).max()) / self.length
 
 
 def spanned(mesh: GridMesh, positions: Floats) -> Floats:

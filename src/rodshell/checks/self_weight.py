@@ -84,25 +84,25 @@ def self_weight(
 
 def unknown_weights(found: Mapping[Ends, SelfWeight]) -> tuple[str, ...]:
     """Sentences for what is not known of shells by their end condition."""
-    if any(one.limit == "no mass" for one in found.values()):
+    if any(weight.limit == "no mass" for weight in found.values()):
         return (
             "no mass was given, so that it is not known what share of its own weight the shell bears: "
             "give rod.section.mass",
         )
     return tuple(
-        f"with {ends} ends the shell bears at least {_share(one.load_factor or 0.0)} its own weight; above, its path "
-        "could not be followed, and nothing is known"
-        for ends, one in found.items()
-        if one.limit == "not followed"
+        f"with {ends} ends the shell bears at least {_share(weight.load_factor or 0.0)} its own weight; above, its "
+        "path could not be followed, and nothing is known"
+        for ends, weight in found.items()
+        if weight.limit == "not followed"
     )
 
 
 def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
     """Of shells that stand by themselves: the smallest factor, and the largest deflection if all bear their weight."""
-    least = min(parts, key=lambda one: one.at_least)
-    sunk = [one.deflection for one in parts]
-    deflection = None if None in sunk else max(one for one in sunk if one is not None)
-    return SelfWeight(least.load_factor, deflection, least.limit, sum(one.factorizations for one in parts))
+    least = min(parts, key=lambda part: part.at_least)
+    sunk = [part.deflection for part in parts]
+    deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
+    return SelfWeight(least.load_factor, deflection, least.limit, sum(part.factorizations for part in parts))
 
 
 def _share(factor: float) -> str:

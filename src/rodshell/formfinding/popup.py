@@ -117,7 +117,7 @@ def pop_up(
     require_joint(joint)
     joint = joint or Ball()
     joints = joint if isinstance(joint, Sequence) else (joint,)
-    apart = max((one.eccentricity for one in joints), default=0.0)
+    apart = max((joint.eccentricity for joint in joints), default=0.0)
     if apart and not footprint.mesh.layered:
         footprint, boundary = in_layers(footprint, boundary, apart)
     elif footprint.mesh.layered and apart != (lie := 2 * float(np.abs(footprint.mesh.heights).max(initial=0.0))):

@@ -205,7 +205,7 @@ class Shell:
         self.turn_edges(state, signed_angle(moved, wanted, now))
 
     def turn_edges(self, state: Floats, turns: Floats) -> None:
-        """Add `turns` (e,) [rad] to the twist angles in `state` of the rods' edges and linkers that share them."""
+        """Add `turns` (e,) [rad] to the twist angles in `state` of the edges, and of linkers that share them."""
         first = self.mesh.node_count + len(self.ghosts)
         turning = np.flatnonzero((self.like >= first) & (self.like < first + len(turns)))
         state[turning, 0] += turns[self.like[turning] - first]

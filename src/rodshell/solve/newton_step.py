@@ -86,10 +86,17 @@ class NewtonStep:
         return not (self._chord and self._was_chord)
 
     def refresh(self, state: Floats) -> None:
+        """Carry the source frames of the elements to `state` (n, 3)."""
         self.elements = tuple(element.refreshed(state) for element in self.elements)
 
     def gradient(self, state: Floats, forces: Floats) -> Floats:
-        """Gradient (n, 3) of energy and load with the given axial forces [N]."""
+        """Gradient of energy and load.
+
+        Parameters
+        ----------
+        state : (n, 3) [m, rad].
+        forces : (e,) axial forces that the edges carry [N].
+        """
         gradient = np.zeros_like(state) if self._problem.load is None else -self._problem.load
         for element in self.elements:
             element.evaluate(state, gradient)
@@ -97,7 +104,23 @@ class NewtonStep:
         return gradient
 
     def take(self, state: Floats, forces: Floats, descend: bool) -> tuple[float, Floats, Floats, float]:
-        """Length of the step, the next state and forces, and how far these are from matching the strains."""
+        """One step.
+
+        Parameters
+        ----------
+        state : (n, 3) [m, rad].
+        forces : (e,) axial forces [N].
+        descend : shift the Hessian wherever it is indefinite.
+
+        Returns
+        -------
+        Length of the step [m], the next state and forces, and how far these are from matching the strains [-].
+
+        Raises
+        ------
+        SingularError : a pivot vanishes, and not by a mode without stiffness.
+        HopelessError : the start has more negative modes than are allowed.
+        """
         problem = self._problem
         if not self._chord:
             self._factored = state, forces
@@ -198,7 +221,7 @@ class NewtonStep:
         """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated."""
         self._shift_until_definite()
         mode = self._free.expand(self._inverse_iteration(12)[0])
-        return mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max())
+        return np.asarray(mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max()))
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
