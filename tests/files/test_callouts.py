@@ -15,6 +15,8 @@ from rodshell.output.drawings.supports import supports_drawing
 from rodshell.output.labels import Room, boxes_meet, lines_meet
 from rodshell.output.plan import flat_plan
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])

@@ -36,6 +36,7 @@ def leaders(drawing: Drawing, ends: Floats) -> list[Floats]:
     return [line for line in lines if np.linalg.norm(ends - line[0], axis=1).min() < 1e-6]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [1.0, 0.6], ids=["usual size", "small"])
 @pytest.mark.parametrize("name", NAMES)
 def test_texts_of_the_flat_plan_lie_on_no_rod(name: str, share: float) -> None:
@@ -47,6 +48,7 @@ def test_texts_of_the_flat_plan_lie_on_no_rod(name: str, share: float) -> None:
     assert {rod.id for rod in plan.rods} <= {text.text for text in texts}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_no_two_leaders_of_the_flat_plan_cross_nor_run_through_a_name(name: str) -> None:
     _, plan = named(name)

@@ -20,6 +20,8 @@ from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
 from rodshell.paper.plotting import standing
 from tests.paper.falls import HEMISPHERE
 
+pytestmark = pytest.mark.slow
+
 CASE = Case("a", HEMISPHERE, (7, 7), spacing=0.06, edge=0.03)
 
 

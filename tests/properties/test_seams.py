@@ -96,6 +96,7 @@ def test_these_points_lie_on_target_and_seam(name: str) -> None:
     assert off_seams(form, points).max() < 3e-5  # the dense points lie 5e-5 apart
 
 
+@pytest.mark.slow
 @every_case
 def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
     """Each end off the target's own edge belongs to exactly one meeting."""
@@ -238,6 +239,7 @@ def test_a_patch_may_have_its_own_spacing_and_anchor() -> None:
     assert len(form.meetings) > 10
 
 
+@pytest.mark.slow
 def test_the_strong_bending_of_patches_is_that_of_the_worst() -> None:
     """Here not of the patch whose rods meet at the smallest angle."""
     lath = rs.Rod(rs.RectangularSection(width=1e-3, height=8e-3), rs.Material(youngs_modulus=1e9, density=1e3))

@@ -157,7 +157,7 @@ def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last)
     for form in (last, rs.find_form(HEMISPHERE, layout_of(), ROD, ends=("pinned",))):
         popped, trimmed = form.popped["pinned"], form.trimmed
         down = at_positions(popped, popped.positions * [1.0, 1.0, -0.85])
-        again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", start=down)
+        again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", warm_start=down)
         assert again.report.stable
         assert largest(again.positions - popped.positions) < SETTLED
 

@@ -312,7 +312,7 @@ def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
 
     Returns
     -------
-    None where that could not be followed. Snaps on the way are gone through.
+    None where that could not be followed. The path goes on after a snap.
     """
     shell, mesh = clamped.shell, clamped.footprint.mesh
     now, outward = end_directions(mesh, pinned.positions), clamped.boundary.tangents

@@ -132,7 +132,7 @@ def find_stages(
     for end in ends if draped.converged else ():
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
-            ends=end, start=last.get(end, "draped"), joint=joint, progress=progress,
+            ends=end, warm_start=last.get(end), joint=joint, progress=progress,
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break

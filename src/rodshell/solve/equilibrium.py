@@ -19,7 +19,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.rods.elements import Elements
-from rodshell.solve.newton_step import HopelessError, NewtonStep
+from rodshell.solve.newton_step import NewtonStep, TooManyModesError
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport, Status
 from rodshell.solve.sparse_ldl import SingularError
@@ -28,7 +28,7 @@ from rodshell.solve.tangent import Tangent, TangentAssembly
 Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6
-CIRCLES, ALIKE = 12, 1e-3  # steps; and how near to each other
+REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
 MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
@@ -113,7 +113,7 @@ def find_equilibrium(
         counted = step.counts
         try:
             moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
-        except HopelessError:
+        except TooManyModesError:
             status = Status.BUCKLED
             break
         except SingularError:
@@ -135,7 +135,7 @@ def find_equilibrium(
             status = Status.OUT_OF_TIME
             break
         steps.append(moved)
-        if _in_circles(steps):
+        if _repeats(steps):
             break
         step.refresh(state)
     gradient = step.gradient(state, forces)
@@ -157,10 +157,10 @@ def find_equilibrium(
     return Equilibrium(solved, state, forces, gradient, report, mode)
 
 
-def _in_circles(steps: list[float]) -> bool:
-    """Whether the last `CIRCLES` steps are as long as those two before: to and fro between two states, for ever."""
-    last = np.array(steps[-CIRCLES - 2 :])
-    return len(last) == CIRCLES + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+def _repeats(steps: list[float]) -> bool:
+    """Whether the last `REPEATED` steps are as long as those two before: back and forth between two states."""
+    last = np.array(steps[-REPEATED - 2 :])
+    return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
 
 
 def find_stable(
