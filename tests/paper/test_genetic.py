@@ -144,7 +144,8 @@ def test_what_does_not_stand_counts_as_off_by_the_targets_size(monkeypatch: pyte
     assert one.error(short) == 0.2
     stands = one.pop_up(good)
     assert stands is not None
-    shaky = replace(stands, report=replace(stands.report, negative_modes=1))
+    found = stands.equilibrium
+    shaky = replace(stands, equilibrium=replace(found, report=replace(found.report, negative_modes=1)))
     with monkeypatch.context() as patched:
         patched.setattr(genetic_search, "pop_up", lambda *_, **__: shaky)
         assert one.error(good) == 0.2
