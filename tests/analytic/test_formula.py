@@ -358,7 +358,7 @@ REFUSED = {
     "(-8)^(1/3)": "is not a finite number",
     "exp(1000)": "is not a finite number",
     "x*" * 3000 + "x": "6001 characters",
-    "(" * 150 + "x" + ")" * 150: "100 parentheses",
+    "(" * 150 + "x" + ")" * 150: "100 nested parentheses",
     "-" * 3900 + "x": "nested too deeply",
 }
 

@@ -51,7 +51,7 @@ def bound_drape(
     """Drape `layout` over `target` by its net; see `drape`."""
     progress("net", "marching", 0.0)
     eccentricity = joint.eccentricity if joint else 0.0
-    net = chebyshev_net(target, layout, anchor=anchor, near=near.net if near else None, eccentricity=eccentricity)
+    net = chebyshev_net(target, layout, anchor=anchor, warm_start=near.net if near else None, eccentricity=eccentricity)
     grid = with_apron(net, CLEARANCE * layout.edge)
     cuts = [list[FlatRod]() for _ in grid.rods]
     for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):

@@ -26,7 +26,7 @@ UPRIGHT = 0.2  # upward part of a normal: where the edge is not level, a steeper
 CORNER = 0.9  # cosine between edges of the rim: its points are close, and smooth curves turn by far less
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WalledTarget(Target):
     """A target that ends at a base plane or at the edge of its plan.
 
