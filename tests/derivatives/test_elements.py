@@ -16,7 +16,7 @@ import pytest
 from numpy.linalg import norm
 
 from rodshell.errors import InputError
-from rodshell.geometry import directors_along, parallel_transport
+from rodshell.geometry.frames import directors_along, parallel_transport
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.isotropic_bend import IsotropicBend
 from rodshell.rods.round_bend_twist import RoundBendTwist

@@ -1,5 +1,6 @@
 """Targets, layouts and grids as Python values: wrong arguments, repr, equality and hashing."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +9,9 @@ import pytest
 import rodshell as rs
 from rodshell.geometry.curves import closed_loops
 from rodshell.layout import Crossings
-from rodshell.nets import march
-from rodshell.targets import EllipseDomain, Formula, parse_formula
+from rodshell.nets.compass import march
+from rodshell.targets.domain import EllipseDomain
+from rodshell.targets.formula import Formula, parse_formula
 from rodshell.targets.patch import Patch, Seam
 from tests.targets.meshes import sheet
 
@@ -107,8 +109,6 @@ def test_what_is_no_length_is_refused_in_one_sentence(name, wrong):
     ],
 )
 def test_a_wrong_argument_is_refused_in_one_sentence(call, sentence):
-    import re
-
     words = refusal(call)
     assert re.search(sentence, words), words
     assert "\n" not in words

@@ -228,10 +228,10 @@ def _fixed_points(
     rod, s, nodes, turn = rod[order], s[order], nodes[order], turn[order]
     tiny = 1e-9 * np.array([rod.length for rod in grid.rods])
     near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
-    place = np.cumsum(np.append(0, ~near))  # points of a rod at one place: the first is kept, and every joint
-    first = np.full(place[-1] + 1, len(turn))
-    np.minimum.at(first, place, turn)
-    out = turn > first[place]
+    group = np.cumsum(np.append(0, ~near))  # points of a rod at one place: the first is kept, and every joint
+    first = np.full(group[-1] + 1, len(turn))
+    np.minimum.at(first, group, turn)
+    out = turn > first[group]
     joints, fresh = int(merged.max(initial=-1)) + 1, np.flatnonzero(~out & (nodes < 0))
     nodes[fresh[np.argsort(turn[fresh])]] = joints + np.arange(len(fresh))
     return rod[~out], s[~out], nodes[~out], joints + len(fresh)
@@ -266,13 +266,13 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     joint = rank[joint]
     shared = mesh.joint_nodes[found[kept]][np.sort(first)]
     piece, s, node = nodes_along(mesh, rods, index)
-    place = np.full(len(mesh.flat), -1)
-    place[shared] = np.arange(len(shared))
+    node_of = np.full(len(mesh.flat), -1)
+    node_of[shared] = np.arange(len(shared))
     joined = np.isin(piece * mesh.node_count + node, (grid.crossings.rods * mesh.node_count + shared[joint][:, None]))
     starts = np.searchsorted(piece, np.arange(len(rods) + 1))
     from_end = np.minimum(s - s[starts[piece]], s[starts[piece + 1] - 1] - s)
     single = ~joined & ~((from_end > 0.0) & (from_end < CROWDED * _usual_edges(mesh)[index][piece]))
-    nodes = np.where(joined, place[node], len(shared) - 1 + np.cumsum(single))
+    nodes = np.where(joined, node_of[node], len(shared) - 1 + np.cumsum(single))
     made = joined | single
     chosen = np.concatenate([shared, node[single]])
     starts = np.searchsorted(piece[made], np.arange(len(rods)))

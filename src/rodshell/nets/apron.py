@@ -38,17 +38,17 @@ def with_apron(net: ChebyshevNet, clearance: float) -> FlatGrid:
         key = (rod.family, *lines[rod.family].stretch_of(rod))
         known = spans.get(key, rod)
         spans[key] = known.cut(min(known.start, rod.start), max(known.end, rod.end))
-    met = {family: np.zeros(family_lines.live.shape, dtype=bool) for family, family_lines in lines.items()}
+    joints = {family: np.zeros(family_lines.live.shape, dtype=bool) for family, family_lines in lines.items()}
     for (family, line, _), rod in spans.items():
         stations, live = lines[family].stations, lines[family].live[line]
         first = int(np.searchsorted(stations, rod.start - clearance, side="right")) - RINGS
         last = int(np.searchsorted(stations, rod.end + clearance, side="left")) + RINGS - 1
         span = np.arange(max(first, 0), min(last, len(stations) - 1) + 1)
-        met[family][line, span[live[span]]] = True
+        joints[family][line, span[live[span]]] = True
     spanned: dict[tuple[str, int], set[int]] = {}
     for family, line, stretch in spans:
         spanned.setdefault((family, line), set()).add(stretch)
-    points = met["u"] | met["v"].T
+    points = joints["u"] | joints["v"].T
     rods = list[FlatRod]()
     for family, table in (("u", points), ("v", points.T)):
         family_lines = lines[family]
@@ -88,11 +88,11 @@ class _Lines:
         return line, int(self.stretches[line, np.argmin(away)])
 
 
-def _prolonged(rod: FlatRod | None, family: str, offset: float, met: Floats) -> list[FlatRod]:
+def _prolonged(rod: FlatRod | None, family: str, offset: float, joints: Floats) -> list[FlatRod]:
     """A rod from the first to the last joint on its line, including its own ends."""
     if rod is not None:
-        return [rod.cut(min(rod.start, *met), max(rod.end, *met)) if len(met) else rod]
-    if len(met) < 2:
+        return [rod.cut(min(rod.start, *joints), max(rod.end, *joints)) if len(joints) else rod]
+    if len(joints) < 2:
         return []
     make = FlatRod.u if family == "u" else FlatRod.v
-    return [make(f"apron {family.upper()} {offset:+.4f}", offset, float(met[0]), float(met[-1]), virtual=True)]
+    return [make(f"apron {family.upper()} {offset:+.4f}", offset, float(joints[0]), float(joints[-1]), virtual=True)]
