@@ -172,7 +172,7 @@ def test_inside_nodes_are_those_that_hang_together_with_the_anchor():
     s = np.linspace(-1.0, 1.0, 81)
     height = 0.03 * (np.cos(9 * s)[:, None] * np.cos(7 * s) + 0.3 * np.sin(11 * s[:, None] * s) - 0.1)
     points = np.stack([*np.meshgrid(s, s, indexing="ij"), height], axis=-1)
-    net = rs.nets.Net(s, s, points)
+    net = Net(s, s, points)
     islands, count = label(height > 0)
     assert count > 4
     np.testing.assert_array_equal(inside_nodes(target, net), islands == islands[net.origin])
