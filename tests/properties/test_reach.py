@@ -10,7 +10,7 @@ import rodshell as rs
 from rodshell.geometry.curves import resampled
 from rodshell.nets import net_extent
 from rodshell.nets.apron import RINGS
-from rodshell.nets.compass import fill_quadrants, march
+from rodshell.nets.compass import Net, fill_quadrants, march
 from rodshell.nets.cuts import inside_nodes
 from rodshell.nets.net_extent import Covering, march_covering, wanted_nodes
 from tests.targets.test_nets_on_files import TARGETS as FILES

@@ -201,7 +201,7 @@ def test_a_file_that_cannot_be_read_is_refused_with_the_readers_own_words_in_one
 def test_noise_in_an_stl_is_refused(tmp_path):
     """trimesh 4 raises an error for it, trimesh 5 finds no faces."""
     (tmp_path / "noise.stl").write_bytes(bytes(range(255, 0, -1)) * 9)
-    with pytest.raises(rs.InputError, match="cannot be read as STL: it is damaged|has no faces, or is damaged"):
+    with pytest.raises(rs.InputError, match=r"cannot be read as STL: it is damaged|has no faces, or is damaged"):
         rs.surface_from(tmp_path / "noise.stl", unit=1.0)
 
 
