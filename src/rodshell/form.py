@@ -30,8 +30,7 @@ from rodshell.output.takeaway import Takeaway
 from rodshell.output.verdict import Verdict, verdict
 from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
 from rodshell.rods.section import Rod
-from rodshell.targets import Target
-from rodshell.targets.patch import Seam
+from rodshell.targets import Seam, Target
 from rodshell.validation import instance
 
 FOUND = "a form that an earlier rodshell.find_form returned (one read from a folder: run its case.toml again)"

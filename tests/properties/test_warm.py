@@ -94,7 +94,7 @@ def test_a_net_found_near_another_asks_the_target_less_often(monkeypatch):
         monkeypatch.setattr(rs.HeightField, name, lambda self, x, say=answer: asked.append(len(x)) or say(self, x))
     chebyshev_net(BUMPS, layout)
     cold, asked[:] = len(asked), []
-    chebyshev_net(BUMPS, layout, near=last)
+    chebyshev_net(BUMPS, layout, warm_start=last)
     assert len(asked) < 0.1 * cold  # 16 against 467
 
 
