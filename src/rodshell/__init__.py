@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         StabilityError,
     )
     from rodshell.fabrication import Fabrication
-    from rodshell.form import Form, PoppedUp, Sewn, find_form, pop_up_table, sew
+    from rodshell.form import Form
     from rodshell.formfinding import (
         Agreement,
         Bound,
@@ -48,8 +48,9 @@ if TYPE_CHECKING:
         pop_up,
         trim,
     )
+    from rodshell.formfinding.patches import PatchLayout
     from rodshell.formfinding.rising import Rise, Risen, pop_up_in_time
-    from rodshell.formfinding.sewn import PatchLayout
+    from rodshell.job import Job, find_form, pop_up_table
     from rodshell.joints import (
         Ball,
         ExplicitPenalty,
@@ -94,13 +95,14 @@ _HOMES = {
         "StabilityError",
     ),
     "rodshell.fabrication": ("Fabrication",),
-    "rodshell.form": ("Form", "PoppedUp", "Sewn", "find_form", "pop_up_table", "sew"),
+    "rodshell.form": ("Form",),
+    "rodshell.job": ("Job", "find_form", "pop_up_table"),
     "rodshell.formfinding": (
         "Agreement", "Bound", "Boundary", "DrapeFigures", "Draped", "Fall", "Footprint", "Gravity", "Popped", "Trimmed",
         "agreement", "drape", "map_back", "pop_up", "trim",
     ),
     "rodshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
-    "rodshell.formfinding.sewn": ("PatchLayout",),
+    "rodshell.formfinding.patches": ("PatchLayout",),
     "rodshell.joints": (
         "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
     ),
@@ -129,12 +131,12 @@ __all__ = [
     "Disc", "DrapeFigures", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce",
     "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection",
     "Gravity", "GravityForce", "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler",
-    "ImplicitForce", "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError",
+    "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Moment", "Motion", "NetLimitError",
     "OutOfTimeError", "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped",
-    "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn",
+    "Rectangle", "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn",
     "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube",
     "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
-    "pop_up_in_time", "pop_up_table", "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod",
+    "pop_up_in_time", "pop_up_table", "read", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod",
     "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 

@@ -11,14 +11,14 @@ from reprlib import repr as short
 from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.units import shown
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    Floats = Floats
+    from rodshell.arrays import Floats
+
 Choice = TypeVar("Choice", bound=str)
 
 

@@ -14,12 +14,23 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, start="x"), 'start must be a form that an earlier .*, not "x"'),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, start=LAYOUT), "start must be a form .*, not a GridLayout"),
+        (
+            lambda: rs.find_form(TARGET, LAYOUT, ROD, warm_start="x"),
+            'warm_start must be a form that Job.run .*, not "x"',
+        ),
+        (
+            lambda: rs.find_form(TARGET, LAYOUT, ROD, warm_start=LAYOUT),
+            "warm_start must be a form .*, not a GridLayout",
+        ),
         (lambda: rs.find_form(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
         (lambda: rs.find_form(TARGET, ROD, LAYOUT), "layout must be a rodshell GridLayout, not a Rod"),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD.section), "rod must be a rodshell Rod, not a Circle"),
-        (lambda: rs.sew("dome", [[(-1, 0), (1, 0)]], LAYOUT, ROD), 'target must be a rodshell Target, not "dome"'),
+        (
+            lambda: rs.find_form("dome", LAYOUT, ROD, seams=[[(-1, 0), (1, 0)]]),
+            'target must be a rodshell Target, not "dome"',
+        ),
+        (lambda: rs.Job(TARGET, LAYOUT), "a job needs target, layout and rod; for a case"),
+        (lambda: rs.Job("hemisphere", LAYOUT, ROD), 'target must be a rodshell Target, not "hemisphere"'),
         (lambda: rs.drape(TARGET, LAYOUT, ROD), "layout must be a rodshell GridLayout, not a Hemisphere"),
         (lambda: rs.drape(LAYOUT, ROD, 3.0), "target must be a rodshell Target, not 3.0"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, warm_start="x"), 'warm_start must be what .* rodshell.drape .*"x"'),
