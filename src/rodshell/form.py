@@ -204,7 +204,9 @@ class Form:
 
     def finished(self, progress: Progress = silent) -> "Form":
         """This form, its checks and fabrication made now; a progress may end the checks early."""
-        checks = self.known_checks or self._checked(progress)
+        checks = self.known_checks
+        if checks is None or checks.stopped:
+            checks = self._checked(progress)
         known = replace(self, _known_checks=checks)
         return replace(known, _known_fabrication=known.fabrication)
 

@@ -131,7 +131,7 @@ def test_shells_are_stable_and_stay_near(name: str) -> None:
 @every_case
 def test_ends_hardly_move_to_their_points(name: str) -> None:
     """What the mesh of a patch alone misses them by; second order in its edges."""
-    assert max(sewn(name).moved.values()) < 3e-3 * CASES[name][0].size
+    assert max(sewn(name).stages.moved.values()) < 3e-3 * CASES[name][0].size
 
 
 @pytest.mark.parametrize("name", ["dome, aside", "two bumps, in the valley", "vault in three"])

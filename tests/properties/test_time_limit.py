@@ -136,11 +136,11 @@ def test_seams_end_with_the_patches_that_are_finished_or_before_all_have_their_n
         assert form.status.count("(patch ") == 1
         assert form.archive().result["status"] == form.status
         finished = []
-        for name, one in form.found.items():
-            for ends, shell in one.popped.items():
+        for patch, same in zip(form.patches, whole.patches, strict=True):
+            for ends, shell in patch.popped.items():
                 if shell.report.converged:
-                    np.testing.assert_array_equal(shell.positions, whole.found[name].popped[ends].positions)
-                    finished.append(f"{name} {ends}")
+                    np.testing.assert_array_equal(shell.positions, same.popped[ends].positions)
+                    finished.append(f"{patch.name} {ends}")
         kinds.add(tuple(finished))
     nothing = {kind for kind in kinds if isinstance(kind, str)}
     assert nothing == {"seams (laying patch B)"}
