@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
 from rodshell.output import Archive
+from rodshell.output.pictures import picture_svg
 from rodshell.output.result import States, form_result, form_states, table_result, table_states
 from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
 from rodshell.output.takeaway import Takeaway
@@ -259,6 +261,13 @@ class Form:
         parts = f" in {pieces} patches" if pieces > 1 else ""
         found = f"popped up {' and '.join(self.popped)}" if self.popped else "not popped up"
         return f"<rodshell.Form of {name}{parts}: {rods} rods, {found}, {self.status}>"
+
+    def _repr_html_(self) -> str:
+        """The shell in its final shape and what it is worth, as notebooks show it."""
+        archive = self._archive
+        picture = picture_svg(archive, archive.final or "flat")
+        level, reasons = self.verdict.level, "".join(f"<li>{escape(reason)}</li>" for reason in self.verdict.reasons)
+        return f"<div>{picture}<p>{escape(repr(self))}: <b>{level}</b></p><ul>{reasons}</ul></div>"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Form):
