@@ -36,6 +36,7 @@ from rodshell.units import length_text, shown
 from rodshell.validation import choice, choices_of, instance, point
 
 Auto = Literal["auto"]
+AskedEnds = Literal["pinned", "clamped", "both"]
 
 FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
 OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
@@ -57,7 +58,7 @@ class Job:
     rotate : heading in place of the layout's [rad]; "auto": the best found.
     objective : what an "auto" anchor or heading makes smallest, see `search`.
     joint : what the rods do to each other where they cross, see `pop_up`; default: ball joints.
-    ends : end conditions of the pop-up: "pinned", "clamped", both in a tuple, or none.
+    ends : end conditions of the pop-up: "pinned", "clamped", or "both"; also in a tuple, which may be empty.
     seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches; each
         goes on straight past its ends, unless it is closed. Rods and length of the layout are then "auto", its heading
         is that at the target's summit, and "auto" is the one that leaves out the fewest rods.
@@ -84,7 +85,7 @@ class Job:
         rotate: float | Auto | None = None,
         objective: Objective = "shear",
         joint: Joint | None = None,
-        ends: Ends | Sequence[Ends] = ENDS,
+        ends: AskedEnds | Sequence[AskedEnds] = "both",
         seams: Iterable[ArrayLike] = (),
         patches: Mapping[str, PatchLayout] | None = None,
         options: Takeaway | None = None,
@@ -104,7 +105,7 @@ class Job:
         case = case_of(
             target, layout, rod,
             joint=joint or Ball(), method=method, anchor=anchor, rotate=rotate,
-            objective=choice("objective", objective, get_args(Objective)), ends=choices_of("ends", ends, ENDS),
+            objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
             seams=seams, patches=patches or {}, options=options or Takeaway(),
         )  # fmt: skip
         self._set(case, target)
@@ -277,6 +278,12 @@ class Job:
         object.__setattr__(self, "_target", target)
 
 
+def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
+    """The end conditions asked for, in their order."""
+    words = choices_of("ends", given, ("pinned", "clamped", "both"))
+    return ENDS if "both" in words else tuple(end for word in words for end in ENDS if end == word)
+
+
 def _ends_and_case(
     source: "str | PathLike[str] | RodEnds", unit: str | None, overrides: dict[str, object]
 ) -> tuple[RodEnds, Case]:
@@ -305,7 +312,7 @@ def find_form(
     method: Method = Bound(),
     anchor: tuple[float, float] | Auto | None = None,
     joint: Joint | None = None,
-    ends: Ends | Sequence[Ends] = ENDS,
+    ends: AskedEnds | Sequence[AskedEnds] = "both",
     seams: Iterable[ArrayLike] = (),
     patches: Mapping[str, PatchLayout] | None = None,
     warm_start: Form | None = None,

@@ -2,12 +2,15 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
 import click
 
-from rodshell.case import CaseKey, case_keys
+from rodshell.case import CaseKey, case_keys, load_case
+from rodshell.case.keys import BY_KIND
 from rodshell.errors import InputError
 
 ALIASES = {
@@ -52,7 +55,14 @@ class CaseCommand(click.Command):
         for name, value in pairwise(args):
             if name in options and not options[name].is_flag and value in options:
                 raise click.UsageError(f"{name} needs a value, but {value} follows", ctx)
-        return super().parse_args(ctx, args)
+        given = tuple(args)  # which click consumes
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            known = [name for name, option in options.items() if _exists(option, given)]
+            near = get_close_matches(error.option_name.lstrip("-"), [name.lstrip("-") for name in known], n=1)
+            proposed = [name for name in known if name.lstrip("-") in near]
+            raise click.NoSuchOption(error.option_name, possibilities=proposed, ctx=ctx) from None
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         sections = dict[str, list[tuple[str, str]]]()
@@ -63,6 +73,26 @@ class CaseCommand(click.Command):
         for title, records in sections.items():
             with formatter.section(title):
                 formatter.write_dl(records, col_max=40)
+
+
+def _exists(option: click.Option, arguments: tuple[str, ...]) -> bool:
+    """Whether the case that a command line names has the key of an option, so that it may be proposed."""
+    if not isinstance(option, CaseOption) or not option.key.kinds:
+        return True
+    kinds = _kinds_of(arguments)
+    return kinds is None or kinds[option.key.table] in option.key.kinds
+
+
+@cache
+def _kinds_of(arguments: tuple[str, ...]) -> dict[str, str] | None:
+    """The kinds of the tables that have several, in the case that a command line names; None where there is none."""
+    given = dict(pairwise(arguments))
+    overrides = {f"{table}.kind": kind for table in BY_KIND if (kind := given.get(f"--{table}.kind"))}
+    try:
+        case = load_case(arguments[0], overrides)
+    except InputError:
+        return None
+    return {"target": case.target.kind, "rod.section": case.rod.section.kind, "joint": case.joint.kind}
 
 
 def case_options(*tables: str) -> list[click.Parameter]:
