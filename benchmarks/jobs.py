@@ -17,7 +17,7 @@ from rodshell.solve.newton_step import NewtonStep
 RADIUS = 0.2
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 DOME = rs.Hemisphere(radius=RADIUS)
-bound = importlib.import_module("rodshell.formfinding.bound")
+bound = importlib.import_module("rodshell.formfinding.bound_drape")
 
 
 def auto(spacing: float = 0.03, edge: float = 0.005) -> rs.GridLayout:

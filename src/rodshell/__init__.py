@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         Fall,
         Footprint,
         Gravity,
-        Popped,
+        PopUp,
         Trimmed,
         agreement,
         drape,
@@ -47,9 +47,9 @@ if TYPE_CHECKING:
         pop_up,
         trim,
     )
+    from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
     from rodshell.formfinding.patches import PatchLayout
     from rodshell.formfinding.progress import bar
-    from rodshell.formfinding.rising import Rise, Risen, pop_up_in_time
     from rodshell.formfinding.search import search
     from rodshell.job import Job, find_form, pop_up_table
     from rodshell.joints import (
@@ -73,8 +73,8 @@ if TYPE_CHECKING:
     from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.rod_statics import RodShape, solve_rod
-    from rodshell.solve.simulate import simulate
-    from rodshell.solve.time_series import Moment, TimeSeries
+    from rodshell.solve.rod_supports import RodLoads, RodSupports
+    from rodshell.solve.simulate import Sample, TimeSeries, simulate
     from rodshell.targets import (
         Cap,
         Disc,
@@ -91,38 +91,36 @@ if TYPE_CHECKING:
     )
 
 _HOMES = {
+    "rodshell.checks": ("check",),
     "rodshell.errors": (
-        "ConvergenceError", "RodshellError", "InputError", "NetLimitError", "OutOfTimeError", "OutputError",
+        "ConvergenceError", "InputError", "NetLimitError", "OutOfTimeError", "OutputError", "RodshellError",
         "StabilityError",
     ),
-    "rodshell.checks": ("check",),
     "rodshell.fabrication": ("Fabrication", "fabricate"),
     "rodshell.form": ("Form",),
-    "rodshell.job": ("Job", "find_form", "pop_up_table"),
     "rodshell.formfinding": (
-        "Agreement", "Bound", "Boundary", "Draped", "Fall", "Footprint", "Gravity", "Popped", "Trimmed",
-        "agreement", "drape", "map_back", "pop_up", "trim",
+        "Agreement", "Bound", "Boundary", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed", "agreement",
+        "drape", "map_back", "pop_up", "trim",
     ),
-    "rodshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
+    "rodshell.formfinding.dynamic_pop_up": ("DynamicPopUp", "DynamicPopUpSettings", "dynamic_pop_up"),
     "rodshell.formfinding.patches": ("PatchLayout",),
     "rodshell.formfinding.progress": ("bar",),
     "rodshell.formfinding.search": ("search",),
-    "rodshell.joints": (
-        "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
-    ),
+    "rodshell.job": ("Job", "find_form", "pop_up_table"),
+    "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
-    "rodshell.rods.materials": ("Material",),
-    "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.output.archive": ("Archive", "export", "read"),
     "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
-    "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
+    "rodshell.rods.materials": ("Material",),
+    "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
-    "rodshell.solve.simulate": ("simulate",),
-    "rodshell.solve.time_series": ("Moment", "TimeSeries"),
+    "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
+    "rodshell.solve.rod_supports": ("RodLoads", "RodSupports"),
+    "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
@@ -132,16 +130,16 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
-    "Disc", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
-    "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity",
-    "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
-    "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutOfTimeError",
-    "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "Rectangle",
-    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodshellError", "SharedDofs", "Shell", "Spring",
-    "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "bar", "chebyshev_net",
-    "check", "drape", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
-    "pop_up_in_time", "pop_up_table", "read", "search", "simulate", "solve_rod", "straight_rods", "surface_from",
-    "trim",
+    "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse", "Ellipsoid",
+    "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform",
+    "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
+    "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Motion", "NetLimitError",
+    "OutOfTimeError", "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "PopUp",
+    "Rectangle", "RectangularSection", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample",
+    "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube",
+    "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export", "fabricate", "find_form",
+    "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "search", "simulate", "solve_rod",
+    "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

@@ -14,10 +14,10 @@ from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.checks import Checks, check
 from rodshell.checks.contact import contact_of_patches
-from rodshell.checks.joined import joined_checks
+from rodshell.checks.merge import merged_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabricated, fabricate
-from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, Popped, Trimmed
+from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
 from rodshell.formfinding.patches import MergedPopUp, PatchedForm
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
@@ -34,7 +34,7 @@ from rodshell.output.verdict import Verdict, verdict
 from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Seam
 
 Stages = PatchForm | PatchedForm
 
@@ -142,7 +142,7 @@ class Form:
         return self.stages.boundary
 
     @property
-    def popped(self) -> Mapping[Ends, Popped | MergedPopUp]:
+    def popped(self) -> Mapping[Ends, PopUp | MergedPopUp]:
         """The popped-up shell with each kind of ends; of several patches that of all together."""
         return self.stages.popped
 
@@ -304,7 +304,7 @@ class Form:
             shells = [patch.popped[ends] for patch in found.values()]
             states = [(shell.shell, shell.state) for shell in shells]
             met[ends] = contact_of_patches(self.footprint.mesh, states, self.rod)
-        return joined_checks(each, met)
+        return merged_checks(each, met)
 
     @cached_property
     def _archive(self) -> Archive:

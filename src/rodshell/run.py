@@ -19,7 +19,7 @@ from rodshell.output.result import rod_table
 from rodshell.output.summary import chosen, rod_text
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Seam
 from rodshell.units import length_text
 
 Announce = Callable[[str], None]

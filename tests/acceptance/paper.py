@@ -15,9 +15,9 @@ import numpy as np
 import rodshell as rs
 from rodshell.errors import StabilityError
 from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.dynamic_pop_up import DynamicPopUpSettings, dynamic_pop_up
 from rodshell.formfinding.methods import Fall
 from rodshell.formfinding.progress import silent
-from rodshell.formfinding.rising import Rise, pop_up_in_time
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.nets import sphere_net_end
 from rodshell.paper import fig8, genetic
@@ -186,7 +186,8 @@ def pop_up_rows() -> Iterator[Row]:
     form = rs.find_form(TARGETS["hemisphere"], coarse, ROD, ends=("pinned",))
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     for coupling in couplings:
-        risen = pop_up_in_time(form.footprint, form.trimmed.boundary, ROD, rise=Rise(coupling=coupling))
+        settings = DynamicPopUpSettings(coupling=coupling)
+        risen = dynamic_pop_up(form.footprint, form.trimmed.boundary, ROD, settings=settings)
         off = float(np.linalg.norm(risen.positions - form.popped["pinned"].positions, axis=1).max()) / 0.2
         gap = risen.rest.joint_gap / 0.2
         note = f"at rest: {risen.rest.at_rest}, after {risen.rest.time:.1f} s; joint gap {gap:.1e} R"

@@ -20,6 +20,7 @@ from rodshell.output.archive import export
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.files import KINDS
+from rodshell.output.fonts import CAPITAL
 from rodshell.output.plan import flat_plan
 from rodshell.output.rounding import rounding_of
 from rodshell.output.takeaway import DrawingStyle, Takeaway
@@ -31,7 +32,6 @@ from hostile import hostile_archive
 from live_cells import live_cells
 
 FOUND = (0, 4)  # exit codes of a form that converged
-CAPITAL = 0.718  # height of Helvetica's capitals over its size [Adobe's font metrics]
 LABELS = (
     "Project", "Drawn by", "Date", "Revision", "Section", "Material", "Joints", "Rods", "Units", "Tolerance", "Input",
     "Made by",

@@ -88,14 +88,14 @@ def contact_rows() -> Iterator[Row]:
     yield Row("2 mm rods on the hemisphere", "contacts in all shapes and stages", float(wrong), 0)
 
 
-def _sharpest(popped: rs.Popped) -> float:
+def _sharpest(popped: rs.PopUp) -> float:
     """Largest curvature [1/m] by the circles through three nodes in a row."""
     a, b, c = (popped.positions[popped.footprint.mesh.bends[:, k]] for k in range(3))
     sides = [np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))]
     return float((2 * np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.prod(sides, axis=0)).max())
 
 
-def _nearest_parallel(popped: rs.Popped) -> float:
+def _nearest_parallel(popped: rs.PopUp) -> float:
     """Distance of the axes of the two nearest rods of one family [m], by a search over all pairs near the rim."""
     mesh, x = popped.footprint.mesh, popped.positions
     rods = mesh.grid.rods

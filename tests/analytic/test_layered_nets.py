@@ -28,6 +28,7 @@ def layers_of(net, eccentricity):
     return [points + height(family, eccentricity) * normals for family in "uv"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("eccentricity", [2e-3, 4e-3])
 def test_rod_lengths_on_the_sphere_are_those_of_the_nets_of_two_spheres(eccentricity):
     """A rod at offset c of the other layer lies on the sphere R + h at the angle c/(R - h) from the axis."""

@@ -1,7 +1,7 @@
 """Rod ends of the net against the similarity equation on the sphere and a slow twin (`goursat`) elsewhere.
 
-All lengths in metres. The promise is 0.02 mm (numerics.md, section 1, says 0.002 mm); each tolerance here is
-about three times what was measured, so that a loss of order shows.
+All lengths in metres. The promise is 0.02 mm; each tolerance here is about three times what was measured, so
+that a loss of order shows.
 """
 
 import re
@@ -170,7 +170,7 @@ def test_sphere_end_that_does_not_exist_is_refused(offset, base, sentence):
         sphere_net_end(R, offset, base)
 
 
-# Rod ends: tables of numerics.md, section 1
+# Rod ends: the table of docs/theory.md, The inextensible net
 
 TABLES = {
     "hemisphere": (HEMISPHERE, 0.03 * np.arange(11), [
@@ -253,6 +253,7 @@ def sphere_error(net: ChebyshevNet, furthest: float = np.inf) -> float:
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ON_SPHERES)
 def test_rod_ends_are_those_of_the_similarity_equation(name):
     error = sphere_error(net_on_sphere(name))
@@ -279,6 +280,7 @@ def test_rods_lie_at_the_offsets_of_the_layout(name):
         assert 0.0 in [*virtual, *(rod.offset for rod in built)]  # the axis is there, built or not
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ON_SPHERES)
 def test_error_estimate_on_spheres_is_the_error_before_extrapolation(name):
     """Of the finer march alone, to 3 %; what is left after extrapolation is a hundredth of it."""
@@ -358,6 +360,7 @@ TWINS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TWINS)
 def test_rod_ends_are_those_of_the_twin(name):
     case = TWINS[name]

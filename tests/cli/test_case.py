@@ -230,7 +230,7 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nturn = [0, 0, 30]', "third value: a plain number is in radians"),
         (
             'layout.spacing = "700,5 mm"',
-            'a decimal takes a point, not a comma: give each its own, such as "700 mm, 5 mm"',
+            'a decimal takes a point, not a comma: give each its unit, such as "700 mm, 5 mm"',
         ),
         ('layout.offset = "10 mm, 20"', "only some of these have a unit"),
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nmove = "1,0,2 m"', "only some of these have a unit"),

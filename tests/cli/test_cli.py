@@ -198,7 +198,7 @@ def test_any_words_reach_their_key(key: str, finder: FakeFinder) -> None:
         (["--drape.anchor", "--out", "C/y"], "--drape.anchor needs a value, but --out follows"),
         (["-o", "--quiet"], "-o needs a value, but --quiet follows"),
         (["--rotate", "30"], 'write "30 deg"'),
-        (["--target.kind", "mesh", "--target.file", "no.obj"], 'no file named "no.obj": give the path of one that is'),
+        (["--target.kind", "mesh", "--target.file", "no.obj"], 'there is no file named "no.obj": check the path'),
         (["twice"], "unexpected extra argument"),
         (["--target.kind", "mesh"], "target.file is missing"),
     ],
@@ -695,6 +695,7 @@ sys.exit(main(["form", "hemisphere"]))
 """
 
 
+@pytest.mark.slow
 def test_on_a_terminal_the_live_line_names_stage_and_residual_and_ctrl_c_ends_it() -> None:
     pty = pytest.importorskip("pty", reason="no terminals: run on Linux or macOS")
     ours, theirs = pty.openpty()

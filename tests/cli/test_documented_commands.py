@@ -10,6 +10,8 @@ import pytest
 from rodshell.case.rod_ends import COLUMNS
 from rodshell.cli import main, warmup
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 QUICK = {"form": ["--only", "csv", "--checks.stages", "0", "--pop_up.ends", "clamped"]}
 """What is added to a command so that it does no more than it must."""

@@ -60,6 +60,7 @@ def test_no_two_leaders_of_the_flat_plan_cross_nor_run_through_a_name(name: str)
         assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() < 8 * plan.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["oval", "roof", "opening", "sewn"])
 def test_ids_of_joints_can_be_read_on_the_sheet(name: str) -> None:
     """Capitals of 1.8 mm or more, each nearer to its own joint than to any other, and of most joints at 1:1."""
@@ -99,6 +100,7 @@ def test_the_edge_of_a_sewn_shell_has_no_notches_at_its_seam() -> None:
         assert np.linalg.norm(seam[:, None] - meetings, axis=2).min(axis=1).max() < 1.0
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.integers(4, 24), st.floats(0.24, 1.28), st.floats(1.0, 2.5), st.integers(3, 7), st.integers(0, 99))
 def test_names_around_any_opening_are_clear_and_near(

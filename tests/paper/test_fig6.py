@@ -32,11 +32,13 @@ def by(method: str) -> Drape:
     return next(one for one in figure().drapes if one.method == method)
 
 
+@pytest.mark.slow
 def test_the_net_that_g0_is_held_against_is_the_spheres_exact_one() -> None:
     for rod, net in zip(by("paper").trimmed.mesh.grid.rods, by("paper").net, strict=True):
         np.testing.assert_allclose(np.abs(net), sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
 
 
+@pytest.mark.slow
 def test_of_the_bound_drape_its_own_ends_are_shown_which_tend_to_the_nets_as_the_spacing() -> None:
     """It starts from the net; where its own lines cross the target's end is found again from its positions."""
     fine = drape_all([replace(CASE, rods=(13, 13), spacing=0.03, edge=0.015)], lambda *told: None, methods=["bound"])
@@ -78,6 +80,7 @@ def test_the_files_hold_tables_and_one_picture_a_method(tmp_path: Path) -> None:
         assert len(lines) >= 4 * (rods - 2)  # four panels; lines that miss the target are dropped when trimmed
 
 
+@pytest.mark.slow
 def test_a_fall_that_does_not_rest_is_the_status_of_the_figure() -> None:
     moving = DrapeFigure("fig6", "a title", drape_all([CASE], lambda *told: None, fall=Fall(duration=0.8)))
     assert moving.status.startswith("(a) by method paper was not at rest")

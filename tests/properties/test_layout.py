@@ -100,6 +100,7 @@ def test_rods_are_refused_for_the_reasons_of_exact_arithmetic(rods):
         straight_rods(ends_of(rods))
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(joined_rods())
 def test_rods_through_one_point_share_one_node(rods):

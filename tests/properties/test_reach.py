@@ -8,11 +8,11 @@ from scipy.ndimage import label
 
 import rodshell as rs
 from rodshell.geometry.curves import resampled
-from rodshell.nets import lines, march
+from rodshell.nets import march, net_extent
 from rodshell.nets.apron import RINGS
 from rodshell.nets.compass import fill_quadrants
 from rodshell.nets.cuts import inside_nodes
-from rodshell.nets.reach import Covering, march_covering, wanted_nodes
+from rodshell.nets.net_extent import Covering, march_covering, wanted_nodes
 from tests.targets.test_nets_on_files import TARGETS as FILES
 
 SIZE = 0.2
@@ -98,7 +98,7 @@ def test_a_net_leaves_the_corners_alone_and_asks_the_target_seldom(monkeypatch):
     assert most < 0.7 * net.net.points[:, :, 0].size
     assert next_to_most < 0.3 * most  # the coarser march: the finer one, foreseen from two, settles in one round
     assert len(asked) + len(marched) < 130
-    assert max(marched) <= 4 * lines.STRIDES
+    assert max(marched) <= 4 * net_extent.STRIDES
 
 
 def test_a_rougher_net_that_tells_too_little_does_no_harm():

@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 import rodshell as rs
-from rodshell.checks import self_weight, settled_shell
+from rodshell.checks import self_weight
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
-from rodshell.formfinding.matching import LEAVE_OUT, choose_families
+from rodshell.formfinding.end_matching import LEAVE_OUT, choose_families
 from rodshell.formfinding.seams import End, in_a_row
 from rodshell.formfinding.target_patches import carried_heading, patches_of
+from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.side_by_side import side_by_side
 from rodshell.output import read
-from rodshell.targets.curvefile import closed_loops, joined
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Seam
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +74,7 @@ def off_seams(form: rs.Form, x: Floats) -> Floats:
     return np.asarray(cKDTree(np.vstack(dense)).query(x[:, :2])[0])
 
 
+@pytest.mark.slow
 @every_case
 def test_both_patches_end_at_the_same_points(name: str) -> None:
     form = sewn(name)
@@ -86,6 +87,7 @@ def test_both_patches_end_at_the_same_points(name: str) -> None:
         np.testing.assert_array_equal(place_of(form, first), meeting.point)
 
 
+@pytest.mark.slow
 @every_case
 def test_these_points_lie_on_target_and_seam(name: str) -> None:
     form = sewn(name)
@@ -178,6 +180,7 @@ def test_patches_of_a_mirrored_target_mirror_each_other(name: str) -> None:
     np.testing.assert_allclose(lengths[0], lengths[1], atol=1e-3 * form.target.size)
 
 
+@pytest.mark.slow
 def test_seams_carry_what_the_patches_do_not() -> None:
     """Forces on the seam and at the edge balance; each is the sum of both rods'."""
     form = sewn("two bumps, in the valley")
@@ -194,11 +197,13 @@ def test_seams_carry_what_the_patches_do_not() -> None:
     assert seam["forces"]["clamped"]["largest"] > 0.01 * held["largest_force"]
 
 
+@pytest.mark.slow
 def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> None:
     form = sewn("two bumps, in the valley")
     archive = form.archive()
     for ends, weighed in archive.result["self_weight"].items():
-        own = [self_weight(*settled_shell(one.popped[ends])) for one in form.stages.found.values()]
+        popped = [patch.popped[ends] for patch in form.patches]
+        own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
         assert weighed["load_factor"] == min(one.load_factor for one in own)
     assert archive.summary().count("(weakest patch, its seam held)") == 2
 
@@ -216,6 +221,7 @@ def test_a_valley_with_a_seam_holds_the_grid_down() -> None:
     assert sewn("two bumps, in the valley").agreement["clamped"].rms < 0.3 * whole.agreement["clamped"].rms
 
 
+@pytest.mark.slow
 def test_the_search_leaves_out_no_more_rods_than_the_default_heading() -> None:
     target, seams, spacing = CASES["dome, aside"]
     layout = layout_of(1.2 * spacing)
@@ -244,6 +250,7 @@ def test_the_strong_bending_of_patches_is_that_of_the_worst() -> None:
     assert result["drape"]["strong_bending"] == bent[0]
 
 
+@pytest.mark.slow
 def test_running_a_result_again_gives_the_same(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "seams.obj").write_text("v -300 -300 0\nv 0 -10 0\nv 300 300 0\nl 1 2\nl 2 3\n")
@@ -266,6 +273,7 @@ def test_running_a_result_again_gives_the_same(tmp_path, monkeypatch) -> None:
     )
 
 
+@pytest.mark.slow
 def test_an_archive_of_patches_gives_itself_again(tmp_path, capsys) -> None:
     form = rs.find_form(DOME, layout_of(0.06), ROD, seams=[DIAGONAL])
     form.save(tmp_path / "dome")
@@ -416,7 +424,7 @@ def test_grids_side_by_side_are_the_same_grids() -> None:
 def test_strokes_are_joined_at_both_ends() -> None:
     x = np.column_stack([np.arange(7.0), np.zeros((7, 2))])
     middle_last = [x[[2, 1, 0]], x[4:7], x[2:5]]
-    (line,) = joined(middle_last)
+    (line,) = join_end_to_end(middle_last)
     assert len(line) == 7
     assert abs(line[0, 0] - line[-1, 0]) == 6.0
     assert closed_loops(middle_last) == []
@@ -446,6 +454,7 @@ def test_figures_of_all_patches_are_joined() -> None:
         assert report.dofs == sum(found.popped[ends].report.dofs for found in form.stages.found.values())
 
 
+@pytest.mark.slow
 def test_the_way_up_of_all_patches_ends_where_they_stand() -> None:
     form = sewn("dome in quarters")
     archive = form.archive()

@@ -74,6 +74,7 @@ def test_out_of_time_at_any_call_the_finished_stages_are_those_of_the_whole_job(
     assert kinds == {"nothing", (), ("pinned",), ("pinned", "clamped")}
 
 
+@pytest.mark.slow
 def test_checks_that_were_not_reached_are_named_and_the_result_is_not_called_converged(clock):
     form, seconds, kinds = whole_form(), 0, set()
     while True:
@@ -121,6 +122,7 @@ def sewn_form(**options):
     return rs.find_form(HEMISPHERE, layout, ROD, seams=[[(-1, 0), (1, 0)]], **options)
 
 
+@pytest.mark.slow
 def test_seams_end_with_the_patches_that_are_finished_or_before_all_have_their_nets(clock):
     whole, seconds, kinds = whole_sewn(), -1.5, set()
     while True:
@@ -147,6 +149,7 @@ def test_seams_end_with_the_patches_that_are_finished_or_before_all_have_their_n
     assert kinds - nothing >= {(), ("A pinned", "A clamped"), ("A pinned", "A clamped", "B pinned")}
 
 
+@pytest.mark.slow
 def test_checks_that_any_patch_did_not_reach_are_named_and_left_out_of_the_joined_result(clock):
     form, seconds, kinds = whole_sewn(), -2.5, set()
     while True:

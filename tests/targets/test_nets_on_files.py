@@ -24,6 +24,7 @@ TARGETS: dict[str, rs.Target] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 @pytest.mark.parametrize("lines", [9, 40])
 def test_squares_of_nodes_are_inside_where_each_of_them_is(name, lines):
@@ -51,6 +52,7 @@ def test_a_net_across_an_opening_keeps_the_symmetry_of_the_target():
         assert np.sort(own) == pytest.approx(np.sort(ends[family, round(-offset, 9)]), abs=4e-4 * 5)
 
 
+@pytest.mark.slow
 def test_rod_ends_that_two_marches_place_differently_are_warned_of():
     """A peak much sharper than the spacing; the sentence names the place and what helps, and comes true."""
     sharp = Freeform.of(*sheet(lambda x, y: 5 * np.exp(-(x**2 + y**2) / 1.62), 6.0, 121))

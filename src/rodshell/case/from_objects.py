@@ -30,7 +30,7 @@ from rodshell.layout import GridLayout
 from rodshell.output.takeaway import Takeaway
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Seam
 
 Auto = Literal["auto"]
 Point = tuple[float, float]

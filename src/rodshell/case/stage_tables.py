@@ -163,7 +163,7 @@ class SeamsTable(Table):
         """The lines of the file become lines of the case, which then needs the file no longer."""
         if given.get("file") is None:
             return given
-        from rodshell.targets.curvefile import read_lines
+        from rodshell.targets.mesh_files import read_lines
 
         rest = {key: value for key, value in given.items() if key not in ("file", "unit")}
         try:

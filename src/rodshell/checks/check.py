@@ -8,24 +8,19 @@ from math import inf
 import numpy as np
 
 from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
-from rodshell.checks.clamping import reached_by_turning
 from rodshell.checks.contact import Contact, contact, contact_of
-from rodshell.checks.deployment import Deployment, deploy
-from rodshell.checks.joint_loads import JointLoads, joint_loads
+from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
-from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
+from rodshell.checks.support_and_joint_loads import JointLoads, Reactions, joint_loads, reactions
 from rodshell.errors import OutOfTimeError
-from rodshell.formfinding import Popped
-from rodshell.formfinding.popup import UP, Ends
+from rodshell.formfinding import PopUp
+from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.model import Shell
-from rodshell.rods.fibres import VON_MISES
+from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
-from rodshell.solve.constraint import Supports
+from rodshell.rods.section_stress import VON_MISES
 from rodshell.solve.critical import MOST_FACTORIZATIONS
-from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
-from rodshell.solve.problem import Problem
 from rodshell.units import length_text, stress_text
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
@@ -156,7 +151,7 @@ class Checks:
 
 
 def check(
-    popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, shear_weight: float = VON_MISES,
+    popped: Mapping[Ends, PopUp], rod: Rod, *, stages: int = 8, shear_weight: float = VON_MISES,
     progress: Progress = silent,
 ) -> Checks:  # fmt: skip
     """Check every shell that converged.
@@ -164,66 +159,69 @@ def check(
     Parameters
     ----------
     stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.fibres`.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.section_stress`.
     """
-    done = {ends: shell for ends, shell in popped.items() if shell.report.converged}
-    settled = {ends: settled_shell(shell) for ends, shell in done.items()}
-    bent = {
-        ends: bending_of(shell, found.state, rod, shear_weight=shear_weight) for ends, (shell, found) in settled.items()
-    }
-    met = {ends: contact_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
-    held = {ends: reactions(*pair) for ends, pair in settled.items()}
-    carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
+    done = {ends: shape for ends, shape in popped.items() if shape.report.converged}
+    bent = {ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()}
+    met = {ends: contact_of(shape.shell, shape.state, rod) for ends, shape in done.items()}
+    held = {ends: reactions(shape.shell, shape.equilibrium) for ends, shape in done.items()}
+    joints = {ends: joint_loads(shape.shell, shape.state) for ends, shape in done.items()}
     weighed = dict[Ends, SelfWeight]()
     follow = "pinned" in done and stages > 0
     deployment, turned, others, stopped = None, None, dict[Ends, OtherShapes](), ""
-    missing = [f"self-weight with {ends} ends" for ends in settled]
+    missing = [f"self-weight with {ends} ends" for ends in done]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:
-        for ends, pair in settled.items():
-            weighed[ends] = self_weight(*pair, progress=_weighing(ends, progress))
+        for ends, shape in done.items():
+            weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
             missing.pop(0)
         if follow:
-            deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
+            deployment = _deployed(done["pinned"], stages, progress)
             missing[0] = "whether the clamped shell is reached from flat"
             if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
                 turned = reached_by_turning(done["pinned"], done["clamped"])
             missing.pop(0)
-        done_before = sum(one.factorizations for one in weighed.values())
-        for ends, one in _other_shapes(popped, settled, deployment, done_before, progress):
-            others[ends] = one
+        done_before = sum(weight.factorizations for weight in weighed.values())
+        for ends, search in _other_shapes(popped, deployment, done_before, progress):
+            others[ends] = search
         missing.pop(0)
     except OutOfTimeError as error:
         stopped = str(error)
     late = stopped, tuple(missing)
     if deployment is None:
-        return Checks(bent, held, carried, None, (), weighed, met, (), others, None, *late)
+        return Checks(bent, held, joints, None, (), weighed, met, (), others, None, *late)
     mesh, laid = done["pinned"].footprint.mesh, deployment.positions[0]
     flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
     on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
     met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
     met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, *late)
+    return Checks(bent, held, joints, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, *late)
 
 
 def _other_shapes(
-    popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None,
-    weighing: int, progress: Progress,
-) -> Iterator[tuple[Ends, OtherShapes]]:  # fmt: skip
+    popped: Mapping[Ends, PopUp], deployment: Deployment | None, weighing: int, progress: Progress
+) -> Iterator[tuple[Ends, OtherShapes]]:
     """Other stable shapes, with half of the factorisations that the shells, their deployment and their `weighing` took.
 
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
-    done = weighing + sum(one.report.factorizations for one in popped.values())
+    done = weighing + sum(shape.report.factorizations for shape in popped.values())
     left = (done + (0 if deployment is None else deployment.factorizations)) // 2
-    stable = [ends for ends, (_, at) in settled.items() if at.report.stable]
-    for ends in stable:
-        most = 2 * left // 3 if ends == stable[0] else left
+    stable = {ends: shape for ends, shape in popped.items() if shape.report.stable}
+    for number, (ends, shape) in enumerate(stable.items()):
+        most = 2 * left // 3 if number == 0 else left
         left -= most
-        own = deployment if ends == "pinned" else None
-        told = partial(_starting, ends, progress)
-        yield ends, other_shapes(*settled[ends], most_factorizations=most, deployment=own, told=told)
+        yield (
+            ends,
+            other_shapes(
+                shape.shell,
+                shape.equilibrium,
+                most_factorizations=most,
+                deployment=deployment if ends == "pinned" else None,
+                progress=partial(_starting, ends, progress),
+            ),
+        )
 
 
 def _starting(ends: Ends, progress: Progress, start: int) -> None:
@@ -231,24 +229,17 @@ def _starting(ends: Ends, progress: Progress, start: int) -> None:
 
 
 def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
-    def told(count: int, factor: float) -> None:
+    def report(count: int, factor: float) -> None:
         done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
         progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
 
-    return told
+    return report
 
 
-def _deployed(last: Popped, found: Equilibrium, stages: int, progress: Progress) -> Deployment:
+def _deployed(last: PopUp, stages: int, progress: Progress) -> Deployment:
     return deploy(
-        last.shell, last.state, last.forces, stages=stages, pattern=found.pattern,
-        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
-    )  # fmt: skip
-
-
-def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:
-    """A popped-up shell and its equilibrium, with what the pop-up does not keep of it: the gradient and the pattern."""
-    shell = popped.shell
-    length = 0.5 * float(np.ptp(popped.positions, axis=0).max())
-    problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), length, places=shell.places)
-    found = find_equilibrium(problem, popped.state, popped.forces)
-    return shell.with_elements(found.elements), found
+        last.shell,
+        last.equilibrium,
+        stages=stages,
+        progress=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+    )

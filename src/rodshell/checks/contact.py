@@ -29,13 +29,13 @@ from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import FlatGrid, GridMesh
 from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell
+from rodshell.model.shell import UP
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
 
 FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
 SHORT = 0.5  # of a section's reach: edges are taken together up to this length, which leaves 0.2 % of it as sag
 SLACK = 0.05  # of the rods' breadth: crossing rods that bend together overlap for longer than straight ones
 ACROSS = 0.1  # cosine to a rod's axis up to which a direction is across it
-UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def contact(
     return Contact(float(gap[worst]), len(np.unique(rods[counted & (gap <= 0)], axis=0)), (a, b), (x, y, z))
 
 
-def joined_contact(parts: Mapping[str, Contact]) -> Contact:
+def worst_contact(parts: Mapping[str, Contact]) -> Contact:
     """Of several shells, by their names, each checked by itself: the worst, with the names of rods among all."""
     known = [(name, one) for name, one in parts.items() if one.clearance is not None]
     if not known:

@@ -16,19 +16,17 @@ from scipy.sparse.linalg import splu
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
 from rodshell.checks.deployment import SAME, Deployment
-from rodshell.formfinding.draped import middle_surface
+from rodshell.formfinding.layers import middle_surface
 from rodshell.geometry.frames import parallel_transport, signed_angle
 from rodshell.geometry.vectors import unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
-from rodshell.solve.modes import softest_modes
-from rodshell.solve.path import potential
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
+from rodshell.solve.problem import half_width
 
 MODES = 4
+MODE_SWEEPS = 4  # enough for directions to search in: the last eigenvalue may be a quarter too high
 KICKS = (0.2, 0.4)  # of the shell's size: how far the node goes that goes farthest
 MIXTURES = 12  # kicks along mixtures of the modes, which are the same at every run
 MOST_A_START = 40  # iterations
@@ -94,16 +92,16 @@ class OtherShapes:
 
 def other_shapes(
     shell: Shell, found: Equilibrium, *, most_factorizations: int, deployment: Deployment | None = None,
-    told: Callable[[int], None] = lambda start: None,
+    progress: Callable[[int], None] = lambda start: None,
 ) -> OtherShapes:  # fmt: skip
     """Look for other stable equilibria of a shell, its supports being held where they are.
 
     Parameters
     ----------
-    found : its stable equilibrium, the shell's source frames being there.
+    found : its stable equilibrium without loads, the shell's source frames being there.
     most_factorizations : the search ends before they are used up; kicks that are small come first.
     deployment : of this shell; the shape that it ended in, if that was another one, is among those found.
-    told : called with the number of each start before it.
+    progress : called with the number of each start before it.
     """
     search = _Search(shell, found, deployment)
     kicks = list[float]()
@@ -112,7 +110,7 @@ def other_shapes(
         most = min(MOST_A_START, (most_factorizations - search.factorizations) // each)
         if most < FEWEST_A_START:
             break
-        told(len(kicks) + 1)
+        progress(len(kicks) + 1)
         search.go(start, kick, most)
         kicks.append(kick)
     return OtherShapes(len(kicks), 0.0 in kicks, max(kicks, default=0.0), tuple(search.shapes), search.factorizations)
@@ -122,12 +120,7 @@ class _Search:
     def __init__(self, shell: Shell, found: Equilibrium, deployment: Deployment | None) -> None:
         self.shell, self.own, self.factorizations = shell, found, 0
         self.positions = shell.positions(found.state)
-        self.length = 0.5 * float(np.ptp(self.positions, axis=0).max())
-        self.problem = Problem(
-            found.elements, shell.stretch, Supports(shell.held_ends()), self.length,
-            places=shell.places, pattern=found.pattern,
-        )  # fmt: skip
-        self.energy = potential(self.problem, found)
+        self.length = half_width(self.positions)
         crossed = (shell.mesh.grid.joint_counts() > 0).all()  # else no normals are known
         self.middle = middle_surface(shell.mesh, shell.mesh, self.positions) if crossed else self.positions
         self.normal, origin, off = _plane(self.middle[shell.mesh.ends.ravel()])
@@ -161,7 +154,7 @@ class _Search:
     def go(self, start: Floats, kick: float, most: int) -> None:
         """Down from a start; keeps a shape that is new. The mirror image has the same axial forces."""
         forces = self.own.forces if kick == 0 else np.zeros_like(self.own.forces)
-        there = find_equilibrium(self.problem, start, forces, descend=True, cut=True, most_iterations=most)
+        there = find_equilibrium(self.own.problem, start, forces, descend=True, limit_steps=True, most_iterations=most)
         self.factorizations += there.report.factorizations
         positions = self.shell.positions(there.state)
         known = (self.positions, *(one.positions for one in self.shapes))
@@ -169,15 +162,15 @@ class _Search:
             mirror = self.image is not None and self._apart(positions, self.image) < MIRRORED
             same = mirror and not self.shell.mesh.layered  # lifted to the other side it goes to its image
             from_flat = True if same and self.reached else None
-            energy = potential(self.problem, there) / self.energy
+            energy = there.energy / self.own.energy
             self.shapes.append(OtherShape(self._apart(positions, self.positions), energy, from_flat, mirror, positions))
 
     def _modes(self) -> list[Floats]:
         """The softest modes, the farthest node going by 1."""
-        own = find_equilibrium(self.problem, self.own.state, self.own.forces)  # for its factors
-        modes = softest_modes(own.pattern.solver, self.shell.held_ends(), self.shell.mass, MODES)
+        mass = self.shell.mass if self.shell.mass.any() else None
+        modes = self.own.tangent.lowest_modes(MODES, mass=mass, tolerance=0.0, most_sweeps=MODE_SWEEPS, guards=2)
         self.factorizations += MODES_COST
-        return [mode / np.linalg.norm(mode[self.shell.stretch.blocks], axis=2).max() for mode in modes]
+        return [mode / np.linalg.norm(mode[self.shell.stretch.blocks], axis=2).max() for mode in modes.shapes]
 
     def _through(self) -> Floats:
         """Each node mirrored in the surface that the supports span, across their plane; the supports stay. So are the

@@ -13,10 +13,8 @@ import numpy as np
 
 from rodshell.formfinding.popup import Ends
 from rodshell.model import Shell
-from rodshell.solve.constraint import Supports
 from rodshell.solve.critical import first_critical
-from rodshell.solve.mixed_newton import Equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import Equilibrium
 
 GRAVITY = 9.81  # [m/s2]
 MOST = 100.0  # times its own weight: what bears more is not loaded further
@@ -60,10 +58,11 @@ def self_weight(
     most: float = MOST,
     progress: Callable[[int, float], None] = lambda count, factor: None,
 ) -> SelfWeight:
-    """Load a shell in equilibrium, `found`, with its own weight until it is no longer stable.
+    """Load a shell with its own weight until it is no longer stable.
 
     Parameters
     ----------
+    found : the equilibrium of the shell without loads, its ends held.
     gravity : [m/s2].
     most : the largest factor that is of interest.
     progress : as of `first_critical`.
@@ -72,10 +71,7 @@ def self_weight(
         return SelfWeight(None, None, "no mass")
     load = np.zeros_like(found.state)
     load[:, 2] = -gravity * shell.mass[:, 2]
-    supports = Supports(shell.held_ends())
-    length = 0.5 * float(np.ptp(shell.positions(found.state), axis=0).max())
-    problem = Problem(shell.elements, shell.stretch, supports, length, places=shell.places, pattern=found.pattern)
-    end = first_critical(problem, found.state, found.forces, load, most=most, progress=progress)
+    end = first_critical(found, load, most=most, progress=progress)
     deflection = None
     if end.state is not None:
         moved = shell.positions(end.state) - shell.positions(found.state)

@@ -45,7 +45,7 @@ command.help = command.help.format(names=", ".join(BUILT_IN))
 
 def _frames(case: "Case") -> list[str]:
     """Patterns of the files that a fall streams."""
-    from rodshell.solve.time_series import NAMES
+    from rodshell.solve.simulate import NAMES
 
     return [f"{escape(case.drape.frames)}/{name}.npy" for name in NAMES] if case.drape.frames else []
 

@@ -139,7 +139,7 @@ def _single_rods() -> None:
     for section, twist in ((round_section, False), (round_section, True), (oval, True)):
         one = rs.Rod(section, rs.Material(youngs_modulus=1e7, density=1e3))
         rod = rs.ElasticRod.of(straight, one, clamped=("start",), twist=twist)
-        rs.solve_rod(rod, forces={-1: (0.0, 0.0, -1e-4)})
+        rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0.0, 0.0, -1e-4)}))
         motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
         rs.simulate(motion, rod.state(), until=4e-3, step=1e-3)
 

@@ -12,13 +12,13 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.agreement import Agreement
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.flatness import flat_warning
-from rodshell.formfinding.matching import Point
+from rodshell.formfinding.end_matching import Point
 from rodshell.formfinding.pipeline import PatchForm, find_stages
 from rodshell.formfinding.popup import ENDS, Ends, Start
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.seams import FEWEST, Laid, Meeting, lay_patches
 from rodshell.formfinding.search import HEADINGS
+from rodshell.formfinding.section_limits import flat_warnings
 from rodshell.formfinding.target_patches import carried_heading, patches_of
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
 from rodshell.joints import Ball, Joint, require_joint
@@ -27,8 +27,7 @@ from rodshell.layout.side_by_side import SideBySide, side_by_side
 from rodshell.rods.section import Rod
 from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target
-from rodshell.targets.patch import Patch
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Patch, Seam
 from rodshell.units import shown
 from rodshell.validation import choices_of
 
@@ -107,7 +106,7 @@ class PatchedForm:
     @property
     def warnings(self) -> tuple[str, ...]:
         whole = set(self.target.warnings)  # said once; and a patch may be flat where the shell is not
-        whole.update(*(flat_warning(form.trimmed.positions, self.rod) for form in self.found.values()))
+        whole.update(*(flat_warnings(form.trimmed.positions, self.rod) for form in self.found.values()))
         words = [f"patch {k}: {word}" for k, form in self.found.items() for word in form.warnings if word not in whole]
         words += [
             f"patch {k}: rod ends were moved by up to {by:.3g} m to where they meet others: its net does not hold them "
@@ -121,7 +120,7 @@ class PatchedForm:
                 f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
                 "seam: another heading may leave out fewer (layout.rotate, or seams.patches for one patch alone)"
             )
-        return (*flat_warning(self.draped, self.rod), *self.target.warnings, *words)
+        return (*flat_warnings(self.draped, self.rod), *self.target.warnings, *words)
 
     def parameters(self) -> dict[str, object]:
         """Seams and what patches have of their own, as they stand in a case file."""

@@ -11,11 +11,10 @@ from rodshell.errors import InputError
 from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.flatness import flat_warning
 from rodshell.formfinding.methods import Bound, Method
-from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
+from rodshell.formfinding.popup import ENDS, Ends, PopUp, pop_up
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.roll import roll
+from rodshell.formfinding.section_limits import flat_warnings, section_rotation
 from rodshell.formfinding.trim import (
     FEWEST_JOINTS,
     NEAREST_JOINT,
@@ -61,7 +60,7 @@ class PatchForm:
     ends: tuple[Ends, ...]
     footprint: Footprint
     boundary: Boundary
-    popped: dict[Ends, Popped]
+    popped: dict[Ends, PopUp]
     agreement: dict[Ends, Agreement]
     dropped: tuple[tuple[str, str], ...]
     lying: Trimmed | None
@@ -103,7 +102,7 @@ class PatchForm:
         """Whether a time limit stopped the drape."""
         return self.lying is not None and self.draped.report.status is Status.OUT_OF_TIME
 
-    def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, Popped]:
+    def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, PopUp]:
         """Those of the pop-ups with these ends that no time limit stopped."""
         there = [end for end in ends if end in self.popped]
         return {end: self.popped[end] for end in there if self.popped[end].report.status is not Status.OUT_OF_TIME}
@@ -129,7 +128,7 @@ class PatchForm:
         if self.lying is None:
             return _rolled(self.popped)
         tails = _long_tails(self.lying) if self.draped.converged else ()
-        flat = flat_warning(self.lying.positions, self.rod)
+        flat = flat_warnings(self.lying.positions, self.rod)
         return (*flat, *self.draped.warnings, *_stretched(self.draped), *tails, *_rolled(self.popped))
 
 
@@ -171,7 +170,7 @@ def find_stages(
             warm_start=warm_start.draped if warm_start else None, progress=progress,
         )  # fmt: skip
         trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
-        footprint, popped, compared = map_back(trimmed), dict[Ends, Popped](), dict[Ends, Agreement]()
+        footprint, popped, compared = map_back(trimmed), dict[Ends, PopUp](), dict[Ends, Agreement]()
     earlier = warm_start.popped if warm_start else {}
     for end in ends if draped.converged else ():
         if end in popped:
@@ -278,10 +277,10 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
     )
 
 
-def _rolled(popped: dict[Ends, Popped]) -> tuple[str, ...]:
+def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
     """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
     for ends, shell in popped.items():
-        angles = roll(shell) if shell.report.converged else None
+        angles = section_rotation(shell.shell, shell.state) if shell.report.converged else None
         if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
             return (
                 f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "

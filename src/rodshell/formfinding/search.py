@@ -157,7 +157,7 @@ def _spread_anchors(target: Target) -> list[Point]:
     for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
         aside = (x + ASIDE * dx * target.size, y + ASIDE * dy * target.size)
         with np.errstate(invalid="ignore"):
-            z = float(target.height(np.array([aside]))[0])
+            z = float(target.height_at(np.array([aside]))[0])
         if np.isfinite(z) and target.margin(np.array([[*aside, z]]))[0] > DEEP * target.size:
             points.append(aside)
     return points

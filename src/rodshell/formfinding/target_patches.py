@@ -10,8 +10,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross
 from rodshell.nets import geodesics
 from rodshell.targets import Target
-from rodshell.targets.patch import Patch
-from rodshell.targets.seam import Seam
+from rodshell.targets.patch import Patch, Seam
 
 RAYS, STEPS = 240, 90  # of the look around a target, from its summit
 FAR = 3.0  # sizes that a ray runs
@@ -120,5 +119,5 @@ def _middle(patch: Patch, points: Floats, areas: Floats) -> tuple[float, float]:
 
 def _from_above(patch: Patch, points: Floats) -> Bools:
     """Whether these points (n, 3) are the ones that an anchor's x, y stands for."""
-    z = patch.height(points[:, :2])
+    z = patch.height_at(points[:, :2])
     return np.asarray(np.abs(z - points[:, 2]) < 1e-6 * patch.size)

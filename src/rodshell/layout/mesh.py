@@ -8,8 +8,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
-from rodshell.layout.flatgrid import FlatGrid, FlatRod, whole_rods
-from rodshell.layout.layers import sides
+from rodshell.layout.flatgrid import FlatGrid, FlatRod, sides, whole_rods
 
 
 @dataclass(frozen=True)

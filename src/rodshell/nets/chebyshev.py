@@ -21,8 +21,7 @@ from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import rod_name
 from rodshell.nets.compass import ON_SURFACE
 from rodshell.nets.cuts import Cut, Lines, cut_lines, extrapolated
-from rodshell.nets.lines import LatticeLines, find_lines, march_lines
-from rodshell.nets.reach import Covering
+from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.targets import Target
 from rodshell.units import length_text
 
@@ -147,7 +146,7 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
         point = target.lift(np.array([[x, y]]))
     except InputError as reason:
         raise InputError(f"the anchor: {reason}, {other}") from None
-    if not target.carries(point)[0]:
+    if not target.covers(point)[0]:
         raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim, {other}")
     n = target.on_surface(point).normal[0]
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])

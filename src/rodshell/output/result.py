@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
 from rodshell.formfinding import Agreement, Draped, Footprint, PatchForm
-from rodshell.formfinding.bound import shape_of_net
-from rodshell.formfinding.flatness import is_flat
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod

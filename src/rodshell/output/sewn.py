@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from rodshell.checks import Checks
-from rodshell.formfinding.bound import shape_of_net
-from rodshell.formfinding.flatness import is_flat
+from rodshell.formfinding.bound_drape import shape_of_net
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
+from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.output.result import (
     States,

@@ -8,7 +8,7 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.solve.tiles import BYTES, LANES, REGISTERS, ROWS, adding, eliminating, multiplying, subtracting
+from rodshell.solve.simd_kernels import BYTES, LANES, REGISTERS, ROWS, adding, eliminating, multiplying, subtracting
 
 PAD = 8  # numbers in the largest register
 BLOCK = 32  # pivots after which all rows below are updated

@@ -15,8 +15,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.rods.elements import NO_HESSIANS, Elements
-from rodshell.solve.linear import SingularError
-from rodshell.solve.problem import Problem, pattern_of
+from rodshell.solve.problem import Problem
+from rodshell.solve.sparse_ldl import Factors, SingularError
 
 TOLERANCE = 1e-13  # of the length: estimate of the error that is left
 FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces
@@ -56,16 +56,18 @@ class HopelessError(Exception):
 class NewtonStep:
     """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
 
-    def __init__(self, problem: Problem, state: Floats, *, cut: bool = False, most_modes: int | None = None) -> None:
-        self._problem, self._cut, self._most_modes = problem, cut, most_modes
+    def __init__(
+        self, problem: Problem, state: Floats, *, limit_steps: bool = False, most_modes: int | None = None
+    ) -> None:
+        self._problem, self._limit_steps, self._most_modes = problem, limit_steps, most_modes
         self.elements = problem.elements
-        free = problem.constraint.freedom(state)
-        everywhere = np.arange(len(state))[:, None]
-        self._blocks = (*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere)
-        self.pattern = pattern_of(problem, self._blocks, free)
+        self._free = problem.constraint.freedom(state)
+        self._blocks = problem.blocks(len(state))
+        self.pattern = problem.pattern_at(state)
         self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
+        self._factors: Factors | None = None  # their memory serves for all factorisations of this iteration
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
-        self.dofs = free.size
+        self.dofs = self._free.size
         self.iterations = 0
         self.factorizations = 0
         self.negative_modes = 0
@@ -155,7 +157,7 @@ class NewtonStep:
 
     def _near(self, moved: float) -> bool:
         """Whether a step of Newton's so long leads to the equilibrium at hand, be it a saddle."""
-        before = min(self._nearest, np.inf if self._shifted else self._last[0]) if self._cut else np.inf
+        before = min(self._nearest, np.inf if self._shifted else self._last[0]) if self._limit_steps else np.inf
         near = moved < min(NEAR, NEARER * before)
         if near:
             self._nearest = moved
@@ -165,7 +167,7 @@ class NewtonStep:
         """Whether the last step was not short and led to more negative modes than it began with: by several, which are
         rods that buckle; one more is a saddle on the way."""
         last = self._stride
-        if last is None or not self._cut or self.negative_modes <= last.negative_modes + 1:
+        if last is None or not self._limit_steps or self.negative_modes <= last.negative_modes + 1:
             return False
         return last.share * last.reach > NEAR * self._problem.length
 
@@ -202,13 +204,13 @@ class NewtonStep:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
         where the step that led there was too long."""
         if self._chord:
-            return self._solver.solve(right)
+            return self._solve(right)
         self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
         regular = self._count_negative_modes()
         if self.factorizations == 1 and self._most_modes is not None and self.negative_modes > self._most_modes:
             raise HopelessError
         if self.negative_modes and regular and not descend:
-            step = self._solver.solve(right)
+            step = self._solve(right)
             if self._near(float(np.abs(step).max()) / self._problem.length):
                 self._shifted = False
                 return step
@@ -218,13 +220,13 @@ class NewtonStep:
         self._shifted = self.negative_modes > 0
         if self.negative_modes:
             self._shift_until_definite()
-        return self._solver.solve(right)
+        return self._solve(right)
 
     def _count_negative_modes(self) -> bool:
         """Factorise the Hessian; whether that can be done. A mode without stiffness counts as a negative one."""
         self.factorizations += 1
         try:
-            self.negative_modes = self._solver.factor(self._data)
+            self.negative_modes = self._factor(self._data)
         except SingularError:
             if not np.isfinite(self._data).all():
                 raise
@@ -253,14 +255,24 @@ class NewtonStep:
         shifted = self._data.copy()
         shifted[self._assembly.diagonal] += shift
         self.factorizations += 1
-        return self._solver.factor(shifted)
+        return self._factor(shifted)
+
+    def _factor(self, data: Floats) -> int:
+        """Factorise; the number of negative modes."""
+        self._factors = self._solver.factor(data, reuse=self._factors)
+        return self._factors.negative
+
+    def _solve(self, right: Floats) -> Floats:
+        """By the last factors."""
+        assert self._factors is not None
+        return self._factors.solve(right)
 
     def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
         v = np.sin(1.0 + np.arange(self._free.size) ** 2)  # no symmetry of the shell is one of this start
         for _ in range(steps):
             v /= np.linalg.norm(v)
-            image = self._solver.solve(v)
+            image = self._solve(v)
             smallest = 1.0 / float(v @ image)
             v = image
         return v, smallest

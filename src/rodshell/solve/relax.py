@@ -15,10 +15,10 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
+from rodshell.solve.equilibrium import Equilibrium, find_stable
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
-from rodshell.solve.mixed_newton import Equilibrium, find_stable
+from rodshell.solve.newton_matrix import SparseSum
 from rodshell.solve.problem import Problem, linear_solver
-from rodshell.solve.summed import SparseSum
 
 FIRST = 6.0  # the first step leaves 1/36 of D in the matrix
 GROWTH, SHRINKAGE = 3.0, 0.25
@@ -39,7 +39,7 @@ def relax(problem: Problem, state: Floats, *, progress: Callable[[int, float], N
         motion = replace(motion, forces=(_Dead(problem.load),))
     stepper = ImplicitEuler(
         lambda blocks, free: SparseSum(
-            blocks, free, lambda indptr, indices: linear_solver(indptr, indices, free, problem.places)
+            blocks, free, lambda indptr, indices: linear_solver(indptr, indices, free, problem.flat_coordinates)
         )
     )
     still, length, factorizations, number = np.zeros_like(state), FIRST, 0, 0

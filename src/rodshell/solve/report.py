@@ -10,7 +10,7 @@ class Status(Enum):
     CONVERGED = "converged"
     STALLED = "stalled"
     DIVERGED = "diverged"
-    SLID_OFF = "slid off"
+    LOST_CONTACT = "lost contact"
     MOVING = "not at rest"
     BUCKLED = "buckled"
     OUT_OF_TIME = "out of time"
@@ -25,7 +25,8 @@ _SENTENCES = {
     Status.STALLED: "stopped at the largest number of iterations above its tolerance; refine the mesh or "
     "reduce the spacing",
     Status.DIVERGED: "the iteration diverged; reduce the spacing, or choose another anchor or heading",
-    Status.SLID_OFF: "the grid slid off the target (nothing holds it there without friction); use method = bound",
+    Status.LOST_CONTACT: "the grid lost contact with the target (without friction nothing holds it there); "
+    "use method = bound",
     Status.BUCKLED: "was given up at its start: released from the target, the rods would buckle between their joints "
     "in very many places; a smaller spacing, a flatter target or, of laths, narrower ones may do",
     Status.OUT_OF_TIME: "was out of time",

@@ -11,7 +11,7 @@ import numpy as np
 
 from rodshell.arrays import Longs
 from rodshell.solve.dense import padded
-from rodshell.solve.sharing import parts_of, stacks_of
+from rodshell.solve.subtree_scheduling import parts_of, stacks_of
 
 
 class Plan(NamedTuple):

@@ -3,10 +3,9 @@
 from rodshell.targets.domain import Disc, Domain, EllipseDomain, Rectangle
 from rodshell.targets.formula import Formula, parse_formula
 from rodshell.targets.freeform import Freeform
-from rodshell.targets.fromfile import heights_from, surface_from
+from rodshell.targets.from_file import Placement, heights_from, surface_from
 from rodshell.targets.heightfield import HeightField
 from rodshell.targets.jet import Jet
-from rodshell.targets.placement import Placement
 from rodshell.targets.quadric import Cap, Ellipsoid, Hemisphere, Paraboloid
 from rodshell.targets.target import Gap, Implicit, Target
 

@@ -1,11 +1,13 @@
 """The drawing set: each drawing at 1:1 for DXF and SVG, and all of them on sheets of paper for the PDF."""
 
+from functools import cache
+
 from rodshell.output.archive import Archive
-from rodshell.output.drawing import Drawing
+from rodshell.output.drawing import TEXT, Drawing
 from rodshell.output.drawings.bracing import bracing_drawing
 from rodshell.output.drawings.final import elevations_drawing, erection_drawing
 from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.sheets import SCALES, TEXT, Compose, Sheet, bound, fitted, parts, room, table
+from rodshell.output.drawings.sheets import SCALES, Compose, Sheet, bound, fitted, parts, room, table
 from rodshell.output.drawings.strips import per_sheet, strips_drawing
 from rodshell.output.drawings.supports import supports_drawing
 from rodshell.output.drawings.titleblock import title_block, with_title
@@ -31,13 +33,15 @@ def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[fl
     """All sheets in mm of paper, and the paper's size."""
     paper = PAPERS[(archive.result.get("drawings") or {}).get("paper", "A3")]
 
+    @cache  # the same text sizes are tried for one sheet and for its parts
     def flat(text: float) -> Drawing:
         return flat_drawing(plan, text)
 
     whole = fitted(flat, paper)
     sheets = [whole, *parts(flat, paper, whole, true_size=True)]
     sheets += _strips(plan, paper)
-    for name, make in _of_the_shell(archive, plan).items():
+    for name, compose in _of_the_shell(archive, plan).items():
+        make = cache(compose)
         whole = fitted(make, paper)
         sheets += [whole, *parts(make, paper, whole)]
         if name == "supports":

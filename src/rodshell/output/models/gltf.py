@@ -11,8 +11,8 @@ from rodshell.arrays import Floats
 from rodshell.geometry.frames import directors_along
 from rodshell.geometry.vectors import cross, unit
 from rodshell.output.archive import Archive
+from rodshell.output.colour_scale import scale_of
 from rodshell.output.rods import rods_of
-from rodshell.output.scale import scale_of
 from rodshell.output.shapes import shape_of
 
 ROUND = 8  # sides of a circle

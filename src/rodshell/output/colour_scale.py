@@ -1,0 +1,153 @@
+"""Colours that stand for numbers in a picture: the gap to the target, the stress, or the height without a target."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.output.archive import SHELLS, Archive, made_once
+from rodshell.output.drawing import Pen, Pencil
+from rodshell.output.plan import nice_step, nice_ticks
+from rodshell.output.shapes import Shape, shape_of
+from rodshell.output.svg import number
+from rodshell.output.wording import MINUS
+from rodshell.units import PRESSURES
+
+Colour = Literal["gap", "stress"]
+
+# Maps of even steps in lightness, by a few control points.
+# Signed: dark in the middle, so that rods without a gap are drawn in ink on light paper.
+SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f28c3a")
+STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
+HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
+BINS = 33  # colours in use; odd, so that a gap of 0 has its own
+STRESSES = ("stress_pinned", "stress_clamped")
+FINEST = 1e-3  # mm; smaller gaps are drawn like none
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Colours of a shell.
+
+    Parameters
+    ----------
+    values : (k,) at each entry of `rod_nodes`.
+    low, high : values at both ends of the map.
+    colours : control points of the map.
+    """
+
+    values: Floats
+    low: float
+    high: float
+    colours: tuple[str, ...]
+    caption: str
+
+    @property
+    def bins(self) -> Ints:
+        """(k,) index in the palette of each value's colour."""
+        share = np.nan_to_num((self.values - self.low) / (self.high - self.low), nan=0.5)
+        return np.rint(np.clip(share, 0, 1) * (BINS - 1)).astype(np.intp)
+
+    @property
+    def palette(self) -> list[str]:
+        return hex_colours(self.colours, np.linspace(0, 1, BINS))
+
+
+def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
+    """The scale of a shape, one for all shapes of the archive, which are compared; None where nothing colours it."""
+    nodes = archive.states["rod_nodes"]
+    if colour == "stress":
+        return None if shape.stress is None else _stress_scale(archive, shape)
+    if shape.gap is not None:
+        largest = _largest_of_all_gaps(archive)
+        factor, unit = length_unit(largest)
+        limit = _rounded_up(max(largest, FINEST) / factor)
+        caption = f"gap to target in {unit}, + outside"
+        return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
+    if shape.flat or archive.result.get("target"):
+        return None
+    heights = 1e3 * shape.positions[nodes, 2]  # mm, as at the axes of the picture
+    low, high = float(heights.min()), float(heights.max())
+    return Scale(heights, low, max(high, low + FINEST), HEIGHT, "height in mm")
+
+
+def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
+    """The largest gap [mm] with its sign, and where (3,) [m]: the agreement's own, which also looks between the nodes.
+
+    shape : one whose gaps are known.
+    """
+    assert shape.gap is not None
+    points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
+    worst = int(np.argmax(np.abs(gaps)))
+    found = (archive.result.get("agreement") or {}).get(shape.name.removeprefix("popped_")) or {}
+    if found.get("where") is None or found.get("max") is None:
+        return float(gaps[worst]), points[worst]
+    place = np.array(found["where"], dtype=float)
+    nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
+    return float(np.copysign(1e3 * found["max"], gaps[nearest])), place
+
+
+@made_once
+def _largest_of_all_gaps(archive: Archive) -> float:
+    """The largest gap [mm], without its sign, of all shapes that have one."""
+    shapes = [shape_of(archive, name) for name in SHELLS if name in archive.states]
+    return max((abs(largest_gap(archive, shape)[0]) for shape in shapes if shape.gap is not None), default=0.0)
+
+
+def length_unit(largest: float) -> tuple[float, str]:
+    """The unit that fits a length [mm]: how many mm it is, and its name."""
+    return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
+
+
+def _stress_scale(archive: Archive, shape: Shape) -> Scale:
+    """Utilisation where the strength is known, else the stress in a unit of its size."""
+    assert shape.stress is not None
+    strength = (archive.result.get("bending") or {}).get("strength")
+    known = [values for name, values in archive.states.items() if name == "history_stress" or name in STRESSES]
+    top = max(float(np.max(values)) for values in known)
+    if strength:
+        unit, caption = strength / 100, "utilisation in %"
+    else:
+        unit, name = next((one for one in PRESSURES if top >= one[0]), PRESSURES[-1])
+        caption = f"stress in {name}"
+    largest = float(np.max(shape.stress)) / unit
+    limit = _rounded_up(max(top / unit, FINEST))
+    return Scale(shape.stress / unit, 0.0, limit, STRESS, f"{caption}, here up to {largest:.3g}")
+
+
+def _rounded_up(largest: float) -> float:
+    """To a whole number of ticks."""
+    step = nice_step(largest, 4)
+    return float(step * np.ceil(largest / step - 1e-9))
+
+
+def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
+    """The map with its ticks and its caption, ending at x = `right`, ticks' baseline at `y`."""
+    length = 200.0
+    left, step = right - length, length / BINS
+    for k, colour in enumerate(scale.palette):  # each under the next: no seams
+        x, stop = left + k * step, min(left + (k + 2) * step, right)
+        corners = [(x, y + 14), (stop, y + 14), (stop, y + 22), (x, y + 22)]
+        pencil.line(corners, "TITLE", closed=True, pen=Pen(colour, 0.0, fill=colour))
+    for value in nice_ticks(scale.low, scale.high, 4):
+        x = left + length * (value - scale.low) / (scale.high - scale.low)
+        shown = number(value, 6).replace("-", MINUS)
+        pencil.write(shown, (x, y), 12.5, "DIM", anchor="middle")
+    pencil.write(scale.caption, (left - 12, y + 13), 13.0, "TITLE", anchor="end")
+
+
+def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
+    """Colours at `shares` (k,) of the way through a map, 0 to 1."""
+    table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
+    at = np.linspace(0.0, 1.0, len(points))
+    channels = [np.interp(shares, at, table[:, k]) for k in range(3)]
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(channels).astype(int).T.tolist()]
+
+
+@lru_cache(maxsize=4096)
+def mixed(colour: str, other: str, share: float) -> str:
+    """`colour` with a `share` of the `other`, 0 to 1."""
+    pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
+    return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)
