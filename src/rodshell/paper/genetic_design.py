@@ -10,7 +10,7 @@ from math import inf
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding import FoundForm, agreement, pop_up
+from rodshell.formfinding import PatchForm, agreement, pop_up
 from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
@@ -48,7 +48,7 @@ class Design:
     upper: Floats
 
     @staticmethod
-    def of(direct: FoundForm) -> "Design":
+    def of(direct: PatchForm) -> "Design":
         """The design with the target, the grid and the boundary of a direct result."""
         target, lines, points = direct.target, direct.footprint.rods, direct.trimmed.boundary.points
         orbit = _orbits(target, lines, points)
