@@ -9,6 +9,7 @@ import pytest
 import rodshell as rs
 from rodshell.geometry.curves import closed_loops
 from rodshell.layout import Crossings
+from rodshell.nets import sphere_net_end, sphere_net_rod
 from rodshell.nets.compass import march
 from rodshell.targets.domain import EllipseDomain
 from rodshell.targets.formula import Formula, parse_formula
@@ -41,7 +42,7 @@ LENGTHS = {
     "unit": lambda x: rs.surface_from("dome.obj", unit=0.0 if x is None else x),
     "size": lambda x: rs.heights_from("dome.csv", size=(x, 1.0)),
     "height": lambda x: rs.heights_from("dome.csv", size=(1.0, 1.0), height=0.0 if x is None else x),
-    "radius": lambda x: rs.sphere_net_end(x, 0.1),
+    "radius": lambda x: sphere_net_end(x, 0.1),
 }
 NO_LENGTH = ["20", None, True, float("nan"), float("inf"), -1.0, 0, [1.0], np.ones(2), 10**400]
 
@@ -105,7 +106,7 @@ def test_what_is_no_length_is_refused_in_one_sentence(name, wrong):
         (lambda: rs.straight_rods("rods.csv"), r"rod ends must be numbers of the shape \(rods, 2, 2\), not 'rods.csv'"),
         (lambda: rs.chebyshev_net(rs.Hemisphere(0.2), LAYOUT, anchor="0,0"), "anchor must be two finite numbers"),
         (lambda: rs.chebyshev_net(rs.Hemisphere(0.2), LAYOUT, eccentricity="1"), "eccentricity must be a number in m"),
-        (lambda: rs.sphere_net_rod(0.2, "0.1", 0.3), 'offset must be a number in m, not "0.1"'),
+        (lambda: sphere_net_rod(0.2, "0.1", 0.3), 'offset must be a number in m, not "0.1"'),
     ],
 )
 def test_a_wrong_argument_is_refused_in_one_sentence(call, sentence):
