@@ -6,7 +6,7 @@ Without names all figures are made; the page shows all that there are, so that o
 import sys
 from pathlib import Path
 
-from rodshell.cli.progress import Progress
+from rodshell.cli.reporting import Progress
 from rodshell.output import open_folder
 from rodshell.paper import FIGURES, figure_maker
 

@@ -75,7 +75,7 @@ def test_a_lath_whose_joints_let_it_roll_is_thicker_for_it_bends_towards_its_thi
     held, free = (Fit.on(target, layout, joint=joint).section(larch) for joint in (rs.Pin(), rs.Ball()))
     assert free.depth > held.depth
     form = rs.find_form(target, layout, rs.Rod(free, larch), ends=("clamped",))
-    bending = form.archive(takeaway=rs.Takeaway(stages=0)).result["bending"]["clamped"]
+    bending = form.archive(options=rs.Takeaway(stages=0)).result["bending"]["clamped"]
     assert 0.2 < bending["utilisation"] <= 0.5
 
 
@@ -225,7 +225,7 @@ def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path)
 )
 def test_what_keeps_a_chosen_section_from_being_thicker_is_named(keys: dict[str, str], limit: str) -> None:
     case = roof(**{"rod.material.preset": "larch", **keys})
-    target, layout, rod, _ = case.build()
+    target, layout, rod, *_ = case.build()
     fit = case.fit_on(target, layout)
     assert isinstance(rod.section, rs.Circle | rs.Tube | rs.RectangularSection)
     assert rod.material
@@ -246,9 +246,9 @@ def test_a_given_strength_wins_over_the_presets(tmp_path: Path, capsys: pytest.C
     target, layout = half_sphere(5.0)
     rod = rs.Rod(rs.Circle(0.005), rs.Material.preset("gfrp"))
     form = rs.find_form(target, layout, rod, ends=("clamped",))
-    bending = form.archive(takeaway=rs.Takeaway(strength=100e6, stages=0)).result["bending"]
+    bending = form.archive(options=rs.Takeaway(strength=100e6, stages=0)).result["bending"]
     assert (bending["strength"], bending["strength_of"]) == (100e6, None)
-    bending = form.archive(takeaway=rs.Takeaway(stages=0)).result["bending"]
+    bending = form.archive(options=rs.Takeaway(stages=0)).result["bending"]
     assert (bending["strength"], bending["strength_of"]) == (240e6, "gfrp")
     assert bending["clamped"]["utilisation"] == bending["clamped"]["max_stress"] / 240e6
 
@@ -275,7 +275,7 @@ def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
     out = tmp_path / "barrel"
     assert main(["form", "heightfield", *options, "--only", "csv", "--quiet", "--out", str(out)]) == 0
     case = load_case(out / "case.toml")
-    target, layout, rod, _ = case.build()
+    target, layout, rod, *_ = case.build()
     assert layout.rotate == pytest.approx(np.pi / 4)
     assert rod.section == Fit.on(target, layout, anchor=case.drape.anchor).section(
         rs.Material.preset("larch"), strength=20e6

@@ -196,7 +196,7 @@ def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Pa
 
 @pytest.mark.slow
 def test_without_stages_there_is_no_way_up(tmp_path: Path) -> None:
-    made = form("dome").archive(takeaway=rs.Takeaway(stages=0))
+    made = form("dome").archive(options=rs.Takeaway(stages=0))
     assert "deployment" not in made.result
     assert "history" not in made.states
     names = export(made, tmp_path)

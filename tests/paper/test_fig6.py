@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-import rodshell as rs
 from rodshell.formfinding.methods import Fall
+from rodshell.nets import sphere_net_end
 from rodshell.output.view import TOWARDS
 from rodshell.paper import drapes
 from rodshell.paper.cases import Case
@@ -37,7 +37,7 @@ def by(method: str) -> DrapeRun:
 @pytest.mark.slow
 def test_the_net_that_g0_is_held_against_is_the_spheres_exact_one() -> None:
     for rod, net in zip(by("paper").trimmed.mesh.grid.rods, by("paper").net, strict=True):
-        np.testing.assert_allclose(np.abs(net), rs.sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
+        np.testing.assert_allclose(np.abs(net), sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
 
 
 @pytest.mark.slow

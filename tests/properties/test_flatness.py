@@ -68,7 +68,7 @@ def test_a_plane_is_called_one(name: str) -> None:
 
 
 def test_a_flat_target_in_patches_is_flat_too() -> None:
-    sewn = rs.sew(dome(0.001), [[(-1.0, 0.0), (1.0, 0.0)]], GRID, ROD)
+    sewn = rs.find_form(dome(0.001), GRID, ROD, seams=[[(-1.0, 0.0), (1.0, 0.0)]])
     result = sewn.archive().result
     assert result["target"]["flat"] is True
     assert sewn.warnings[0].startswith("the target is flat, nothing pops up: it rises by 1 mm only")

@@ -185,14 +185,15 @@ def test_a_layout_beside_the_target_is_refused():
 def test_a_drape_by_weight_that_fails_is_told_of_the_bound_one_once(method, status, times):
     draped = hemisphere_form().draped
     levels = (replace(draped.report, status=status),)
-    form = replace(hemisphere_form(), draped=replace(draped, method=method, levels=levels))
+    lying = replace(hemisphere_form().trimmed, draped=replace(draped, method=method, levels=levels))
+    form = replace(hemisphere_form(), stages=replace(hemisphere_form().stages, lying=lying))
     assert form.status.startswith("drape ")
     assert form.status.count("bound") == times
 
 
 def test_a_wave_that_springs_off_is_advised_seams():
     gap = replace(hemisphere_form().agreement["clamped"], max=0.03 * SIZE)
-    form = replace(hemisphere_form(), agreement={"clamped": gap})
+    form = replace(hemisphere_form(), stages=replace(hemisphere_form().stages, agreement={"clamped": gap}))
     (words,) = [text for text in verdict(form.result()).reasons if "off the target" in text]
     assert words.endswith("dips and ridges need seams, graded stiffness or supports")
 
@@ -303,13 +304,12 @@ def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
     target, layout = rs.Hemisphere(SIZE), rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
     whole, sewn = (
         rs.find_form(target, layout, ROD, ends=ends),
-        rs.sew(target, [[(-1, 0), (1, 0)]], layout, ROD, ends=ends),
+        rs.find_form(target, layout, ROD, seams=[[(-1, 0), (1, 0)]], ends=ends),
     )
     for form in (whole, sewn):
-        (tmp_path / "case.toml").write_text(form.archive(takeaway=rs.Takeaway(stages=0)).case_toml)
+        (tmp_path / "case.toml").write_text(form.archive(options=rs.Takeaway(stages=0)).case_toml)
         case = load_case(tmp_path / "case.toml")
-        built = case.build_sewn() if form is sewn else case.build()
-        assert built.drape_options["ends"] == form.ends == tuple(form.popped) == ends
+        assert case.build().ends == form.ends == tuple(form.popped) == ends
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
-from rodshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
+from rodshell.formfinding import Agreement, Draped, Footprint, PatchForm
 from rodshell.formfinding.bound_drape import shape_of_net
 from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
@@ -24,7 +24,7 @@ from rodshell.targets import Target
 States = dict[str, NDArray[Any]]
 
 
-def form_result(form: FoundForm) -> dict[str, Any]:
+def form_result(form: PatchForm) -> dict[str, Any]:
     """result.json of a form, SI units; the keys are those of the documentation's page on files."""
     return {
         **head(form.target.name, form.status, form.warnings),
@@ -74,7 +74,7 @@ def drape_table(draped: Draped) -> dict[str, Any]:
     return drape
 
 
-def form_states(form: FoundForm) -> States:
+def form_states(form: PatchForm) -> States:
     """states.npz of a form."""
     target = form.target
     states = _mesh_states(form.footprint)
@@ -92,7 +92,7 @@ def _mesh_states(footprint: Footprint) -> States:
     return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
 
 
-def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
+def table_result(table: PatchForm, name: str) -> dict[str, Any]:
     """result.json of a popped-up table of rods."""
     return {
         **head(name, table.status, table.warnings),
@@ -103,7 +103,7 @@ def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
     }
 
 
-def table_states(table: PoppedTable) -> States:
+def table_states(table: PatchForm) -> States:
     """states.npz of a popped-up table of rods."""
     return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
 

@@ -11,8 +11,13 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
+<<<<<<< HEAD
 from rodshell.formfinding import FoundForm, find_stages
 from rodshell.formfinding.progress import Progress
+=======
+from rodshell.formfinding import PatchForm, find_stages
+from rodshell.output.folder import ResultFolder
+>>>>>>> main
 from rodshell.output.svg import tag
 from rodshell.paper.cases import CASES, ROD, Case
 from rodshell.paper.figure import Figure
@@ -46,7 +51,7 @@ class PopUpCase:
     """One shell, and the time from target to popped up, pinned and clamped [s]."""
 
     case: Case
-    form: FoundForm
+    form: PatchForm
     seconds: float
 
     @property

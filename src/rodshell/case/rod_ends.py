@@ -1,8 +1,8 @@
-"""Rods given by where their ends lie flat and where they go: from a table, or from an earlier result."""
+"""Rods given by where their ends lie flat and where they go: read from a table, or from an earlier result."""
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -11,39 +11,80 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.units import length_text, parse_quantity, read_unit
+from rodshell.layout import FlatGrid, straight_rods
+from rodshell.units import length_text, parse_quantity, read_unit, shown
+from rodshell.validation import instance
 
 COLUMNS = (
     "flat_x0", "flat_y0", "flat_x1", "flat_y1",
     "final_x0", "final_y0", "final_z0", "final_x1", "final_y1", "final_z1",
 )  # fmt: skip
 MILLIMETRE = 1e-3
+LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RodEnds:
-    """Both ends of each rod, before and after.
+    """Rods by both their ends, flat and popped up; two tables are equal that have the same numbers.
 
     Parameters
     ----------
-    names : m labels, or None.
-    flat : (m, 2, 2), the two ends in the plane [m].
-    final : (m, 2, 3), the same two ends of the popped shell [m].
-    rod, joint : what they are and what joins them, as in a case file; empty for a table, which does not say.
-    edge : longest edge of their mesh [m]; None where none was given.
+    grid : m rods in the plane.
+    final : (m, 2, 3), where the start and the end of each rod go [m].
+    edge : longest edge of their mesh [m]; None: a sixth of the usual distance between joints.
+
+    Raises
+    ------
+    InputError : `final` does not fit `grid`, or a rod would be stretched.
     """
 
-    names: list[str] | None
-    flat: Floats
+    grid: FlatGrid
     final: Floats
-    rod: dict[str, Any] = field(default_factory=dict)
-    joint: dict[str, Any] = field(default_factory=dict)
     edge: float | None = None
+
+    def __post_init__(self) -> None:
+        instance("grid", self.grid, FlatGrid)
+        points = np.asarray(self.final, dtype=float)
+        object.__setattr__(self, "final", points)
+        if points.shape != (len(self.grid.rods), 2, 3) or not np.isfinite(points).all():
+            wanted = (len(self.grid.rods), 2, 3)
+            raise InputError(f"final ends must be finite and of the shape {wanted}, not {points.shape}")
+        distances = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        for rod, distance in zip(self.grid.rods, distances, strict=True):
+            if distance > LONGEST_STRETCH * rod.length:
+                raise InputError(
+                    f"rod {rod.name} is {rod.length:.4g} m long, but its final ends lie {distance:.4g} m apart: "
+                    "move them closer, or give a longer rod"
+                )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RodEnds):
+            return NotImplemented
+        same = self.grid.rods == other.grid.rods and self.edge == other.edge
+        return same and np.array_equal(self.final, other.final)
+
+    def __hash__(self) -> int:
+        return hash((self.grid.rods, self.edge))
 
     @property
     def lengths(self) -> Floats:
         """(m,) lengths of the rods [m]."""
-        return np.linalg.norm(self.flat[:, 1] - self.flat[:, 0], axis=1)
+        return np.array([rod.length for rod in self.grid.rods])
+
+
+@dataclass(frozen=True)
+class ResultRods:
+    """The rods of an earlier result.
+
+    Parameters
+    ----------
+    ends : where they lie flat and popped up.
+    rod, joint : what they are and what joins them, as in a case file; empty where the result does not say.
+    """
+
+    ends: RodEnds
+    rod: dict[str, Any]
+    joint: dict[str, Any]
 
 
 def read_table(path: Path, unit: str | None) -> RodEnds:
@@ -60,7 +101,7 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     try:
         scale = None if unit is None else float(read_unit(unit, "length"))
     except ValueError as reason:
-        raise InputError(f'--unit = "{unit}": {reason}') from None
+        raise InputError(f"unit = {shown(unit)}: {reason}") from None
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except OSError as reason:
@@ -73,10 +114,10 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     columns = _columns(path, header)
     if columns != COLUMNS:
         if scale not in (None, MILLIMETRE):
-            raise InputError(f'--unit = "{unit}": the columns of {path} are in mm; leave --unit out')
+            raise InputError(f"unit = {shown(unit)}: the columns of {path} are in mm: leave it out")
         scale = MILLIMETRE
     if scale is None:
-        raise InputError("--unit is missing: give the unit of the table's coordinates, such as --unit m")
+        raise InputError("unit is missing: give the unit of the table's coordinates, such as m (--unit m)")
     names, numbers = list[str](), list[list[float]]()
     for where, row in _rows(path, [(reader.line_num, cells) for cells in reader], header, delimiter):
         numbers.append([parse_quantity(row[column], "number", f"{where}, {column}") for column in columns])
@@ -84,7 +125,8 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
     if not numbers:
         raise InputError(f"{path} has no rods: give one row for each rod under the header")
     values = np.array(numbers) * scale
-    return RodEnds(_labels(path, names), values[:, :4].reshape(-1, 2, 2), values[:, 4:].reshape(-1, 2, 3))
+    grid = straight_rods(values[:, :4].reshape(-1, 2, 2), names=_labels(path, names))
+    return RodEnds(grid, values[:, 4:].reshape(-1, 2, 3))
 
 
 def _columns(path: Path, header: list[str]) -> tuple[str, ...]:
@@ -127,7 +169,7 @@ def _labels(path: Path, names: list[str]) -> list[str] | None:
     return names
 
 
-def read_result(folder: Path) -> RodEnds:
+def read_result(folder: Path) -> ResultRods:
     """The rods of an earlier result: their flat ends, where its shell has them, what they are and their joints.
 
     Raises
@@ -165,4 +207,5 @@ def read_result(folder: Path) -> RodEnds:
         raise InputError(f"the result in {folder} lacks its rods or its states: run it again") from None
     if not rods:
         raise InputError(f"the result in {folder} has no rods")
-    return RodEnds([rod.id for rod in rods], flat, final, rod, joint, (archive.result.get("layout") or {}).get("edge"))
+    edge = (archive.result.get("layout") or {}).get("edge")
+    return ResultRods(RodEnds(straight_rods(flat, names=[rod.id for rod in rods]), final, edge), rod, joint)
