@@ -7,7 +7,7 @@ of one processor. `make paper` then writes the table and the pictures.
 import sys
 from pathlib import Path
 
-from rodshell.cli.progress import Progress
+from rodshell.cli.reporting import Progress
 from rodshell.paper.fig6 import CASES
 from rodshell.paper.genetic import KEPT, SEED, find
 

@@ -7,7 +7,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from rodshell.cli.progress import Progress
+from rodshell.cli.reporting import Progress
 from rodshell.output import open_folder
 from rodshell.paper import FIGURES
 

@@ -93,7 +93,7 @@ def dome() -> Archive:
     style = DrawingStyle(
         project="Park", author="A. Nyone", date="2026-11-22", revision="C", tolerance=5e-4, name="Dome"
     )
-    return rs.find_form(HEMISPHERE, layout, ROD).archive(takeaway=Takeaway(stages=2, drawings=style))
+    return rs.find_form(HEMISPHERE, layout, ROD).archive(options=Takeaway(stages=2, drawings=style))
 
 
 def sheets_of(archive: Archive) -> list[Drawing]:

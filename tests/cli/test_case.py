@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from rodshell.case import BUILT_IN, Case, case_keys, load_case
+from rodshell.case.load import RenamedKeyWarning
 from rodshell.errors import InputError
 
 DESIGN = """
@@ -87,11 +88,11 @@ def test_what_a_file_leaves_out_is_the_default_but_counts_and_lengths_are_auto(l
 def test_lengths_left_out_grow_with_the_target(load: Any, size: float) -> None:
     """So every scale has the same net: the spacing is a round length, and all else follows it or the size."""
     text = f'target = {{ kind = "heightfield", formula = "0", radius = {size} }}\nrod.material.preset = "rubber"'
-    _, layout, rod, _ = load(text).build()
+    _, layout, rod, *_ = load(text).build()
     assert size / 12 < layout.spacing[0] <= size / 8  # rounded down to 1, 1.5, 2, 3, 5 or 7 times a power of ten
     assert layout.edge == layout.spacing[0] / 6
     assert rod.section.radius == pytest.approx(size / 200, rel=1e-3)
-    _, layout, _, _ = load(text, {"layout.spacing": [size / 5, size / 10]}).build()
+    _, layout, *_ = load(text, {"layout.spacing": [size / 5, size / 10]}).build()
     assert layout.edge == pytest.approx(size / 60, rel=1e-15)
 
 
@@ -101,10 +102,10 @@ def test_seams_take_the_rods_of_the_whole_from_a_built_in_case_but_not_from_the_
         case = load_case(name, seams)
         whole = load_case(name, {"layout.rods": "auto", "layout.length": "auto"})
         assert case.layout == whole.layout
-        assert case.build_sewn().layout.spacing == (0.03, 0.03)
+        assert case.build().layout.spacing == (0.03, 0.03)
     for key, value in (("layout.rods", "17x17"), ("layout.length", "1.2 m"), ("drape.method", "gravity")):
         with pytest.raises(InputError, match=f"{key} = .*: (use|each patch .* use|seams need .* use)"):
-            load_case("hemisphere", {**seams, key: value}).build_sewn()
+            load_case("hemisphere", {**seams, key: value}).build()
 
 
 def test_an_empty_table_is_written_without_a_gap_in_it() -> None:
@@ -193,20 +194,20 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ('[target]\nkind = "heights"\nfile = "h.csv"', "target.size is missing: give the width along x and depth"),
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nunit = "furlong"', 'target.unit = "furlong"'),
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nturn = [1, 2]', "target.turn = [1, 2]: needs three values"),
-        ('target.kind = "hemispher"', "did you mean hemisphere?"),
-        ("target.kind = 3", "target.kind = 3: use"),
-        ("target.kind = []", "target.kind = []: use"),
+        ('target.kind = "hemispher"', 'did you mean "hemisphere"?'),
+        ("target.kind = 3", 'target.kind must be "hemisphere"'),
+        ("target.kind = []", ", not a list"),
         ('target.file = "dome.obj"', 'a target of kind "hemisphere" has no file'),
-        ('joint.kind = "glue"', 'joint.kind = "glue": use "ball", "pin", "spring", "linker" or "rigid"'),
+        ('joint.kind = "glue"', 'joint.kind must be "ball", "pin", "spring", "linker" or "rigid", not "glue"'),
         ("joint.shear = 1", 'a joint of kind "ball" has no shear: leave it out, or set joint.kind to "spring"'),
         ('joint = { kind = "spring", shear = -1 }', "joint.shear = -1: must not be negative"),
         ('joint = { kind = "spring", twist = "2 mm" }', "mm is a unit of length"),
         ('joint = { kind = "linker", corners = 3 }', "joint.corners = 3: give 2, opposite corners"),
         ('joint = { kind = "pin", eccentricity = "-1 mm" }', "must not be negative"),
-        ('drape.method = "magic"', 'drape.method = "magic": use "bound", "gravity" or "paper"'),
+        ('drape.method = "magic"', 'drape.method must be "bound", "gravity" or "paper", not "magic"'),
         ("drape.anchor = 1", "drape.anchor = 1: needs two values"),
         ("drape.gravity = -9.81", "drape.gravity = -9.81: must be larger than zero"),
-        ('pop_up.ends = "clampd"', "did you mean clamped?"),
+        ('pop_up.ends = "clampd"', '"both", not "clampd": did you mean "clamped"?'),
         ('rod.section.kind = "tube"', "rod.section.thickness is missing: give the thickness"),
         ("rod.material.poisson_ratio = 0.6", "must lie above -1 and not above 0.5"),
         ("layout.rods = 17", "layout.rods = 17: give two counts of at least 2"),
@@ -229,7 +230,7 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nturn = [0, 0, 30]', "third value: a plain number is in radians"),
         (
             'layout.spacing = "700,5 mm"',
-            'a decimal takes a point, not a comma: give each its own, such as "700 mm, 5 mm"',
+            'a decimal takes a point, not a comma: give each its unit, such as "700 mm, 5 mm"',
         ),
         ('layout.offset = "10 mm, 20"', "only some of these have a unit"),
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nmove = "1,0,2 m"', "only some of these have a unit"),
@@ -261,6 +262,48 @@ def test_an_unknown_override_names_the_nearest_key() -> None:
         load_case("hemisphere", {"layout.spaceing": "30 mm"})
     with pytest.raises(InputError, match='kind "hemisphere" has no formula'):
         load_case("hemisphere", {"target.formula": "x"})
+
+
+def test_only_keys_of_the_kinds_at_hand_are_proposed() -> None:
+    """A hemisphere has no height, a circle no thickness: neither is offered to one who misspells them."""
+    for path, absent in (
+        ("target.heigth", "height?"),
+        ("rod.section.thicknes", "thickness?"),
+        ("joint.eccentricty", "eccentricity?"),
+        ("drape.frictn", "friction?"),
+    ):
+        with pytest.raises(InputError) as caught:
+            load_case("hemisphere", {path: "1 mm"})
+        assert absent not in str(caught.value)
+    with pytest.raises(InputError, match=r"did you mean target.height\?"):
+        load_case("paraboloid", {"target.heigth": "1 m"})
+    with pytest.raises(InputError, match=r"did you mean joint.eccentricity\?"):
+        load_case("hemisphere", {"joint.kind": "pin", "joint.eccentricty": "1 mm"})
+
+
+def test_a_key_by_its_old_name_is_read_with_a_warning(load: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rodshell.case.load.RENAMED", {"drape.weight": "drape.gravity", "grid.edge": "layout.edge"})
+    wanted = load('drape = { method = "gravity", gravity = 1.6 }\nlayout.edge = 0.004')
+    with pytest.warns(RenamedKeyWarning, match="drape.weight is now called drape.gravity"):
+        assert load('drape = { method = "gravity", weight = 1.6 }\ngrid.edge = 0.004') == wanted
+    with pytest.warns(RenamedKeyWarning):
+        assert load('drape.method = "gravity"\nlayout.edge = 0.004', {"drape.weight": 1.6}) == wanted
+
+
+def test_a_case_is_also_its_text_or_its_tables() -> None:
+    case = load_case("cap", {"target.base": "50 mm", "rod.section.radius": "2 mm"})
+    assert load_case(case.to_toml()) == case
+    assert load_case(tomllib.loads(case.to_toml())) == case
+    tables = {"target": {"kind": "cap", "base": "50 mm"}, "rod.section.radius": "2 mm", "rod": {"material.density": 9}}
+    tables["rod"]["material.youngs_modulus"] = 1e6  # type: ignore[index]
+    mixed = load_case(tables)
+    assert (mixed.target.base, mixed.rod.section.radius, mixed.rod.material.density) == (0.05, 0.002, 9.0)
+    with pytest.raises(InputError, match="the text is not valid TOML"):
+        load_case("target = ")
+    with pytest.raises(InputError, match=r"unknown key target.radus: did you mean target.radius\?"):
+        load_case({"target": {"radus": 1}})
+    with pytest.raises(InputError, match="target = 3: must be a table"):
+        load_case({"target": 3})
 
 
 @pytest.mark.parametrize(
@@ -317,31 +360,25 @@ def test_a_built_target_has_the_numbers_of_its_case(name: str) -> None:
 
 
 def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
+    from rodshell.formfinding import Gravity
     from rodshell.joints import Ball, Pin
     from rodshell.layout import GridLayout
     from rodshell.rods.section import Circle, Material, Rod, Tube
 
     overrides = {"drape.anchor": "0.1,0", "drape.method": "gravity", "layout.rotate": 0.5}
-    _, layout, rod, options = load_case("ellipsoid", overrides).build()
+    _, layout, rod, *options = load_case("ellipsoid", overrides).build()
     assert layout == GridLayout.orthogonal(
         rods=(11, 15), spacing=0.03, length=1.2, edge=0.005, rotate=0.5, offset=(0.0, 0.0)
     )
     assert rod == Rod(Circle(0.001), Material(1e6, 1000.0, 0.5))
-    assert options == {
-        "method": "gravity",
-        "anchor": (0.1, 0.0),
-        "gravity": 9.81,
-        "ends": ("pinned", "clamped"),
-        "fall": None,
-        "joint": Ball(),
-    }
+    assert options == [Ball(), Gravity(), (0.1, 0.0), ("pinned", "clamped")]
     tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
     tube |= {"joint.kind": "pin", "joint.eccentricity": "2 mm"}
     built = load_case("hemisphere", tube).build()
     assert built.rod.section == Tube(0.001, 0.0001)
-    assert built.drape_options["ends"] == ("pinned",)
-    assert built.drape_options["joint"] == Pin(eccentricity=0.002)
-    assert built.drape_options["anchor"] is None
+    assert built.ends == ("pinned",)
+    assert built.joint == Pin(eccentricity=0.002)
+    assert built.anchor is None
 
 
 def test_a_height_field_gets_its_formula_and_its_domain(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -390,7 +427,7 @@ def test_what_would_do_nothing_is_refused_before_the_job(overrides: dict[str, ob
 def test_seams_have_no_objective() -> None:
     case = load_case("hemisphere", {"seams.lines": "-1,0;1,0", "layout.rotate": "auto", "drape.objective": "gap"})
     with pytest.raises(InputError, match=r"drape\.objective"):
-        case.build_sewn()
+        case.build()
 
 
 def test_a_patch_of_finer_spacing_may_have_shorter_stock() -> None:
@@ -399,7 +436,7 @@ def test_a_patch_of_finer_spacing_may_have_shorter_stock() -> None:
     with pytest.raises(InputError, match="stock_length"):
         load_case("hemisphere", short).build()
     case = load_case("hemisphere", {**seams, **short})
-    assert case.build_sewn()
+    assert case.build()
     assert case.takeaway().fabrication.stock_length == 0.01
 
 
@@ -437,13 +474,25 @@ def test_a_zero_needs_no_unit_beside_others() -> None:
 @pytest.mark.parametrize("angle", [7.0, -30.0, 0.3])
 def test_a_case_of_python_objects_can_be_read_again_whatever_its_angle(load: Any, angle: float) -> None:
     import rodshell as rs
-    from rodshell.case.of import case_text
 
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02, rotate=angle)
     rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
-    case = load(case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball(), gravity=3.0))
+    case = load(rs.Job(rs.Hemisphere(radius=0.2), layout, rod).to_toml())
     assert cos(case.layout.rotate - angle) == pytest.approx(1)
     assert abs(case.layout.rotate) < tau
+
+
+def test_each_method_of_draping_is_written_to_a_case_and_read_again(load: Any) -> None:
+    import rodshell as rs
+
+    layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02)
+    rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+    ties = rs.ExplicitPenalty(C1=2.0, C2=3e-5)
+    timed = {"time_step": 1e-3, "duration": 2.0, "friction": 0.1, "drag": 4.0}
+    slow = rs.Fall(acceleration=1.6, height=0.1, coupling=ties, **timed)
+    for method in (rs.Bound(), rs.Gravity(acceleration=1.6), rs.Fall(), slow):
+        text = rs.Job(rs.Hemisphere(radius=0.2), layout, rod, method=method).to_toml()
+        assert load(text).build().method == method
 
 
 def test_each_key_has_one_line_of_help() -> None:

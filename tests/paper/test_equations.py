@@ -51,15 +51,15 @@ def test_targets_are_those_of_equation_13() -> None:
     xy = np.array([[0.0, 0.0], [0.1, 0.05], [-0.03, 0.12], [0.02, -0.14]])
     x, y = xy.T
     found = [
-        rs.Hemisphere(0.2).height(xy), rs.Paraboloid(0.2, 0.12).height(xy), rs.Ellipsoid(0.2, 0.15, 0.12).height(xy),
-    ]  # fmt: skip
+        target.height_at(xy) for target in (rs.Hemisphere(0.2), rs.Paraboloid(0.2, 0.12), rs.Ellipsoid(0.2, 0.15, 0.12))
+    ]
     wanted = [
         np.sqrt(0.2**2 - x**2 - y**2),
         0.12 * (1 - (x**2 + y**2) / 0.2**2),
         0.12 * np.sqrt(1 - x**2 / 0.2**2 - y**2 / 0.15**2),
     ]
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
-    assert np.isnan(rs.Hemisphere(0.2).height(np.array([[0.2, 0.01]]))).all()
+    assert np.isnan(rs.Hemisphere(0.2).height_at(np.array([[0.2, 0.01]]))).all()
 
 
 def test_rod_1_is_led_as_equation_7_says() -> None:

@@ -24,6 +24,7 @@ def demonstrated(demonstration, joint, coupling):
     return run(demonstration, JOINTS[joint], COUPLINGS[coupling], until=UNTIL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coupling", COUPLINGS)
 @pytest.mark.parametrize(
     ("demonstration", "joint"), [("twisting", "linker"), ("bending", "linker"), ("twisting", "pin")]
@@ -36,10 +37,11 @@ def test_rod_2_turns_as_fast_as_rod_1(demonstration, joint, coupling):
         assert np.abs(one.lag[len(one.lag) // 2 :]).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("demonstration", ["twisting", "bending"])
 def test_explicit_ties_start_up_as_implicit_ones_do_with_the_same_step(demonstration):
     explicit = demonstrated(demonstration, "linker", "explicit")
-    same = rs.ExplicitPenalty().of(ROD, LENGTH / 4)
+    same = rs.ExplicitPenalty().with_defaults(ROD, LENGTH / 4)
     ties = rs.ImplicitPenalty(C1=same.C1, C2=same.C2)
     implicit = run(demonstration, rs.Linker(), ties, until=0.1, step=explicit.step)
     every = round(STEP / explicit.step)
@@ -71,6 +73,7 @@ def test_in_statics_rod_2_is_where_rod_1_is(demonstration, coupling):
     assert np.allclose(np.linalg.norm(np.diff(one.nodes, axis=2), axis=-1), LENGTH / 4, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_figure_is_written_with_its_tables(tmp_path):
     figure = make(lambda *_: None, turns=0.05)
     figure.save(tmp_path / "fig4")

@@ -11,14 +11,16 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-import rodshell as rs
-from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.methods import Fall
+from rodshell.nets import sphere_net_end
 from rodshell.output.view import TOWARDS
 from rodshell.paper import drape_pictures
 from rodshell.paper.drapefigure import DrapeFigure
 from rodshell.paper.drapes import METHODS, Case, Drape, drape_all
 from rodshell.paper.panels import standing
 from tests.paper.falls import HEMISPHERE
+
+pytestmark = pytest.mark.slow
 
 CASE = Case("a", HEMISPHERE, (7, 7), spacing=0.06, edge=0.03)
 
@@ -32,11 +34,13 @@ def by(method: str) -> Drape:
     return next(one for one in figure().drapes if one.method == method)
 
 
+@pytest.mark.slow
 def test_the_net_that_g0_is_held_against_is_the_spheres_exact_one() -> None:
     for rod, net in zip(by("paper").trimmed.mesh.grid.rods, by("paper").net, strict=True):
-        np.testing.assert_allclose(np.abs(net), rs.sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
+        np.testing.assert_allclose(np.abs(net), sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
 
 
+@pytest.mark.slow
 def test_of_the_bound_drape_its_own_ends_are_shown_which_tend_to_the_nets_as_the_spacing() -> None:
     """It starts from the net; where its own lines cross the target's end is found again from its positions."""
     fine = drape_all([replace(CASE, rods=(13, 13), spacing=0.03, edge=0.015)], lambda *told: None, methods=["bound"])
@@ -78,6 +82,7 @@ def test_the_files_hold_tables_and_one_picture_a_method(tmp_path: Path) -> None:
         assert len(lines) >= 4 * (rods - 2)  # four panels; lines that miss the target are dropped when trimmed
 
 
+@pytest.mark.slow
 def test_a_fall_that_does_not_rest_is_the_status_of_the_figure() -> None:
     moving = DrapeFigure("fig6", "a title", drape_all([CASE], lambda *told: None, fall=Fall(duration=0.8)))
     assert moving.status.startswith("(a) by method paper was not at rest")

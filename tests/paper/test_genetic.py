@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import InputError
-from rodshell.formfinding import Footprint, FoundForm, find_stages
+from rodshell.formfinding import Footprint, PatchForm, find_stages
 from rodshell.formfinding.progress import silent
 from rodshell.paper import genetic, genetic_design, genetic_search
 from rodshell.paper.drapes import Case
@@ -31,7 +31,7 @@ LEANS = Case("d", LEANING, (5, 5), spacing=0.06, edge=0.03)
 
 
 @cache
-def direct(case: Case) -> FoundForm:
+def direct(case: Case) -> PatchForm:
     return find_stages(case.target, case.layout, PAPER_ROD, ends=("pinned",))
 
 
@@ -119,7 +119,7 @@ def test_bounds_run_from_taut_to_twice_as_long_on_a_hemisphere_and_hold_the_dire
 
 @pytest.mark.parametrize("case", [SMALL, *CASES], ids=lambda case: f"{case.target.name}-{case.rods[0]}")
 def test_the_objective_at_the_direct_answer_is_the_direct_methods_own_agreement(case: Case) -> None:
-    """Popped up from flat on a mesh of its own, not released from the draped state. Newton's steps end at 1e-6."""
+    """PopUp up from flat on a mesh of its own, not released from the draped state. Newton's steps end at 1e-6."""
     assert design(case).error(direct_variables(case)) == pytest.approx(direct(case).agreement["pinned"].rms, rel=1e-5)
 
 
@@ -170,6 +170,7 @@ def test_random_footprints_are_smooth_but_for_the_roughness_and_within_bounds() 
     np.testing.assert_allclose(roughest.max(axis=0), one.upper, rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_a_search_from_the_same_seed_is_the_same_and_from_another_is_not(whole: History, tmp_path: Path) -> None:
     again, other = find(tmp_path / "again"), find(tmp_path / "other", seed=SEED + 1)
     assert course(again) == course(whole)
@@ -199,6 +200,7 @@ def stopping(after: int) -> Callable[[str, str, float], None]:
     return told
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_goes_on_bit_for_bit_and_makes_no_run_twice(
     whole: History, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -227,6 +229,7 @@ def test_a_search_given_up_goes_on_when_more_generations_are_allowed(whole: Hist
     assert course(find(tmp_path)) == course(whole)
 
 
+@pytest.mark.slow
 def test_two_processes_find_what_one_finds(whole: History, tmp_path: Path) -> None:
     found = find(tmp_path, jobs=2, most=2)
     assert course(found) == course(whole)[:2]
@@ -253,6 +256,7 @@ def test_a_broken_file_is_refused_in_one_sentence(text: str, tmp_path: Path) -> 
     assert file.read_text() == text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", ["lost", "nan", "many"])
 def test_values_that_cannot_be_are_refused(harm: str, tmp_path: Path) -> None:
     find(tmp_path, most=1)
@@ -289,6 +293,7 @@ def test_a_search_has_converged_when_twenty_generations_gained_less_than_a_hundr
     assert gain([2.0, 1.0, *[0.995] * WINDOW]) == pytest.approx(0.005)
 
 
+@pytest.mark.slow
 def test_the_table_the_picture_and_the_files_tell_the_search(tmp_path: Path) -> None:
     made = genetic.make(silent, seed=SEED, generations=1, cases=[SMALL], kept=tmp_path / "kept")
     assert made.status == "the search on the hemisphere has not converged: 1 of at least 21 generations"

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 import rodshell as rs
-from rodshell.contact.bound import BoundToTarget
+from rodshell.contact.static import BoundToTarget
 from rodshell.model import Assembly, Shell
 from rodshell.rods.stretch import Stretch
 
@@ -83,7 +83,7 @@ def test_bound_drape_converges_in_few_factorisations_to_a_certified_state(name):
     assert draped.report.negative_modes == 0
     assert draped.report.factorizations <= 8  # 3 to 5 were measured
     assert draped.report.max_strain < 2e-5
-    assert draped.max_gap < 1e-12 * draped.target.size
+    assert draped.figures.max_gap < 1e-12 * draped.target.size
 
 
 @every_case
@@ -199,8 +199,9 @@ def test_pulls_are_the_nodes_that_the_target_would_have_to_hold():
         if cut is not None:
             s = draped.mesh.stations[draped.mesh.rod_slice(k)]
             on_target[draped.mesh.nodes_of(k)[(s > cut.start - 1e-9) & (s < cut.end + 1e-9)]] = True
-    assert draped.pulls == np.count_nonzero(push[on_target] < -1e-6 * np.abs(push).max())
-    assert 0 < draped.pulls < on_target.sum()  # rods of a net are straighter than the sphere near the rim
+    pulls = draped.figures.contact_pulls
+    assert pulls == np.count_nonzero(push[on_target] < -1e-6 * np.abs(push).max())
+    assert 0 < pulls < on_target.sum()  # rods of a net are straighter than the sphere near the rim
 
 
 class Lagrangian:
@@ -236,6 +237,7 @@ class Lagrangian:
         return dense_directions(self.constraint.freedom(x)).T @ self.twin.gradient(x, forces).ravel()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hemisphere", "ellipsoid, turned", "hill"])
 def test_hessian_with_the_surfaces_curvature_is_the_derivative_of_the_gradient_along_the_surface(name):
     lagrangian = Lagrangian(drape_case(name, edge=0.017), 0.0)
@@ -278,7 +280,7 @@ def test_scale_and_material_do_not_enter(scale):
     large = rs.drape(layout_of(spacing=0.05 * scale, edge=0.0125 * scale), rod, target)
     np.testing.assert_allclose(large.positions / scale, small.positions, rtol=0, atol=SAME * 0.2)
     assert large.report.factorizations == small.report.factorizations
-    assert large.pulls == small.pulls
+    assert large.figures.contact_pulls == small.figures.contact_pulls
 
 
 def test_hemisphere_keeps_the_symmetry_of_the_square_grid():
@@ -361,6 +363,7 @@ def test_end_directions_point_outwards_and_down_along_the_rods():
             np.testing.assert_allclose(boundary.tangents[2 * k : 2 * k + 2], [[0, 0, -1]] * 2, rtol=0, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_many_short_edges_take_no_more_factorisations_than_few_long_ones():
     """Bending outweighs a penalty that does not follow the edge length: forces then settle slowly."""
     few, many = (

@@ -4,8 +4,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
-from rodshell.case.table import Table
-from rodshell.case.values import Angles, Coordinate, Factor, Length, Point3, Size, Unit
+from rodshell.case.values import Angles, Coordinate, Factor, Length, Point3, Size, Table, Unit
 
 if TYPE_CHECKING:
     from rodshell.targets import Target
@@ -135,6 +134,12 @@ class HeightsTable(PlacedTable):
         from rodshell.targets import heights_from
 
         return heights_from(self.file, size=self.size, height=self.height, **self.options())
+
+
+class HeldTarget(Table):
+    """In place of a target that no key describes: a Python function, a mesh made in Python, a table of rods."""
+
+    kind: Literal["python", "table"]
 
 
 TargetTable = (

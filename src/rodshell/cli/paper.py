@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rodshell.cli.outcome import deliver, force_option, output_folder
-from rodshell.cli.progress import Progress, announce_compilation
+from rodshell.cli.options import FORCE, QUIET
+from rodshell.cli.reporting import Progress, announce_compilation, deliver, output_folder
 from rodshell.errors import InputError
 from rodshell.paper import FIGURES, reserved
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))
 @click.argument("figure", metavar="FIGURE|all")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the figure; default out/FIGURE; of all: DIR/FIGURE each.")
-@force_option
+@FORCE
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, a line for each figure.")
-@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+@QUIET
 @click.option("--seed", type=click.IntRange(min=0), help="genetic: search anew from this seed, or go on with that.")
 @click.option("--target", metavar="NAME", help="genetic: this target only.")
 @click.option("--jobs", type=click.IntRange(min=1), help="genetic: processes of a search; default 1.")

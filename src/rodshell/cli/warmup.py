@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rodshell.cli.progress import UNKEPT, Progress
+from rodshell.cli.options import QUIET
+from rodshell.cli.reporting import UNKEPT, Progress
 from rodshell.errors import InputError
 from rodshell.uncached import kernels_are_kept
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+@QUIET
 def command(quiet: bool) -> int:
     """Compile all kernels now, once, instead of in the first job of each kind.
 
@@ -75,7 +76,7 @@ def _forms() -> None:
     target = rs.Hemisphere(radius=0.2)
     layout = rs.GridLayout.orthogonal(spacing=0.06, edge=0.02)
     form = rs.find_form(target, layout, _rod())
-    rs.find_form(target, layout, _rod(), start=form)
+    rs.find_form(target, layout, _rod(), warm_start=form)
     rs.find_form(rs.HeightField(formula="0.1 - x**2 - y**2", domain=rs.Rectangle((0.4, 0.3))), layout, _rod())
 
 
@@ -112,7 +113,7 @@ def _meshes() -> None:
 def _gravity() -> None:
     import rodshell as rs
 
-    rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method="gravity")
+    rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method=rs.Gravity())
 
 
 def _falls() -> None:
@@ -123,9 +124,9 @@ def _falls() -> None:
         for joint in (rs.Ball(), rs.Linker()):
             step = 1e-4 if isinstance(coupling, rs.ExplicitPenalty) else 5e-3
             fall = rs.Fall(coupling=coupling, duration=8 * step, time_step=step)
-            rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method="paper", joint=joint, fall=fall)
+            rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method=fall, joint=joint)
     rubbing = rs.Fall(friction=0.3, duration=0.2, time_step=1e-2, height=1e-3)
-    rs.drape(_few(), _rod(), rs.Ellipsoid(a=0.2, b=0.15, c=0.12), method="paper", fall=rubbing)
+    rs.drape(_few(), _rod(), rs.Ellipsoid(a=0.2, b=0.15, c=0.12), method=rubbing)
 
 
 def _single_rods() -> None:
@@ -138,8 +139,8 @@ def _single_rods() -> None:
     for section, twist in ((round_section, False), (round_section, True), (oval, True)):
         one = rs.Rod(section, rs.Material(youngs_modulus=1e7, density=1e3))
         rod = rs.ElasticRod.of(straight, one, clamped=("start",), twist=twist)
-        rs.solve_rod(rod, forces={-1: (0.0, 0.0, -1e-4)})
-        motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),))
+        rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0.0, 0.0, -1e-4)}))
+        motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
         rs.simulate(motion, rod.state(), until=4e-3, step=1e-3)
 
 

@@ -12,9 +12,9 @@ import scipy
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
-from rodshell.formfinding import Agreement, Draped, Footprint, FoundForm, PoppedTable
-from rodshell.formfinding.bound import shape_of_net
-from rodshell.formfinding.flatness import is_flat
+from rodshell.formfinding import Agreement, Draped, Footprint, PatchForm
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod
@@ -24,7 +24,7 @@ from rodshell.targets import Target
 States = dict[str, NDArray[Any]]
 
 
-def form_result(form: FoundForm) -> dict[str, Any]:
+def form_result(form: PatchForm) -> dict[str, Any]:
     """result.json of a form, SI units; the keys are those of the documentation's page on files."""
     return {
         **head(form.target.name, form.status, form.warnings),
@@ -49,32 +49,32 @@ def target_table(target: Target, flat: bool) -> dict[str, Any]:
 def drape_table(draped: Draped) -> dict[str, Any]:
     """Figures of a drape."""
     drape: dict[str, Any] = {
-        "method": draped.method,
+        "method": draped.method.name,
         "status": draped.report.status.value,
         "dofs": draped.report.dofs,
         "levels": [_level(level) for level in draped.levels],
         "seconds": sum(level.seconds for level in draped.levels),
         "force_residual": draped.report.force_residual,
         "max_strain": draped.report.max_strain,
-        "max_gap": draped.max_gap,
+        "max_gap": draped.figures.max_gap,
         "negative_modes": draped.report.negative_modes,
-        "min_angle_deg": degrees(draped.min_angle),
-        "min_angle_at": list(draped.min_angle_at),
-        "contact_pulls": draped.pulls,
+        "min_angle_deg": degrees(draped.figures.min_angle),
+        "min_angle_at": list(draped.figures.min_angle_at),
+        "contact_pulls": draped.figures.contact_pulls,
     }
     if draped.rest is not None:
         drape["fall"] = asdict(draped.rest)
     if draped.eccentricity:
         drape["eccentricity"] = draped.eccentricity
-    if draped.strong_bending is not None:
-        drape["strong_bending"] = asdict(draped.strong_bending)
-    if draped.own_ends is not None:
-        off = np.abs(draped.own_ends)
+    if draped.figures.strong_bending is not None:
+        drape["strong_bending"] = asdict(draped.figures.strong_bending)
+    if draped.figures.net_deviation is not None:
+        off = np.abs(draped.figures.net_deviation)
         drape["own_ends"] = {"max": float(off.max()), "median": float(np.median(off))}
     return drape
 
 
-def form_states(form: FoundForm) -> States:
+def form_states(form: PatchForm) -> States:
     """states.npz of a form."""
     target = form.target
     states = _mesh_states(form.footprint)
@@ -92,7 +92,7 @@ def _mesh_states(footprint: Footprint) -> States:
     return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
 
 
-def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
+def table_result(table: PatchForm, name: str) -> dict[str, Any]:
     """result.json of a popped-up table of rods."""
     return {
         **head(name, table.status, table.warnings),
@@ -103,7 +103,7 @@ def table_result(table: PoppedTable, name: str) -> dict[str, Any]:
     }
 
 
-def table_states(table: PoppedTable) -> States:
+def table_states(table: PatchForm) -> States:
     """states.npz of a popped-up table of rods."""
     return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from rodshell.checks import Checks
-from rodshell.formfinding.bound import shape_of_net
-from rodshell.formfinding.flatness import is_flat
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
-from rodshell.formfinding.sewn import SewnForm
+from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.output.result import (
     States,
@@ -23,7 +23,7 @@ from rodshell.output.result import (
 )
 
 
-def sewn_result(form: SewnForm) -> dict[str, Any]:
+def sewn_result(form: PatchedForm) -> dict[str, Any]:
     """result.json of a sewn form, SI units: that of one shell, with `patches` and `seams`."""
     nets = [one.net for one in form.laid.values()]
     tightest = min(nets, key=lambda net: net.min_angle)
@@ -40,24 +40,24 @@ def sewn_result(form: SewnForm) -> dict[str, Any]:
         "end_tangents": form.boundary.tangents,
         "agreement": {ends: agreement_table(gap) for ends, gap in form.agreement.items()},
         "drape": _drape([drape_table(one.draped) for one in form.found.values()]),
-        "pop_up": {ends: popped_table(report, "draped") for ends, (_, report) in form.popped.items()},
+        "pop_up": {ends: popped_table(shell.report, shell.start) for ends, shell in form.popped.items()},
     }
 
 
-def sewn_states(form: SewnForm) -> States:
+def sewn_states(form: PatchedForm) -> States:
     """states.npz of a sewn form."""
     mesh = form.footprint.mesh
     states: States = {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
     states["draped"] = form.draped
     states["gap_draped"] = form.target.gap(form.draped).distance
-    for ends, (positions, _) in form.popped.items():
-        states[f"popped_{ends}"] = positions
+    for ends, shell in form.popped.items():
+        states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:
             states[f"gap_{ends}"] = form.agreement[ends].gaps
     return states
 
 
-def with_seam_forces(result: Mapping[str, Any], form: SewnForm, checks: Checks) -> dict[str, Any]:
+def with_seam_forces(result: Mapping[str, Any], form: PatchedForm, checks: Checks) -> dict[str, Any]:
     """The same result, its seams with what they carry: at each meeting the sum of both rods' support forces [N]."""
     row = {rod.name: k for k, rod in enumerate(form.footprint.rods)}
     seams = [{**seam, "forces": {}} for seam in result["seams"]]
@@ -77,7 +77,7 @@ def _index(row: Mapping[str, int], end: End) -> int:
     return 2 * row[f"{end.patch}-{end.rod}"] + end.side
 
 
-def _patch(form: SewnForm, name: str) -> dict[str, Any]:
+def _patch(form: PatchedForm, name: str) -> dict[str, Any]:
     laid, found = form.laid[name], form.found[name]
     return {
         "id": name,
@@ -96,7 +96,7 @@ def _patch(form: SewnForm, name: str) -> dict[str, Any]:
     }
 
 
-def _seam(form: SewnForm, k: int) -> dict[str, Any]:
+def _seam(form: PatchedForm, k: int) -> dict[str, Any]:
     here = [one for one in form.meetings if one.seam == k]
     return {
         "points": form.seams[k].points,

@@ -11,8 +11,8 @@ from rodshell.output.archive import GAPS, SHELLS, Archive
 CAPTIONS = {
     "flat": "Flat, as cut and laid out",
     "draped": "Draped on the target",
-    "popped_pinned": "Popped up, pinned ends (free to turn)",
-    "popped_clamped": "Popped up, clamped ends (directions held)",
+    "popped_pinned": "PopUp up, pinned ends (free to turn)",
+    "popped_clamped": "PopUp up, clamped ends (directions held)",
 }
 STAGE = "stage_"
 

@@ -26,7 +26,7 @@ PREFERRED = ("clamped", "pinned")  # the shell that the schedules tell of
 
 def sharpest(checks: Checks) -> Floats | None:
     """(k,) sharpest bend [1/m] of each entry of `rod_nodes` in any shell and on the way up; None: nothing checked."""
-    known = [bent.curvature for bent in (*checks.bending.values(), *checks.on_the_way)]
+    known = [bent.curvature for bent in (*checks.bending.values(), *checks.deployment_bending)]
     return np.max(known, axis=0) if known else None
 
 
@@ -48,7 +48,7 @@ def workshop_result(
         }
         if final is not None:
             entry |= _bent([checks.bending[final]], here, strength)
-            entry["pop_up"] = _bent([*checks.bending.values(), *checks.on_the_way], here, strength)
+            entry["pop_up"] = _bent([*checks.bending.values(), *checks.deployment_bending], here, strength)
     return {
         **result,
         "warnings": [
@@ -84,9 +84,9 @@ def workshop_states(checks: Checks) -> dict[str, NDArray[Any]]:
     if checks.deployment is not None:
         states["history_share"] = checks.deployment.share
         states["history"] = checks.deployment.positions
-        states["history_curvature"] = _stacked([bent.curvature for bent in checks.on_the_way])
-        if all(bent.stress is not None for bent in checks.on_the_way):
-            states["history_stress"] = _stacked([bent.stress for bent in checks.on_the_way])
+        states["history_curvature"] = _stacked([bent.curvature for bent in checks.deployment_bending])
+        if all(bent.stress is not None for bent in checks.deployment_bending):
+            states["history_stress"] = _stacked([bent.stress for bent in checks.deployment_bending])
     return states
 
 
@@ -125,12 +125,12 @@ def _bending(checks: Checks, mesh: GridMesh, strength: float | None) -> dict[str
     for ends, bent in checks.bending.items():
         table[ends] = {**_bent([bent], everywhere, strength), **_place(bent, mesh)}
     if checks.deployment is not None:
-        table["pop_up"] = _bent(list(checks.on_the_way), everywhere, strength)
-        sharpest_stage = int(np.argmax([bent.curvature.max() for bent in checks.on_the_way]))
+        table["pop_up"] = _bent(list(checks.deployment_bending), everywhere, strength)
+        sharpest_stage = int(np.argmax([bent.curvature.max() for bent in checks.deployment_bending]))
         table["pop_up"]["share"] = checks.deployment.share[sharpest_stage]
-    if checks.before_the_end:
-        share, worst = max(checks.before_the_end, key=lambda stage: float(_stressed(stage[1]).max()))
-        stages = [bent for _, bent in checks.before_the_end]
+    if checks.stages_below_final:
+        share, worst = max(checks.stages_below_final, key=lambda stage: float(_stressed(stage[1]).max()))
+        stages = [bent for _, bent in checks.stages_below_final]
         table["deployment"] = {**_bent(stages, everywhere, strength), "share": share, **_place(worst, mesh)}
     return table
 
@@ -149,8 +149,8 @@ def _place(bent: Bending, mesh: GridMesh) -> dict[str, Any]:
 
 def _contact(checks: Checks) -> dict[str, Any]:
     table: dict[str, Any] = {ends: asdict(met) for ends, met in checks.contact.items()}
-    if checks.nearest_on_the_way is not None:
-        share, met = checks.nearest_on_the_way
+    if checks.closest_stage is not None:
+        share, met = checks.closest_stage
         table["deployment"] = {**asdict(met), "share": share}
     return table
 
@@ -194,7 +194,7 @@ def _deployment(checks: Checks) -> dict[str, Any]:
     assert way is not None
     stages = [
         {"share": share, "height": float(np.ptp(positions[:, 2])), **_bent([bent], slice(None), None)}
-        for share, positions, bent in zip(way.share, way.positions, checks.on_the_way, strict=True)
+        for share, positions, bent in zip(way.share, way.positions, checks.deployment_bending, strict=True)
     ]
     return {
         "ends": "pinned",

@@ -16,9 +16,9 @@ from rodshell.joints import ExplicitPenalty
 from rodshell.layout import mesh_grid
 from rodshell.model import Shell
 from rodshell.paper.drapes import LENGTH, ROD, Case
-from rodshell.solve.banded import Banded
-from rodshell.solve.constraint import NO_CURVATURE
 from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.newton_matrix import Banded
+from rodshell.solve.problem import NO_CURVATURE
 
 
 class BareSolves:

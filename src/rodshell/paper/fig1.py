@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.formfinding import FoundForm, find_stages
+from rodshell.formfinding import PatchForm, find_stages
 from rodshell.output.folder import ResultFolder
 from rodshell.output.svg import tag
 from rodshell.paper.drapes import ROD, Case, Progress
@@ -37,7 +37,7 @@ class PoppedCase:
     """One shell, and the seconds it took from target to popped up, pinned and clamped."""
 
     case: Case
-    form: FoundForm
+    form: PatchForm
     seconds: float
 
     @property

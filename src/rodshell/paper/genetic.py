@@ -16,7 +16,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding import Agreement, FoundForm, agreement, find_stages
+from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
 from rodshell.formfinding.progress import silent
 from rodshell.output.folder import ResultFolder
 from rodshell.paper.charts import Chart, Series, charts_svg
@@ -231,7 +231,7 @@ def convergence_svg(comparisons: Sequence[Comparison]) -> str:
     return charts_svg([chart], "\N{WHITE DIAMOND} the direct method, one run")
 
 
-def _direct(case: Case) -> FoundForm:
+def _direct(case: Case) -> PatchForm:
     return find_stages(case.target, case.layout, ROD, ends=("pinned",))
 
 

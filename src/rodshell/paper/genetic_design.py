@@ -10,8 +10,8 @@ from math import inf
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding import FoundForm, agreement, pop_up
-from rodshell.formfinding.popup import Popped
+from rodshell.formfinding import PatchForm, agreement, pop_up
+from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
 from rodshell.layout.flatgrid import Family
@@ -48,7 +48,7 @@ class Design:
     upper: Floats
 
     @staticmethod
-    def of(direct: FoundForm) -> "Design":
+    def of(direct: PatchForm) -> "Design":
         """The design with the target, the grid and the boundary of a direct result."""
         target, lines, points = direct.target, direct.footprint.rods, direct.trimmed.boundary.points
         orbit = _orbits(target, lines, points)
@@ -78,7 +78,7 @@ class Design:
         low, high = np.ceil((rod.start + clear - first) / step), np.floor((rod.end - clear - first) / step)
         return [first + step * k for k in range(int(low), int(high) + 1)]
 
-    def pop_up(self, variables: Floats, *, patience: float = inf) -> Popped | None:
+    def pop_up(self, variables: Floats, *, patience: float = inf) -> PopUp | None:
         """The whole shell popped up from flat, pinned; None where a rod would swing or `patience` iterations are over.
 
         Always from flat: a shell has other stable states than the one that it reaches from there.
@@ -143,7 +143,7 @@ def _heights(target: Target, points: Floats) -> Floats:
     """(m,) the target's greatest height over the chord of each rod [m]."""
     t = np.linspace(0.02, 0.98, 49)[:, None]
     ends = points.reshape(-1, 2, 3)
-    return np.array([np.nanmax(target.height((a + t * (b - a))[:, :2])) - min(a[2], b[2]) for a, b in ends])
+    return np.array([np.nanmax(target.height_at((a + t * (b - a))[:, :2])) - min(a[2], b[2]) for a, b in ends])
 
 
 def _orbits(target: Target, lines: tuple[FlatRod, ...], points: Floats) -> Ints:

@@ -102,7 +102,7 @@ def _body(target: Target) -> Floats:
     half = target.size
     grid = np.linspace(-half, half, 161)
     xy = np.column_stack([one.ravel() for one in np.meshgrid(grid, grid)])
-    points = np.column_stack([xy, target.height(xy)])
+    points = np.column_stack([xy, target.height_at(xy)])
     points = points[np.isfinite(points[:, 2])]
     points = points[target.margin(points) >= 0]
     if target.base is None:

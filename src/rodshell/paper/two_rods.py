@@ -23,10 +23,10 @@ from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model.shell import Shell
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, Rod
-from rodshell.solve.constraint import Supports
 from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.linear_stability import step_limit
+from rodshell.solve.problem import Supports
 from rodshell.solve.simulate import simulate
-from rodshell.solve.step_limit import step_limit
 
 Demonstration = Literal["twisting", "bending"]
 

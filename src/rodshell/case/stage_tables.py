@@ -1,0 +1,233 @@
+"""The tables of a case's stages: layout, drape, pop-up, seams, checks, fabrication and drawings."""
+
+from pathlib import Path, PureWindowsPath
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from rodshell.case.values import (
+    Acceleration,
+    Angle,
+    AngleOrAuto,
+    AngleStiffness,
+    Coordinate,
+    Counts,
+    Duration,
+    IsoDate,
+    Length,
+    LengthOrAuto,
+    Lengths,
+    LengthsOrAuto,
+    NodeStiffness,
+    Point,
+    PointOrAuto,
+    Polylines,
+    Share,
+    Stress,
+    Table,
+    Unit,
+    Whole,
+    polylines,
+    unit,
+)
+from rodshell.errors import InputError
+from rodshell.units import rounded_down, shown
+
+if TYPE_CHECKING:
+    from rodshell.formfinding.methods import Method
+    from rodshell.formfinding.patches import PatchLayout
+    from rodshell.layout import GridLayout
+    from rodshell.targets import Target
+
+
+class LayoutTable(Table):
+    rods: Counts = Field(default="auto", description='rods along x and y: 17x17, or "auto" for all that touch')
+    spacing: LengthsOrAuto = Field(
+        default="auto", description='between neighbouring rods: one length, or u,v, or "auto"'
+    )
+    length: LengthOrAuto = Field(default="auto", description='length of every rod before trimming, or "auto"')
+    edge: LengthOrAuto = Field(default="auto", description='longest edge of the mesh, or "auto"')
+    rotate: AngleOrAuto = Field(default=0.0, description='turn of the grid seen from above, or "auto": the best found')
+    offset: Point = Field(default=(0.0, 0.0), description="shift x,y of the lattice against the axes")
+
+    def build(self, target: "Target | None" = None) -> "GridLayout":
+        """The layout; a spacing "auto" stands for some 17 rods each way over the target."""
+        from rodshell.layout import GridLayout
+
+        spacing = self.spacing
+        if spacing == "auto":
+            spacing = (rounded_down((target.size if target else 0.2) / 8),) * 2
+        rotate = 0.0 if self.rotate == "auto" else self.rotate
+        return GridLayout.orthogonal(**self.model_dump() | {"spacing": spacing, "rotate": rotate})
+
+
+FALLING = ("height", "coupling", "C1", "C2", "time_step", "duration", "friction", "drag", "frames")
+IDLE: dict[str, tuple[str, ...]] = {"bound": ("gravity", *FALLING), "gravity": FALLING, "paper": ()}
+"""Keys of [drape] that a method does not use."""
+
+
+class DrapeTable(Table):
+    method: Literal["bound", "gravity", "paper"] = Field(
+        default="bound", description="slide on the target, hang on it at rest, or fall on it in time"
+    )
+    anchor: PointOrAuto | None = Field(
+        default=None, description='point x,y where the axes cross; default: the highest; or "auto"'
+    )
+    objective: Literal["shear", "curvature", "gap"] = Field(
+        default="shear", description='what an "auto" anchor or rotate makes smallest'
+    )
+    gravity: Acceleration = Field(default=9.81, description="acceleration of gravity, for methods gravity and paper")
+    height: Length = Field(default=0.05, description="of a fall (paper); an equilibrium does not depend on it")
+    coupling: Literal["shared", "implicit", "explicit"] = Field(
+        default="shared", description="how falling rods hold together: one node at a joint, or springs"
+    )
+    C1: NodeStiffness | None = Field(default=None, description="of the springs between nodes; default from the rods")
+    C2: AngleStiffness | None = Field(default=None, description="of the springs between twist angles; default as C1")
+    time_step: Duration | None = Field(default=None, description="of a fall; default 10 ms, or what springs bear")
+    duration: Duration | None = Field(default=None, description="longest fall; default 6 s at a size of 0.2 m")
+    friction: Share = Field(default=0.0, description="Coulomb's coefficient between falling rods and target")
+    drag: Share = Field(default=0.0, description="rate in 1/s at which falling rods lose velocity to the air")
+    frames: str | None = Field(default=None, description="folder below --out for the frames of a fall; default: none")
+
+    @field_validator("frames")
+    @classmethod
+    def _inside(cls, value: str | None) -> str | None:
+        """A case from somebody else must not write to any place."""
+        parts = PureWindowsPath("frames" if value is None else value).parts  # it knows both kinds of paths
+        if not parts or ".." in parts or any(one in part for part in parts for one in "/\\:"):
+            raise ValueError('frames are kept in the result\'s own folder: give a name in it such as "frames"')
+        return value
+
+    @model_validator(mode="after")
+    def _uses_all(self) -> Self:
+        for name in IDLE[self.method]:
+            methods = " or ".join(f'"{method}"' for method in IDLE if name not in IDLE[method])
+            self._refuse(name, f'method "{self.method}" has no {name}: leave it out, or set drape.method to {methods}')
+        if self.coupling == "shared":
+            for name in ("C1", "C2"):
+                springs = 'leave it out, or set drape.coupling to "implicit" or "explicit"'
+                self._refuse(name, f'coupling "shared" has no springs: {springs}')
+        return self
+
+    def _refuse(self, name: str, why: str) -> None:
+        """ValueError where a key that does nothing is set."""
+        if getattr(self, name) != type(self).model_fields[name].default:
+            raise ValueError(f"drape.{name} = {shown(getattr(self, name))}: {why}")
+
+    def build(self) -> "Method":
+        """The method with its options."""
+        from rodshell.formfinding.methods import Bound, Fall, Gravity
+        from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
+
+        if self.method == "bound":
+            return Bound()
+        if self.method == "gravity":
+            return Gravity(acceleration=self.gravity)
+        coupling: Coupling = SharedDofs()
+        if self.coupling != "shared":
+            penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
+            coupling = penalty(C1=self.C1, C2=self.C2)
+        return Fall(
+            acceleration=self.gravity, height=self.height, coupling=coupling, time_step=self.time_step,
+            duration=self.duration, friction=self.friction, drag=self.drag, stream=self.frames,
+        )  # fmt: skip
+
+
+class PopUpTable(Table):
+    ends: Literal["pinned", "clamped", "both"] = Field(default="both", description="how the rod ends are held")
+
+
+class PatchTable(Table):
+    """What a patch has of its own."""
+
+    name: str = Field(description="name of the patch: A, B, ... from left to right")
+    anchor: Point | None = Field(default=None, description="point x,y where its axes cross; default: its middle")
+    rotate: Angle | None = Field(default=None, description="turn of its grid seen from above; default: as the whole's")
+    spacing: Lengths | None = Field(default=None, description="between neighbouring rods: one length, or u,v")
+
+    def build(self) -> "PatchLayout":
+        from rodshell.formfinding.patches import PatchLayout
+
+        return PatchLayout(self.anchor, self.rotate, self.spacing)
+
+
+class SeamsTable(Table):
+    lines: Polylines = Field(default=(), description='lines x,y; x,y that cut the target, prolonged; "|" between two')
+    file: str | None = Field(default=None, description="OBJ or DXF with such lines")
+    unit: Unit = Field(default=1.0, description="the unit of that file, such as mm")
+    patches: tuple[PatchTable, ...] = Field(default=(), description="what patches, by their names, have of their own")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_now(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """The lines of the file become lines of the case, which then needs the file no longer."""
+        if given.get("file") is None:
+            return given
+        from rodshell.targets.mesh_files import read_lines
+
+        rest = {key: value for key, value in given.items() if key not in ("file", "unit")}
+        try:
+            drawn = read_lines(Path(given["file"]), unit(given.get("unit", 1.0)))
+        except InputError as reason:
+            raise InputError(f"seams.file = {shown(given['file'])}: {reason}") from None
+        return {**rest, "lines": [*polylines(given.get("lines", ())), *(line[:, :2].tolist() for line in drawn)]}
+
+    @model_validator(mode="after")
+    def _uses_all(self) -> Self:
+        if self.unit != 1.0:  # with a file there is none left
+            raise ValueError("seams.unit is the unit of seams.file, which is missing: leave it out, or give the file")
+        if self.patches and not self.lines:
+            raise ValueError("seams.patches needs seams: give seams.lines or seams.file, or leave it out")
+        return self
+
+    def own(self) -> "dict[str, PatchLayout]":
+        """What patches have of their own, by name.
+
+        Raises
+        ------
+        InputError : two tables for one patch.
+        """
+        names = [patch.name for patch in self.patches]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"seams.patches has patch {shown(name)} twice: put all that it has in one table")
+        return {patch.name: patch.build() for patch in self.patches}
+
+
+class ChecksTable(Table):
+    strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
+    stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
+    shear_strength: Stress | None = Field(
+        default=None, description="in shear along the fibres; default: as von Mises has it"
+    )
+
+
+class FabricationTable(Table):
+    end_allowance: Coordinate = Field(default=0.0, description="added to each end of a rod, to be held by its support")
+    stock_length: Length | None = Field(
+        default=None, description="of the bars that rods are cut from; default: no limit"
+    )
+    kerf: Coordinate = Field(default=0.0, description="lost at each saw cut")
+
+
+class LayersTable(Table):
+    """Other names for the layers of DXF files."""
+
+    cut: str | None = Field(default=None, description="name of the DXF layer CUT")
+    mark: str | None = Field(default=None, description="name of the DXF layer MARK")
+    label: str | None = Field(default=None, description="name of the DXF layer LABEL")
+    boundary_flat: str | None = Field(default=None, description="name of the DXF layer BOUNDARY-FLAT")
+    boundary_final: str | None = Field(default=None, description="name of the DXF layer BOUNDARY-FINAL")
+    dim: str | None = Field(default=None, description="name of the DXF layer DIM")
+    title: str | None = Field(default=None, description="name of the DXF layer TITLE")
+
+
+class DrawingsTable(Table):
+    paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(default="A3", description="of the PDF's sheets, landscape")
+    project: str = Field(default="", description="for the title block")
+    revision: str = Field(default="", description="for the title block")
+    tolerance: Length | None = Field(default=None, description="of lengths; they are shown to a tenth of it or finer")
+    layers: LayersTable = LayersTable()
+    name: str = Field(default="", description="title of the drawings; default: the target's name")
+    author: str = Field(default="", description="for the title block: who drew or answers for the drawings")
+    date: IsoDate = Field(default="", description='for the title block, "2026-11-22"; default: the day of writing')
