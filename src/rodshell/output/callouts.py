@@ -7,7 +7,20 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.output.drawing import LETTER, SMALL, Text
-from rodshell.output.labels import CLOSE, Label, Room, fits, lines_near, nearby, off_its_mark, spread, take, upright
+from rodshell.output.labels import (
+    CLOSE,
+    THIN,
+    Label,
+    Room,
+    fits,
+    lines_near,
+    nearby,
+    off_its_mark,
+    spread,
+    take,
+    thin,
+    upright,
+)
 
 SIZES = (1.0, 0.9, 0.82, SMALL)  # of the names, over the usual one: the largest at which all of an outline find room
 OFF = 1.3  # from a place to where its name may begin
@@ -133,7 +146,7 @@ def _free(name: str, place: Floats, start: Floats, way: Floats, size: float, roo
     lines = lines_near(lines, start, 2 * half + CLOSE * size) if near else lines
     for step in range(CLOSE if near and room.free(foot) else 0):
         label = Label(name, start + (half + 0.5 * step * size) * way, angle, start, moved=True)
-        if fits(label, size, room, lines):
+        if fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):
             room.take(foot)
             take(label, size, room)
             return label
