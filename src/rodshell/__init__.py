@@ -61,8 +61,8 @@ if TYPE_CHECKING:
     from rodshell.model.elastic_rod import ElasticRod, RodStrains
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
-    from rodshell.output.archive import Archive, read
-    from rodshell.output.takeaway import DrawingStyle, Takeaway
+    from rodshell.output.options import DrawingStyle, OutputOptions
+    from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
     from rodshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
@@ -107,8 +107,8 @@ _HOMES = {
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net", "sphere_net_end", "sphere_net_rod"),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
-    "rodshell.output.archive": ("Archive", "read"),
-    "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
+    "rodshell.output.options": ("DrawingStyle", "OutputOptions"),
+    "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
     "rodshell.solve.forces": ("Damping", "ExplicitForce", "Gravity", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
@@ -127,10 +127,10 @@ __all__ = [
     "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity",
     "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
     "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutOfTimeError",
-    "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp", "Rectangle",
-    "RectangularSection", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn", "SharedDofs", "Shell",
-    "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net",
-    "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table",
+    "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp",
+    "Rectangle", "RectangularSection", "Results", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn",
+    "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed", "Tube", "Verdict", "agreement",
+    "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table",
     "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from",
     "trim",
 ]  # fmt: skip

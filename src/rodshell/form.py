@@ -23,13 +23,21 @@ from rodshell.formfinding.progress import Progress, limited, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
 from rodshell.joints import Joint
 from rodshell.layout import FlatGrid, GridLayout
-from rodshell.output import Archive
-from rodshell.output.inputs import read_inputs
-from rodshell.output.result import States, form_result, form_states, table_result, table_states
-from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
-from rodshell.output.takeaway import Takeaway
-from rodshell.output.verdict import Verdict, verdict
-from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
+from rodshell.output.files import save
+from rodshell.output.options import OutputOptions
+from rodshell.results import Archive, Results, Verdict
+from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
+from rodshell.results.from_form import (
+    States,
+    form_results,
+    form_states,
+    patches_results,
+    patches_states,
+    table_results,
+    table_states,
+    with_seam_forces,
+)
+from rodshell.results.inputs import read_inputs
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.targets.seam import Seam
@@ -50,7 +58,7 @@ class _Judged:
     def verdict(self) -> Verdict:
         """What the result is worth, all checks done: good, check or unbuildable, with the reasons.
 
-        For a strength or other options of the checks: `archive(takeaway=...).verdict`.
+        For a strength or other options of the checks: `archive(options=...).verdict`.
         """
         return self._checked.verdict
 
@@ -62,15 +70,15 @@ class _Judged:
 class Form(_Judged, FoundForm):
     """A form that was found: its stages, and its files."""
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json before anything was checked."""
-        return form_result(self)
+    def results(self) -> Results:
+        """The typed content of result.json before anything was checked."""
+        return form_results(self)
 
     def archive(
         self,
         case_toml: str | None = None,
         *,
-        takeaway: Takeaway | None = None,
+        options: OutputOptions | None = None,
         inputs: Mapping[str, bytes] | None = None,
         progress: Progress = silent,
     ) -> Archive:
@@ -79,22 +87,22 @@ class Form(_Judged, FoundForm):
         case_toml : the input it came from, by default one made from the objects.
         inputs : contents of the files that it names, by their path in it; default: as they are now.
         """
-        takeaway = takeaway or Takeaway()
+        options = options or OutputOptions()
         if case_toml is None:
             draped = self.draped
             case_toml = case_text(
                 self.target, self.layout, self.rod, joint=self.joint,
                 method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
-                fall=draped.fall, ends=self.ends, takeaway=takeaway,
+                fall=draped.fall, ends=self.ends, options=options,
             )  # fmt: skip
-        return _archive(self, form_states(self), case_toml, takeaway, progress, inputs)
+        return _archive(self, form_states(self), case_toml, options, progress, inputs)
 
     def save(
         self,
         folder: str | PathLike[str],
         *,
         case_toml: str | None = None,
-        takeaway: Takeaway | None = None,
+        options: OutputOptions | None = None,
         kinds: Iterable[str] | None = None,
         force: bool = False,
     ) -> Path:
@@ -107,68 +115,68 @@ class Form(_Judged, FoundForm):
         ------
         OutputError : the folder cannot be written, or such files are there and `force` is False.
         """
-        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
+        return save(self.archive(case_toml, options=options), folder, kinds, force=force)
 
 
 class PoppedUp(_Judged, PoppedTable):
     """A table of rods that was popped up, and its files."""
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json before anything was checked."""
-        return table_result(self, "popup")
+    def results(self) -> Results:
+        """The typed content of result.json before anything was checked."""
+        return table_results(self, "popup")
 
-    def archive(self, *, takeaway: Takeaway | None = None, progress: Progress = silent) -> Archive:
+    def archive(self, *, options: OutputOptions | None = None, progress: Progress = silent) -> Archive:
         """Everything that is kept, checked and made ready to be built."""
-        return _archive(self, table_states(self), "", takeaway or Takeaway(), progress)
+        return _archive(self, table_states(self), "", options or OutputOptions(), progress)
 
     def save(
         self,
         folder: str | PathLike[str],
         *,
-        takeaway: Takeaway | None = None,
+        options: OutputOptions | None = None,
         kinds: Iterable[str] | None = None,
         force: bool = False,
     ) -> Path:
         """As `Form.save`."""
-        return self.archive(takeaway=takeaway).save(folder, kinds, force=force)
+        return save(self.archive(options=options), folder, kinds, force=force)
 
 
 class Sewn(_Judged, SewnForm):
     """A form in patches that are sewn together, and its files."""
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json before anything was checked."""
-        return sewn_result(self)
+    def results(self) -> Results:
+        """The typed content of result.json before anything was checked."""
+        return patches_results(self)
 
     def archive(
         self,
         case_toml: str | None = None,
         *,
-        takeaway: Takeaway | None = None,
+        options: OutputOptions | None = None,
         inputs: Mapping[str, bytes] | None = None,
         progress: Progress = silent,
     ) -> Archive:
         """All patches as one: everything that is kept, checked and made ready to be built; see `Form.archive`."""
-        takeaway = takeaway or Takeaway()
+        options = options or OutputOptions()
         if case_toml is None:
             case_toml = case_text(
-                self.target, self.layout, self.rod, joint=self.joint, ends=self.ends, takeaway=takeaway, sewn=self
+                self.target, self.layout, self.rod, joint=self.joint, ends=self.ends, options=options, sewn=self
             )
-        takeaway.require_known_stress(self.rod, self.joint)
-        weight = takeaway.judged_by(self.rod).shear_weight
+        options.require_known_stress(self.rod, self.joint)
+        weight = options.judged_by(self.rod).shear_weight
         checks = joined_checks(
             {
                 name: check(
                     one.popped, self.rod,
-                    stages=takeaway.stages, shear_weight=weight, progress=progress,
+                    stages=options.stages, shear_weight=weight, progress=progress,
                 )
                 for name, one in self.found.items()
             },
             {ends: self._contact(ends) for ends in self.popped},
         )  # fmt: skip
-        result = with_seam_forces(self.result(), self, checks)
+        results = with_seam_forces(self.results(), self, checks)
         shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
-        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway, inputs)
+        return _kept(self, results, patches_states(self), checks, shapes, case_toml, options, inputs)
 
     def _contact(self, ends: Ends) -> Contact:
         """Of all patches."""
@@ -180,45 +188,42 @@ class Sewn(_Judged, SewnForm):
         folder: str | PathLike[str],
         *,
         case_toml: str | None = None,
-        takeaway: Takeaway | None = None,
+        options: OutputOptions | None = None,
         kinds: Iterable[str] | None = None,
         force: bool = False,
     ) -> Path:
         """As `Form.save`."""
-        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
+        return save(self.archive(case_toml, options=options), folder, kinds, force=force)
 
 
 def _archive(
-    job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress,
+    job: Form | PoppedUp, states: States, case_toml: str, options: OutputOptions, progress: Progress,
     inputs: Mapping[str, bytes] | None = None,
 ) -> Archive:  # fmt: skip
     """A job's result and states with its checks and its fabrication."""
-    takeaway.require_known_stress(job.rod, job.joint)
-    weight = takeaway.judged_by(job.rod).shear_weight
-    checks = check(job.popped, job.rod, stages=takeaway.stages, shear_weight=weight, progress=progress)
+    options.require_known_stress(job.rod, job.joint)
+    weight = options.judged_by(job.rod).shear_weight
+    checks = check(job.popped, job.rod, stages=options.stages, shear_weight=weight, progress=progress)
     shapes = {ends: shell.positions for ends, shell in job.popped.items()}
-    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway, inputs)
+    return _kept(job, job.results(), states, checks, shapes, case_toml, options, inputs)
 
 
 def _kept(
-    job: Form | PoppedUp | Sewn, result: dict[str, Any], states: States, checks: Checks, shapes: Mapping[Ends, Any],
-    case_toml: str, takeaway: Takeaway, inputs: Mapping[str, bytes] | None,
+    job: Form | PoppedUp | Sewn, results: Results, states: States, checks: Checks, shapes: Mapping[Ends, Any],
+    case_toml: str, options: OutputOptions, inputs: Mapping[str, bytes] | None,
 ) -> Archive:  # fmt: skip
-    mesh = job.footprint.mesh
-    final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
-    made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    judged = takeaway.judged_by(job.rod)
-    result = workshop_result(result, mesh, checks, made, judged.strength, judged.shear_strength)
-    result["bending"]["strength_of"] = judged.strength_of
-    if takeaway.rod_chosen:
-        result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
-    if checks.out_of_time and result["status"] == "converged":
-        result["status"] = checks.out_of_time
-    result["drawings"] = takeaway.drawings.parameters()
-    result["name"] = takeaway.drawings.name or result["name"]
-    result["verdict"] = verdict(result).table()
+    mesh, final = job.footprint.mesh, final_ends(checks)
+    shape = None if final is None else shapes[final]
+    fabricated = fabricate(mesh, job.rod, options.fabrication, curvature=sharpest(checks), final=shape)
+    strengths = options.judged_by(job.rod)
+    results = checked_results(
+        results, mesh, checks, fabricated,
+        strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
+    )  # fmt: skip
+    style = options.drawings
+    results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=options.rod_chosen)
     kept = read_inputs(case_toml) if inputs is None else inputs
-    return Archive(result, states | workshop_states(checks), case_toml, kept).as_stored()
+    return Archive(results, states | checked_states(checks), case_toml, kept)
 
 
 def find_form(

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from rodshell.output.verdict import Verdict, facts, verdict, verdict_of
+from rodshell.results import Verdict
+from rodshell.results.verdict import facts, verdict, verdict_of
 
 
 def good() -> dict[str, Any]:

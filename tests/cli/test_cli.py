@@ -24,10 +24,10 @@ from rodshell.cli import main
 from rodshell.cli.options import ALIASES
 from rodshell.cli.rodends import COLUMNS
 from rodshell.errors import NetLimitError
-from rodshell.output import folder as folder_module
-from rodshell.output import read
-from rodshell.output.archive import export
-from rodshell.output.folder import ResultFolder
+from rodshell.output import export
+from rodshell.results import Results, read
+from rodshell.results import folder as folder_module
+from rodshell.results.folder import ResultFolder
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -39,7 +39,7 @@ CROSS = [
 class FakeArchive:
     def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
         verdict = {"level": level, "reasons": ["the rods touch"]}
-        self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
+        self.results = Results.of({"format": "rodshell-result", "status": status, "verdict": verdict})
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
@@ -475,8 +475,8 @@ def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dom
     options = [word for key, value in wishes.items() for word in (f"--{key}", value)]
     for source in (["dome"], [write_table(Path("rods.csv"), CROSS), "--unit", "m"]):
         assert main(["popup", *source, *options]) == 0
-        told = FakeForm.told[-1]["takeaway"]
-        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).takeaway()
+        told = FakeForm.told[-1]["options"]
+        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).output_options()
 
 
 def test_popup_writes_only_the_kinds_that_are_asked_for(
@@ -600,7 +600,7 @@ def dome() -> Path:
 
 def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinder, dome: Path) -> None:
     """As of a target that was a Python function, or of a table of rods."""
-    from rodshell.output.result import rod_table
+    from rodshell.results.from_form import rod_type
 
     result = json.loads((dome / "result.json").read_text())
     (dome / "case.toml").write_text("# the target was a Python function\n")
@@ -608,7 +608,7 @@ def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinde
         rs.Rod(rs.Tube(radius=0.02, thickness=0.003), rs.Material.preset("gfrp")),
         rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=2.0, GJ=0.5, mass=0.3)),
     ):
-        told = result | {"rod": rod_table(rod), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
+        told = result | {"rod": rod_type(rod), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
         (dome / "result.json").write_text(json.dumps(told))
         assert main(["popup", str(dome), "--force", "-q"]) == 0
         (_, _, same), options = finder.calls[-1]

@@ -15,9 +15,9 @@ from sample_archive import sample_archive, table_archive
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.errors import InputError, OutputError
-from rodshell.output import read, write
-from rodshell.output.archive import export
+from rodshell.output import export, save
 from rodshell.output.files import DEFAULT, KINDS, read_kinds
+from rodshell.results import Results, read
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -29,7 +29,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("name", ["wished", "sample", "table"])
 def test_files_made_again_from_the_folder_are_the_same_bytes(name: str, tmp_path: Path) -> None:
     made = {"wished": wished, "sample": sample_archive, "table": table_archive}[name]()
-    first = write(made, tmp_path / "first")
+    first = save(made, tmp_path / "first")
     names = export(read(first), tmp_path / "again")
     again = contents(tmp_path / "again")
     assert set(names) == set(again)
@@ -39,8 +39,8 @@ def test_files_made_again_from_the_folder_are_the_same_bytes(name: str, tmp_path
 
 def test_an_archive_in_memory_is_what_a_reader_gets(tmp_path: Path) -> None:
     made = wished()
-    again = read(write(made, tmp_path / "dome"))
-    assert again.result == made.result
+    again = read(save(made, tmp_path / "dome"))
+    assert again.results.plain() == made.results.plain()
     for name, values in made.states.items():
         np.testing.assert_array_equal(again.states[name], values)
 
@@ -48,9 +48,9 @@ def test_an_archive_in_memory_is_what_a_reader_gets(tmp_path: Path) -> None:
 def test_numbers_of_the_files_come_from_the_archive(tmp_path: Path) -> None:
     """A rod renamed and a length changed in result.json show in table, drawing and model; nothing is computed anew."""
     made = archive("dome")
-    rods = json.loads(json.dumps(made.result["rods"]).replace('"U04"', '"LONG"'))
+    rods = json.loads(json.dumps(made.results.plain()["rods"]).replace('"U04"', '"LONG"'))
     rods[3] |= {"cut_length": rods[3]["length"] + 0.1, "mass": 0.123456, "min_radius": 0.0777}
-    changed = replace(made, result={**made.result, "rods": rods})
+    changed = replace(made, results=Results.of({**made.results.plain(), "rods": rods}))
     export(changed, tmp_path, ["csv", "svg", "gltf"])
     row = next(line for line in (tmp_path / "schedule/rods.csv").read_text().splitlines() if line.startswith("LONG,"))
     assert f",{1e3 * rods[3]['length'] + 100:.2f}," in row
@@ -61,7 +61,7 @@ def test_numbers_of_the_files_come_from_the_archive(tmp_path: Path) -> None:
 
 
 def test_command_writes_what_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = write(sample_archive(), tmp_path / "dome")
+    folder = save(sample_archive(), tmp_path / "dome")
     before = contents(folder)
     for path in (folder / "drawings/plan.dxf", folder / "schedule/rods.csv"):
         path.unlink()
@@ -81,7 +81,7 @@ def test_command_writes_what_is_asked_for(tmp_path: Path, capsys: pytest.Capture
 def test_bad_requests_are_one_sentence(
     arguments: list[str], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = write(sample_archive(), tmp_path / "dome")
+    folder = save(sample_archive(), tmp_path / "dome")
     (tmp_path / "file").write_text("mine")
     words = [word.format(file=tmp_path / "file") for word in arguments]
     assert main(["export", str(folder), *words]) == 2
@@ -100,7 +100,7 @@ def test_kinds_are_read_in_any_case_and_checked() -> None:
 
 
 def test_a_file_that_cannot_be_replaced_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = write(sample_archive(), tmp_path / "dome")
+    folder = save(sample_archive(), tmp_path / "dome")
     before = contents(folder)
 
     def full(self: Path, data: bytes) -> int:
@@ -114,7 +114,7 @@ def test_a_file_that_cannot_be_replaced_leaves_the_old_one(tmp_path: Path, monke
 
 
 def test_a_newer_format_is_refused(tmp_path: Path) -> None:
-    folder = write(sample_archive(), tmp_path / "dome")
+    folder = save(sample_archive(), tmp_path / "dome")
     result = json.loads((folder / "result.json").read_text())
     (folder / "result.json").write_text(json.dumps({**result, "version": 99}))
     with pytest.raises(OutputError, match="version 99"):
@@ -154,7 +154,7 @@ def test_millimetres_and_metres_give_the_same_drawings_to_the_byte(tmp_path: Pat
 
 def test_drawings_are_the_same_whatever_the_hash_seed(tmp_path: Path) -> None:
     """Another process with another order of sets writes the same bytes."""
-    first = write(wished(), tmp_path / "first")
+    first = save(wished(), tmp_path / "first")
     code = "import sys; from rodshell.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [
         sys.executable,
@@ -180,7 +180,7 @@ def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Pa
     files = contents(out)
     assert {"drawings/plan.dxf", "drawings/drawings.pdf", "schedule/rods.csv", "model/draped.vtp"} <= set(files)
     assert not any("erection" in name or "pop_up" in name or "stress" in name for name in files)
-    result = read(out).result
+    result = read(out).results.plain()
     assert result["reactions"] == {}
     assert "deployment" not in result
     assert result["rods"][0]["cut_length"] == result["rods"][0]["length"]
@@ -189,8 +189,8 @@ def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Pa
 
 
 def test_without_stages_there_is_no_way_up(tmp_path: Path) -> None:
-    made = form("dome").archive(takeaway=rs.Takeaway(stages=0))
-    assert "deployment" not in made.result
+    made = form("dome").archive(options=rs.OutputOptions(stages=0))
+    assert "deployment" not in made.results.plain()
     assert "history" not in made.states
     names = export(made, tmp_path)
     assert "schedule/end_paths.csv" not in names

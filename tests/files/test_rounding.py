@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rodshell.output.rounding import rounding_of
 from rodshell.output.schedules import heading
+from rodshell.results.wording import rounding_of
 
 
 def result(longest: float, tolerance: float | None = None) -> dict:

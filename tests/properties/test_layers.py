@@ -13,7 +13,7 @@ from rodshell.formfinding.thickness import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.vectors import unit
 from rodshell.nets.sphere import crossing_angle
-from rodshell.output.rods import joint_places
+from rodshell.output.grid import joint_places
 from rodshell.solve.constraint import Supports
 from rodshell.solve.mixed_newton import find_equilibrium
 from rodshell.solve.problem import Problem

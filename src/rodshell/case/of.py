@@ -10,7 +10,7 @@ from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.sewn import SewnForm
 from rodshell.joints import Joint, joint_parameters
 from rodshell.layout import GridLayout
-from rodshell.output.takeaway import Takeaway
+from rodshell.output.options import OutputOptions
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 
@@ -26,7 +26,7 @@ def case_text(
     gravity: float = 9.81,
     fall: Fall | None = None,
     ends: Sequence[Ends] = ENDS,
-    takeaway: Takeaway | None = None,
+    options: OutputOptions | None = None,
     sewn: SewnForm | None = None,
 ) -> str:
     """A case file that gives these objects again, or a note on why none can: its target was a Python function, say."""
@@ -53,7 +53,7 @@ def case_text(
             "drape": drape,
             "pop_up": {"ends": ends[0] if len(ends) == 1 else "both"},
             **({"seams": sewn.parameters()} if sewn else {}),
-            **(takeaway or Takeaway()).parameters(),
+            **(options or OutputOptions()).parameters(),
         }
     )
     note = "" if ends else "# the grid was not popped up; a case file always asks for a pop-up\n"

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.fall import Fall
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.layout import GridLayout
-    from rodshell.output.takeaway import Takeaway
+    from rodshell.output.options import OutputOptions
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -320,7 +320,7 @@ class Case(Table):
         layout = self.layout.build(target)
         self._require_stock(layout)
         rod = self.rod_on(target, layout, anchor=anchor)
-        self.takeaway().require_known_stress(rod, options["joint"])
+        self.output_options().require_known_stress(rod, options["joint"])
         return Built(target, layout, rod, options)
 
     def _require_stock(self, layout: "GridLayout") -> None:
@@ -355,7 +355,7 @@ class Case(Table):
         kept = {key: options[key] for key in ("joint", "ends")}
         return Built(target, layout, rod, {"seams": self.seams.lines, "own": self.seams.own(), **kept})
 
-    def takeaway(self) -> "Takeaway":
+    def output_options(self) -> "OutputOptions":
         """What checks, workshop and drawings are told.
 
         Raises
@@ -363,12 +363,12 @@ class Case(Table):
         InputError : a value cannot be used.
         """
         from rodshell.fabrication import Fabrication
-        from rodshell.output.takeaway import DrawingStyle, Takeaway
+        from rodshell.output.options import DrawingStyle, OutputOptions
 
         style = self.drawings.model_dump(exclude={"layers"})
         layers = self.drawings.layers.model_dump(exclude_none=True)
         style["layers"] = {name.upper().replace("_", "-"): shown for name, shown in layers.items()}
-        return Takeaway(
+        return OutputOptions(
             self.checks.strength,
             self.checks.stages,
             Fabrication(**self.fabrication.model_dump()),

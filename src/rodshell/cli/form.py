@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from rodshell.formfinding.progress import Progress as Calls
     from rodshell.formfinding.search import Search
     from rodshell.layout import GridLayout
-    from rodshell.output import Archive
-    from rodshell.output.folder import ResultFolder
+    from rodshell.results import Archive
+    from rodshell.results.folder import ResultFolder
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -86,9 +86,9 @@ def run(
     limit : longest time [s] for all but the files.
     """
     from rodshell.formfinding.progress import limited
-    from rodshell.output.archive import ARCHIVE
     from rodshell.output.files import reserved
-    from rodshell.output.inputs import kept_case, read_inputs
+    from rodshell.results.archive import ARCHIVE
+    from rodshell.results.inputs import kept_case, read_inputs
     from rodshell.solve.time_series import NAMES
 
     kinds = wanted_kinds(only)
@@ -112,7 +112,7 @@ def _form(
     case: Case, inputs: dict[str, bytes], place: "ResultFolder", progress: "Calls", *, quiet: bool
 ) -> "tuple[Archive, Search | None]":
     """The form of a case, and the search for its anchor and heading; frames are staged in `place`."""
-    takeaway = case.takeaway()
+    output = case.output_options()
     target, layout, rod, options = case.build()
     _announce_sizes(case, target, layout, quiet=quiet)
     if case.drape.frames:
@@ -128,14 +128,14 @@ def _form(
     announce_rod(case, rod, lambda: case.fit_on(target, layout, anchor=options["anchor"]), quiet=quiet)
     case = case.with_rod(rod)
     form = find_form(target, layout, rod, progress=progress, **options)
-    return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), found
+    return form.archive(case.to_toml(), options=output, inputs=inputs, progress=progress), found
 
 
 def _sew(
     case: Case, inputs: dict[str, bytes], place: "ResultFolder", progress: "Calls", *, quiet: bool
 ) -> "tuple[Archive, None]":
     """The form of a case with seams."""
-    takeaway = case.takeaway()
+    output = case.output_options()
     target, layout, rod, options = case.build_sewn()
     _announce_sizes(case, target, layout, quiet=quiet)
     announce_rod(case, rod, lambda: case.fit_on(target, layout), quiet=quiet)
@@ -145,7 +145,7 @@ def _sew(
     search = case.layout.rotate == "auto"
     form = sew(target, layout=layout, rod=rod, search=search, progress=progress, **options)
     case = case.headed(form.layout.rotate)
-    return form.archive(case.to_toml(), takeaway=takeaway, inputs=inputs, progress=progress), None
+    return form.archive(case.to_toml(), options=output, inputs=inputs, progress=progress), None
 
 
 def _announce_sizes(case: Case, target: "Target", layout: "GridLayout", *, quiet: bool) -> None:

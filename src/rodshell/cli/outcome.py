@@ -18,8 +18,8 @@ from rodshell.errors import InputError
 if TYPE_CHECKING:
     from rodshell.case import Case
     from rodshell.checks.sizing import Fit
-    from rodshell.output import Archive
-    from rodshell.output.folder import ResultFolder
+    from rodshell.results import Archive
+    from rodshell.results.folder import ResultFolder
     from rodshell.rods.section import Rod
 
 FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
@@ -49,16 +49,18 @@ class Kept:
 
     @property
     def status(self) -> str:
-        return str(self.archive.result["status"])
+        return self.archive.results.status
 
     def summary(self) -> str:
         return self.archive.summary()
 
     def result(self) -> dict[str, Any]:
-        return self.archive.result
+        return self.archive.results.plain()
 
     def save(self, folder: "ResultFolder", progress: Progress) -> Path:
-        return self.archive.save(folder, self.kinds, more=self.more, progress=progress)
+        from rodshell.output.files import save
+
+        return save(self.archive, folder, self.kinds, more=self.more, progress=progress)
 
 
 def output_folder(
@@ -72,7 +74,7 @@ def output_folder(
     ------
     OutputError : it cannot be written, or holds files of these names that rodshell did not write.
     """
-    from rodshell.output.folder import open_folder
+    from rodshell.results.folder import open_folder
 
     return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)
 
@@ -98,11 +100,11 @@ def wanted_kinds(only: str | None) -> list[str] | None:
 def announce_rod(case: "Case", rod: "Rod", fit: "Callable[[], Fit]", *, quiet: bool) -> None:
     """Name a rod of which the case left something open, and what decided its size, before the job runs."""
     if case.rod.left_open and not quiet:
-        from rodshell.output.result import rod_table
-        from rodshell.output.summary import chosen, rod_text
+        from rodshell.results.from_form import rod_type
+        from rodshell.results.summary import chosen, rod_text
         from rodshell.rods.section import GivenSection
 
-        said = f"rodshell: rod: {rod_text(rod_table(rod))}; {chosen(case.rod.left_open)}"
+        said = f"rodshell: rod: {rod_text(rod_type(rod))}; {chosen(case.rod.left_open)}"
         if "section" in case.rod.left_open and rod.material and not isinstance(rod.section, GivenSection):
             why = fit().reason(rod.section, rod.material, strength=case.checks.strength, shape=case.rod.shape)
             said += f", {why}"
@@ -162,7 +164,7 @@ def deliver(
 
 def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:
     """Where a result was saved: beside its place, if somebody put files there while the job ran."""
-    from rodshell.output.folder import ForeignFileError, open_folder
+    from rodshell.results.folder import ForeignFileError, open_folder
 
     try:
         save(place)

@@ -76,11 +76,11 @@ def command(
         fit = partial(Fit.between, ends.lengths, ends.final, grid.joint_counts())
         rod = case.rod.build(fit, strength=case.checks.strength)
         announce_rod(case, rod, fit, quiet=quiet)
-        takeaway = case.takeaway()
+        output = case.output_options()
         with Progress(quiet=quiet) as shown:
             progress = limited(shown, seconds)
             popped = pop_up_table(grid, ends.final, rod, joint=case.joint.build(), edge=ends.edge, progress=progress)
-            kept = Kept(popped.archive(takeaway=takeaway, progress=progress), kinds)
+            kept = Kept(popped.archive(options=output, progress=progress), kinds)
         return deliver(kept, kept.save, place, progress=shown, as_json=as_json, quiet=quiet)
 
 
@@ -88,7 +88,7 @@ def _ends_and_case(path: Path, unit: str | None, given: dict[str, object]) -> "t
     """The rods of a table or a result; and the result's case, or an empty one, with what is `given`."""
     from rodshell.case import load_case
     from rodshell.cli.rodends import read_result, read_table
-    from rodshell.output.folder import reading
+    from rodshell.results.folder import reading
 
     if path.is_dir():
         if unit is not None:

@@ -12,8 +12,8 @@ from itertools import chain, count
 
 import numpy as np
 
-from rodshell.output.archive import printable
 from rodshell.output.drawing import CAP, LAYERS, Drawing, Mark, Path, Text
+from rodshell.results.records import printable
 
 FIRST_LAYER = 0x2F  # handle of the first of our layers, and
 FIRST = 0x39  # of the first entity; the frame's own end before

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.output.drawing import LAYERS, Drawing, Text
-from rodshell.output.wording import MINUS
+from rodshell.results.wording import MINUS
 
 FINER = 2  # pixels drawn for each pixel kept, in both directions
 
