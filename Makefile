@@ -1,5 +1,5 @@
 # The habits of the house. `make` alone shows them.
-.PHONY: help lint types test accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -8,6 +8,9 @@ lint:      ## ruff, format, and the import contract
 	ruff check .
 	ruff format --check .
 	lint-imports
+
+words:     ## words that the project does not use, with what it says instead
+	python .ci/words.py
 
 types:     ## mypy
 	mypy
@@ -36,6 +39,9 @@ accept-paper: ## print the table of the paper's own time stepping (some minutes)
 
 accept-verdict: ## print the table of harm and verdicts (some minutes)
 	python -m tests.acceptance.verdict
+
+house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
+	python -m tests.acceptance.house_figures
 
 paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (some minutes)
 	python docs/paper.py

@@ -115,7 +115,7 @@ def slider(runs: int) -> Section:
         for t in np.linspace(0.0, 1.0, runs + 2)[1:]:
             target, layout, anchor = at(float(t))
             begin = clock()
-            draped = rs.drape(layout, ROD, target, anchor=anchor, start=draped)
+            draped = rs.drape(layout, ROD, target, anchor=anchor, warm_start=draped)
             rs.map_back(rs.trim(draped))
             times.append(clock() - begin)
         rows.append(Row(f"{name} changed", f"{1 / median(times[1:]):.1f} updates a second", "at least 10"))

@@ -52,7 +52,7 @@ def rodshell_tips(nodes: int, youngs_modulus: float, step: float) -> tuple[Float
     kind = rs.Rod(rs.Circle(RADIUS), rs.Material(youngs_modulus, DENSITY, 0.5))
     rest = np.column_stack([np.linspace(0, LENGTH, nodes), np.zeros(nodes), np.zeros(nodes)])
     rod = ElasticRod.of(rest, kind, clamped=("start",))
-    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes), rs.Damping(rate=DAMPING)))
+    motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes), rs.Damping(rate=DAMPING)))
     per_sample = round(1 / (SAMPLES * step))
     begin = time.perf_counter()
     series = rs.simulate(motion, rod.state(), until=1.0, step=step, every=per_sample)

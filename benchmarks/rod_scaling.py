@@ -97,7 +97,7 @@ class _Swing:
     """A heavy cantilever let go, step by step."""
 
     def __init__(self, rod: ElasticRod) -> None:
-        self._motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),)).in_parts()
+        self._motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),)).in_parts()
         self._stepper = rs.ImplicitEuler()
         self._state, self._velocity = rod.state(), np.zeros_like(rod.mass)
         self.taken, self.factorizations = 0, 0

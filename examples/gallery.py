@@ -92,9 +92,8 @@ if __name__ == "__main__":
             continue
         form = check(name, piece)
         gaps = ", ".join(f"{ends} {100 * form.agreement[ends].rms_relative:.3f} %" for ends in form.popped)
-        print(
-            f"{name}: {len(form.footprint.rods)} rods, angle {degrees(form.draped.min_angle):.0f} deg, gap rms {gaps}"
-        )
+        angle = degrees(form.draped.figures.min_angle)
+        print(f"{name}: {len(form.footprint.rods)} rods, angle {angle:.0f} deg, gap rms {gaps}")
         if asked:
             archive = form.archive()
             found = verdict_of(archive.results)

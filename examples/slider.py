@@ -41,7 +41,7 @@ for name, at in sliders.items():
     for t in np.linspace(1 / STEPS, 1.0, STEPS):
         target, layout, anchor = at(float(t))
         begin = time.perf_counter()
-        draped = rs.drape(layout, rod, target, anchor=anchor, start=draped)
+        draped = rs.drape(layout, rod, target, anchor=anchor, warm_start=draped)
         footprint = rs.map_back(rs.trim(draped))
         times.append(time.perf_counter() - begin)
     afresh = rs.map_back(rs.trim(rs.drape(layout, rod, target, anchor=anchor)))

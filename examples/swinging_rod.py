@@ -20,7 +20,7 @@ def swing(step: float, until: float = UNTIL, stream: Path | None = None) -> rs.T
     """A straight cantilever of 1 m, let go under its own weight."""
     rest = np.column_stack([np.linspace(0, 1, NODES), np.zeros(NODES), np.zeros(NODES)])
     rod = rs.ElasticRod.of(rest, ROD, clamped=("start",))
-    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),))
+    motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
     return rs.simulate(motion, rod.state(), until=until, step=step, stream=stream)
 
 

@@ -33,10 +33,13 @@ if TYPE_CHECKING:
     from rodshell.form import Form, PoppedUp, Sewn, find_form, pop_up_table, sew
     from rodshell.formfinding import (
         Agreement,
+        Bound,
         Boundary,
         Draped,
+        DrapeFigures,
         Fall,
         Footprint,
+        Gravity,
         Popped,
         Trimmed,
         agreement,
@@ -65,7 +68,7 @@ if TYPE_CHECKING:
     from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
-    from rodshell.solve.forces import Damping, ExplicitForce, Gravity, ImplicitForce, PointLoads
+    from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
     from rodshell.solve.rod_statics import RodShape, solve_rod
     from rodshell.solve.simulate import simulate
@@ -93,8 +96,8 @@ _HOMES = {
     "rodshell.fabrication": ("Fabrication",),
     "rodshell.form": ("Form", "PoppedUp", "Sewn", "find_form", "pop_up_table", "sew"),
     "rodshell.formfinding": (
-        "Agreement", "Boundary", "Draped", "Fall", "Footprint", "Popped", "Trimmed", "agreement", "drape", "map_back",
-        "pop_up", "trim",
+        "Agreement", "Bound", "Boundary", "DrapeFigures", "Draped", "Fall", "Footprint", "Gravity", "Popped", "Trimmed",
+        "agreement", "drape", "map_back", "pop_up", "trim",
     ),
     "rodshell.formfinding.rising": ("Rise", "Risen", "pop_up_in_time"),
     "rodshell.formfinding.sewn": ("PatchLayout",),
@@ -110,7 +113,7 @@ _HOMES = {
     "rodshell.output.options": ("DrawingStyle", "OutputOptions"),
     "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
-    "rodshell.solve.forces": ("Damping", "ExplicitForce", "Gravity", "ImplicitForce", "PointLoads"),
+    "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
     "rodshell.solve.simulate": ("simulate",),
     "rodshell.solve.time_series": ("Moment", "TimeSeries"),
@@ -122,17 +125,17 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Archive", "Ball", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
-    "Disc", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty",
-    "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity",
-    "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce",
-    "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError", "OutOfTimeError",
-    "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "Popped", "PoppedUp",
-    "Rectangle", "RectangularSection", "Results", "Rigid", "Rise", "Risen", "Rod", "RodShape", "RodStrains", "Sewn",
-    "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed", "Tube", "Verdict", "agreement",
-    "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_in_time", "pop_up_table",
-    "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from",
-    "trim",
+    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError",
+    "Damping", "Disc", "DrapeFigures", "Draped", "DrawingStyle", "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce",
+    "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform", "GivenSection",
+    "Gravity", "GravityForce", "GridLayout", "GridMesh", "RodshellError", "HeightField", "Hemisphere", "ImplicitEuler",
+    "ImplicitForce", "ImplicitPenalty", "InputError", "Linker", "Material", "Moment", "Motion", "NetLimitError",
+    "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads",
+    "Popped", "PoppedUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rise", "Risen", "Rod", "RodShape",
+    "RodStrains", "Sewn", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed", "Tube",
+    "Verdict", "agreement", "chebyshev_net", "drape", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
+    "pop_up_in_time", "pop_up_table", "read", "sew", "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod",
+    "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

@@ -23,6 +23,10 @@ class OutputError(RodshellError, OSError):
     """A result cannot be written or read."""
 
 
+class OutputWarning(UserWarning):
+    """A written file does not show all that it should; the command line prints it as one sentence."""
+
+
 class OutOfTimeError(RodshellError):
     """A job took longer than its time limit; nothing was found that could be kept."""
 

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rodshell.case.of import case_text
+from rodshell.case.from_objects import case_text
 from rodshell.checks import Checks, Contact, check
 from rodshell.checks.contact import contact_of_patches
 from rodshell.checks.joined import joined_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import fabricate
-from rodshell.formfinding import Fall, FoundForm, PoppedTable, find_stages, pop_up_stages
-from rodshell.formfinding.drape import Method
+from rodshell.formfinding import Bound, FoundForm, Method, PoppedTable, find_stages, pop_up_stages
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, limited, silent
 from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
@@ -92,8 +91,7 @@ class Form(_Judged, FoundForm):
             draped = self.draped
             case_toml = case_text(
                 self.target, self.layout, self.rod, joint=self.joint,
-                method=draped.method, anchor=draped.anchor, gravity=draped.gravity or 9.81,
-                fall=draped.fall, ends=self.ends, options=options,
+                method=draped.method, anchor=draped.anchor, ends=self.ends, options=options,
             )  # fmt: skip
         return _archive(self, form_states(self), case_toml, options, progress, inputs)
 
@@ -231,11 +229,9 @@ def find_form(
     layout: GridLayout,
     rod: Rod,
     *,
-    method: Method = "bound",
+    method: Method = Bound(),
     anchor: tuple[float, float] | None = None,
-    gravity: float | None = None,
     joint: Joint | None = None,
-    fall: Fall | None = None,
     ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
     start: FoundForm | None = None,
     progress: Progress = silent,
@@ -248,12 +244,12 @@ def find_form(
     target : the shape wanted.
     layout : the flat grid asked for.
     rod : section and material of every rod.
-    method, anchor, gravity : of the drape, see `drape`.
+    method : of the drape: `Bound()`, `Gravity()` or `Fall()`, see `drape`.
+    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
     joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
-    fall : of method "paper", see `drape`.
     ends : end conditions of the pop-up: "pinned", "clamped", or both in a tuple.
     start : a form found before, for a spacing, heading, anchor or target that has changed a little: its net is where
-        the new net is looked for (method "bound"), and where its shells went from their draped states is where the new
+        the new net is looked for (with `Bound()`), and where its shells went from their draped states is where the new
         ones start, rods being matched by their place in the lattice. Any form will do; what does not help is
         left, and the result is the same as without, to the solver's tolerance. A shell that has several equilibria
         stays with the one that it is in.
@@ -275,7 +271,7 @@ def find_form(
         instance("start", start, FoundForm, FOUND)
     found = find_stages(
         target, layout, rod,
-        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall, ends=ends,
+        method=method, anchor=anchor, joint=joint, ends=ends,
         start=start, progress=limited(progress, time_limit),
     )  # fmt: skip
     return Form(**{field.name: getattr(found, field.name) for field in fields(found)})

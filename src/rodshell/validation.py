@@ -34,10 +34,20 @@ def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
     for word in choices:
         if value == word:
             return word
+    raise InputError(not_a_choice(name, value, choices))
+
+
+def not_a_choice(name: str, value: object, choices: Sequence[str]) -> str:
+    """The sentence on a `value` that is none of the words in `choices`; the same for arguments, keys and options."""
     near = get_close_matches(value, choices, n=1) if isinstance(value, str) else []
     hint = f": did you mean {shown(near[0])}?" if near else ""
-    *rest, last = map(shown, choices)
-    raise InputError(f"{name} must be {', '.join(rest)} or {last}, not {_described(value)}{hint}")
+    return f"{name} must be {either(choices)}, not {_described(value)}{hint}"
+
+
+def either(words: Sequence[str]) -> str:
+    """ "a", "b" or "c"."""
+    *rest, last = map(shown, words)
+    return f"{', '.join(rest)} or {last}" if rest else last
 
 
 def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 import rodshell as rs
 from rodshell.errors import StabilityError
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.methods import Fall
 from rodshell.formfinding.progress import silent
 from rodshell.formfinding.rising import Rise, pop_up_in_time
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
@@ -36,12 +36,12 @@ def layout(name: str) -> rs.GridLayout:
 
 @cache
 def fallen(name: str, fall: Fall, stretch: float = 1.0) -> Draped:
-    return rs.drape(layout(name), stretched(stretch), TARGETS[name], method="paper", fall=fall)
+    return rs.drape(layout(name), stretched(stretch), TARGETS[name], method=fall)
 
 
 @cache
 def hanging(name: str) -> Draped:
-    return rs.drape(layout(name), ROD, TARGETS[name], method="gravity")
+    return rs.drape(layout(name), ROD, TARGETS[name], method=rs.Gravity())
 
 
 def stretched(factor: float) -> rs.Rod:
@@ -90,7 +90,7 @@ def refused(name: str, step: float) -> str:
     """What the paper's scheme says against a time step [s], or nothing."""
     fall = Fall(coupling=ExplicitPenalty(C1=C1), time_step=step, duration=2.0)
     try:
-        rs.drape(layout(name), ROD, TARGETS[name], method="paper", fall=fall)
+        rs.drape(layout(name), ROD, TARGETS[name], method=fall)
     except StabilityError as error:
         return str(error)
     return ""
@@ -150,7 +150,7 @@ def linker_rows() -> Iterator[Row]:
 
 def with_linkers(grid: rs.GridLayout, coupling: Coupling, until: float, step: float | None = None) -> Draped:
     fall = Fall(coupling=coupling, drag=5.0, duration=until, time_step=step, settle=False)
-    return rs.drape(grid, ROD, TARGETS["hemisphere"], method="paper", fall=fall, joint=Linker())
+    return rs.drape(grid, ROD, TARGETS["hemisphere"], method=fall, joint=Linker())
 
 
 def tail_rows() -> Iterator[Row]:
@@ -172,7 +172,7 @@ def friction_rows() -> Iterator[Row]:
         offsets = []
         for duration in (2.0, 12.0):
             fall = Fall(friction=friction, drag=5.0, stopped="along the normal", duration=duration, settle=False)
-            draped = rs.drape(coarse, ROD, TARGETS["hemisphere"], method="paper", anchor=(1e-3, 0.0), fall=fall)
+            draped = rs.drape(coarse, ROD, TARGETS["hemisphere"], method=fall, anchor=(1e-3, 0.0))
             middle = draped.positions[np.argmin(np.linalg.norm(draped.mesh.flat, axis=1))]
             offsets.append(1e3 * float(np.linalg.norm(middle[:2])))
         note = f"offset {offsets[0]:.3f} mm after 2 s, {offsets[1]:.3f} mm after 12 s"

@@ -83,8 +83,8 @@ def net_rows(case: AcceptanceCase) -> Iterator[Row]:
 
 def own_end_rows(case: AcceptanceCase) -> Iterator[Row]:
     """The bound drape's own ends against G0."""
-    assert form_of(case).draped.own_ends is not None
-    own = np.abs(form_of(case).draped.own_ends)
+    assert form_of(case).draped.figures.net_deviation is not None
+    own = np.abs(form_of(case).draped.figures.net_deviation)
     yield Row(case.name, "the drape's own rod ends off G0, max", 1e3 * float(own.max()), 0.3, "mm")
     yield Row(case.name, "the same, median", 1e3 * float(np.median(own)), 0.06, "mm")
 
@@ -94,7 +94,7 @@ def drape_rows(case: AcceptanceCase) -> Iterator[Row]:
     draped = form_of(case).draped
     report = draped.report
     yield Row(case.name, "bound drape: not converged", float(not draped.converged), 0)
-    yield Row(case.name, "bound drape: gap over the size", draped.max_gap / case.target.size, 2e-5)
+    yield Row(case.name, "bound drape: gap over the size", draped.figures.max_gap / case.target.size, 2e-5)
     yield Row(case.name, "bound drape: strain", report.max_strain, 2e-5)
     yield Row(case.name, "bound drape: negative modes", report.negative_modes, 0)
     yield Row(case.name, "bound drape: factorisations", report.factorizations, 8, note=f"{report.dofs} unknowns")
@@ -157,7 +157,7 @@ def gravity_rows() -> Iterator[Row]:
         ("paper's rod", ROD, 2.8, 3.0),
         ("EA x100", _Inextensible(ROD.section, ROD.material), 0.0, 0.3),
     ):
-        draped = rs.drape(case.grid(length=1.2), rod, case.target, method="gravity")
+        draped = rs.drape(case.grid(length=1.2), rod, case.target, method=rs.Gravity())
         rods = rs.trim(draped).mesh.grid.rods
         short = [
             rs.sphere_net_end(case.target.size, abs(rod.offset)) - end for rod in rods for end in (rod.end, -rod.start)
@@ -181,9 +181,9 @@ def scale_rows() -> Iterator[Row]:
     scaled = rs.Rod(rs.Circle(radius=0.1), rs.Material(1e6, 1e3))
     for name, rod in (("x100", scaled), ("x100, 25 GPa tubes", tube)):
         large = rs.find_form(rs.Hemisphere(20.0), layout, rod)
-        assert small.draped.own_ends is not None
-        assert large.draped.own_ends is not None
-        own = np.abs(large.draped.own_ends / 20 - small.draped.own_ends / 0.2).max()
+        assert small.draped.figures.net_deviation is not None
+        assert large.draped.figures.net_deviation is not None
+        own = np.abs(large.draped.figures.net_deviation / 20 - small.draped.figures.net_deviation / 0.2).max()
         yield Row(f"hemisphere {name}", "the drape's own ends apart, over R", float(own), 1e-4)
         for ends in small.popped:
             apart = np.abs(large.popped[ends].positions / 20 - small.popped[ends].positions / 0.2).max()

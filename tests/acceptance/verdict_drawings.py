@@ -20,6 +20,7 @@ from rodshell.output.drawing import Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.files import KINDS
+from rodshell.output.fonts import CAPITAL
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive, read
 from rodshell.results.wording import rounding_of
@@ -31,7 +32,6 @@ from hostile import hostile_archive
 from live_cells import live_cells
 
 FOUND = (0, 4)  # exit codes of a form that converged
-CAPITAL = 0.718  # height of Helvetica's capitals over its size [Adobe's font metrics]
 LABELS = (
     "Project", "Drawn by", "Date", "Revision", "Section", "Material", "Joints", "Rods", "Units", "Tolerance", "Input",
     "Made by",

@@ -73,7 +73,7 @@ def frequency_limit(rod, shape, frequency):
 def swing_order(twist):
     """Order in the step of a heavy cantilever's tip, let go for 0.2 s, by the distances between successive halves."""
     rod = straight(21, kind(1e8), clamped=("start",), twist=twist)
-    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes, G),))
+    motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes, G),))
     counts = np.array([160, 320, 640, 1280, 2560])
     tips = [rs.simulate(motion, rod.state(), until=0.2, step=0.2 / n).states[-1][20] for n in counts]
     return order(1 / counts[:-1], np.linalg.norm(np.diff(tips, axis=0), axis=1))

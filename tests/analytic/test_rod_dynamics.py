@@ -106,7 +106,7 @@ def test_free_fall_is_exact():
     """As implicit Euler falls: v = g k h, and the sum of it; no strain, no spin."""
     rod = straight(21, kind(5e10))
     series = rs.simulate(
-        rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes, (1.0, 2.0, -9.81)),)), rod.state(), until=1.0, step=0.01
+        rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes, (1.0, 2.0, -9.81)),)), rod.state(), until=1.0, step=0.01
     )
     k = np.arange(101)[:, None]
     g = np.array([1.0, 2.0, -9.81])
@@ -256,7 +256,7 @@ def test_rod_let_go_falls_as_a_whole():
     def support(time):
         return Supports(held if time < release + 1e-9 else body.freedom())
 
-    motion = rs.Motion.of(body, constraint=support, forces=(rs.Gravity(body.nodes, G),))
+    motion = rs.Motion.of(body, constraint=support, forces=(rs.GravityForce(body.nodes, G),))
     series = rs.simulate(motion, body.state(), until=0.3, step=1e-3)
     assert np.abs(series.states[:101, [0, 20]] - body.state()[[0, 20]]).max() == 0
     momentum = linear_momentum(body, series.velocities) / body.mass[body.nodes, 0].sum()
@@ -271,7 +271,7 @@ def test_rod_held_again_stays_where_it_is_caught():
         free = body.freedom()
         return Supports(free.with_directions(np.array([0])) if time > 0.05 + 1e-9 else free)
 
-    motion = rs.Motion.of(body, constraint=support, forces=(rs.Gravity(body.nodes, G),))
+    motion = rs.Motion.of(body, constraint=support, forces=(rs.GravityForce(body.nodes, G),))
     series = rs.simulate(motion, body.state(), until=0.15, step=1e-3)
     assert series.states[50, 0, 2] < -0.01
     np.testing.assert_array_equal(series.states[50:, 0], np.tile(series.states[50, 0], (101, 1)))
@@ -432,7 +432,7 @@ def test_supports_carry_the_weight_of_a_hanging_rod():
     motion = rs.Motion.of(
         rod,
         constraint=rod.freedom().with_directions(np.array([0, rod.angles.start])),
-        forces=(rs.Gravity(rod.nodes), rs.Damping(rate=20.0)),
+        forces=(rs.GravityForce(rod.nodes), rs.Damping(rate=20.0)),
     )
     series = rs.simulate(motion, rod.state(), until=3.0, step=0.02)
     taken = ImplicitEuler().take(series.last.motion, series.last.state, series.last.velocity, time=3.0, step=0.02)
@@ -495,7 +495,7 @@ def test_motion_that_cannot_go_on_raises_with_its_record():
 
 def swing(**options):
     rod = straight(11, kind(1e8), clamped=("start",))
-    motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),))
+    motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
     return rs.simulate(motion, rod.state(), step=0.01, **{"until": 0.5, **options})
 
 
@@ -601,7 +601,7 @@ def test_step_of_a_smooth_swing_costs_the_same_for_each_node(nodes, monkeypatch)
     monkeypatch.setattr(Banded, "solve", solved)
     rest = np.column_stack([0.01 * np.arange(nodes), np.zeros(nodes), np.zeros(nodes)])
     rod = rs.ElasticRod.of(rest, kind(), clamped=("start",))
-    motion, stepper = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),)), ImplicitEuler()
+    motion, stepper = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),)), ImplicitEuler()
     state, velocity = rod.state(), np.zeros_like(rod.mass)
     for k in range(20):
         if k == 10:  # until then so little has moved that a share of it is hard to reach

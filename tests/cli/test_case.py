@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from rodshell.case import BUILT_IN, Case, case_keys, load_case
+from rodshell.case.load import RenamedKeyWarning
 from rodshell.errors import InputError
 
 DESIGN = """
@@ -193,20 +194,20 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ('[target]\nkind = "heights"\nfile = "h.csv"', "target.size is missing: give the width along x and depth"),
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nunit = "furlong"', 'target.unit = "furlong"'),
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nturn = [1, 2]', "target.turn = [1, 2]: needs three values"),
-        ('target.kind = "hemispher"', "did you mean hemisphere?"),
-        ("target.kind = 3", "target.kind = 3: use"),
-        ("target.kind = []", "target.kind = []: use"),
+        ('target.kind = "hemispher"', 'did you mean "hemisphere"?'),
+        ("target.kind = 3", 'target.kind must be "hemisphere"'),
+        ("target.kind = []", ", not a list"),
         ('target.file = "dome.obj"', 'a target of kind "hemisphere" has no file'),
-        ('joint.kind = "glue"', 'joint.kind = "glue": use "ball", "pin", "spring", "linker" or "rigid"'),
+        ('joint.kind = "glue"', 'joint.kind must be "ball", "pin", "spring", "linker" or "rigid", not "glue"'),
         ("joint.shear = 1", 'a joint of kind "ball" has no shear: leave it out, or set joint.kind to "spring"'),
         ('joint = { kind = "spring", shear = -1 }', "joint.shear = -1: must not be negative"),
         ('joint = { kind = "spring", twist = "2 mm" }', "mm is a unit of length"),
         ('joint = { kind = "linker", corners = 3 }', "joint.corners = 3: give 2, opposite corners"),
         ('joint = { kind = "pin", eccentricity = "-1 mm" }', "must not be negative"),
-        ('drape.method = "magic"', 'drape.method = "magic": use "bound", "gravity" or "paper"'),
+        ('drape.method = "magic"', 'drape.method must be "bound", "gravity" or "paper", not "magic"'),
         ("drape.anchor = 1", "drape.anchor = 1: needs two values"),
         ("drape.gravity = -9.81", "drape.gravity = -9.81: must be larger than zero"),
-        ('pop_up.ends = "clampd"', "did you mean clamped?"),
+        ('pop_up.ends = "clampd"', '"both", not "clampd": did you mean "clamped"?'),
         ('rod.section.kind = "tube"', "rod.section.thickness is missing: give the thickness"),
         ("rod.material.poisson_ratio = 0.6", "must lie above -1 and not above 0.5"),
         ("layout.rods = 17", "layout.rods = 17: give two counts of at least 2"),
@@ -263,6 +264,48 @@ def test_an_unknown_override_names_the_nearest_key() -> None:
         load_case("hemisphere", {"target.formula": "x"})
 
 
+def test_only_keys_of_the_kinds_at_hand_are_proposed() -> None:
+    """A hemisphere has no height, a circle no thickness: neither is offered to one who misspells them."""
+    for path, absent in (
+        ("target.heigth", "height?"),
+        ("rod.section.thicknes", "thickness?"),
+        ("joint.eccentricty", "eccentricity?"),
+        ("drape.frictn", "friction?"),
+    ):
+        with pytest.raises(InputError) as caught:
+            load_case("hemisphere", {path: "1 mm"})
+        assert absent not in str(caught.value)
+    with pytest.raises(InputError, match=r"did you mean target.height\?"):
+        load_case("paraboloid", {"target.heigth": "1 m"})
+    with pytest.raises(InputError, match=r"did you mean joint.eccentricity\?"):
+        load_case("hemisphere", {"joint.kind": "pin", "joint.eccentricty": "1 mm"})
+
+
+def test_a_key_by_its_old_name_is_read_with_a_warning(load: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rodshell.case.load.RENAMED", {"drape.weight": "drape.gravity", "grid.edge": "layout.edge"})
+    wanted = load('drape = { method = "gravity", gravity = 1.6 }\nlayout.edge = 0.004')
+    with pytest.warns(RenamedKeyWarning, match="drape.weight is now called drape.gravity"):
+        assert load('drape = { method = "gravity", weight = 1.6 }\ngrid.edge = 0.004') == wanted
+    with pytest.warns(RenamedKeyWarning):
+        assert load('drape.method = "gravity"\nlayout.edge = 0.004', {"drape.weight": 1.6}) == wanted
+
+
+def test_a_case_is_also_its_text_or_its_tables() -> None:
+    case = load_case("cap", {"target.base": "50 mm", "rod.section.radius": "2 mm"})
+    assert load_case(case.to_toml()) == case
+    assert load_case(tomllib.loads(case.to_toml())) == case
+    tables = {"target": {"kind": "cap", "base": "50 mm"}, "rod.section.radius": "2 mm", "rod": {"material.density": 9}}
+    tables["rod"]["material.youngs_modulus"] = 1e6  # type: ignore[index]
+    mixed = load_case(tables)
+    assert (mixed.target.base, mixed.rod.section.radius, mixed.rod.material.density) == (0.05, 0.002, 9.0)
+    with pytest.raises(InputError, match="the text is not valid TOML"):
+        load_case("target = ")
+    with pytest.raises(InputError, match=r"unknown key target.radus: did you mean target.radius\?"):
+        load_case({"target": {"radus": 1}})
+    with pytest.raises(InputError, match="target = 3: must be a table"):
+        load_case({"target": 3})
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -317,6 +360,7 @@ def test_a_built_target_has_the_numbers_of_its_case(name: str) -> None:
 
 
 def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
+    from rodshell.formfinding import Gravity
     from rodshell.joints import Ball, Pin
     from rodshell.layout import GridLayout
     from rodshell.rods.section import Circle, Material, Rod, Tube
@@ -328,11 +372,9 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
     )
     assert rod == Rod(Circle(0.001), Material(1e6, 1000.0, 0.5))
     assert options == {
-        "method": "gravity",
+        "method": Gravity(),
         "anchor": (0.1, 0.0),
-        "gravity": 9.81,
         "ends": ("pinned", "clamped"),
-        "fall": None,
         "joint": Ball(),
     }
     tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
@@ -437,13 +479,27 @@ def test_a_zero_needs_no_unit_beside_others() -> None:
 @pytest.mark.parametrize("angle", [7.0, -30.0, 0.3])
 def test_a_case_of_python_objects_can_be_read_again_whatever_its_angle(load: Any, angle: float) -> None:
     import rodshell as rs
-    from rodshell.case.of import case_text
+    from rodshell.case.from_objects import case_text
 
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02, rotate=angle)
     rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
-    case = load(case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball(), gravity=3.0))
+    case = load(case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball()))
     assert cos(case.layout.rotate - angle) == pytest.approx(1)
     assert abs(case.layout.rotate) < tau
+
+
+def test_each_method_of_draping_is_written_to_a_case_and_read_again(load: Any) -> None:
+    import rodshell as rs
+    from rodshell.case.from_objects import case_text
+
+    layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02)
+    rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+    ties = rs.ExplicitPenalty(C1=2.0, C2=3e-5)
+    timed = {"time_step": 1e-3, "duration": 2.0, "friction": 0.1, "drag": 4.0}
+    slow = rs.Fall(acceleration=1.6, height=0.1, coupling=ties, **timed)
+    for method in (rs.Bound(), rs.Gravity(acceleration=1.6), rs.Fall(), slow):
+        text = case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball(), method=method)
+        assert load(text).build().drape_options["method"] == method
 
 
 def test_each_key_has_one_line_of_help() -> None:

@@ -1,10 +1,11 @@
-"""A reader of DXF that knows nothing of the library that wrote it: pairs of a group code and a value."""
+"""What a DXF file holds, as ezdxf reads it."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import ezdxf
 import numpy as np
+from ezdxf.entities import DXFEntity
 
 
 @dataclass(frozen=True)
@@ -14,44 +15,23 @@ class Entity:
     kind: str
     layer: str
     points: np.ndarray
-    text: str = ""
 
 
 def read_dxf(path: Path) -> list[Entity]:
     """All lines, polylines, circles and texts of the model space."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    pairs = [(int(code), value.strip()) for code, value in zip(lines[::2], lines[1::2], strict=True)]
-    start = next(k for k, pair in enumerate(pairs) if pair == (2, "ENTITIES"))
-    stop = next(k for k in range(start, len(pairs)) if pairs[k] == (0, "ENDSEC"))
-    return list(_entities(pairs[start + 1 : stop]))
+    space = ezdxf.readfile(path).modelspace()
+    return [Entity(one.dxftype(), one.dxf.layer, _points(one)) for one in space]
 
 
-def _entities(pairs: list[tuple[int, str]]) -> Iterator[Entity]:
-    starts = [k for k, (code, _) in enumerate(pairs) if code == 0]
-    parts = [pairs[a:b] for a, b in zip(starts, [*starts[1:], len(pairs)], strict=True)]
-    k = 0
-    while k < len(parts):
-        kind, codes = parts[k][0][1], parts[k]
-        layer = next((value for code, value in codes if code == 8), "")
-        text = next((value for code, value in codes if code == 1), "")
-        if kind == "POLYLINE":
-            vertices = []
-            while parts[k + 1][0][1] == "VERTEX":
-                k += 1
-                vertices.append([_first(parts[k], code) for code in (10, 20, 30)])
-            yield Entity(kind, layer, np.array(vertices))
-        elif kind == "LINE":
-            yield Entity(kind, layer, np.array([[_first(codes, c) for c in row] for row in ((10, 20), (11, 21))]))
-        elif kind == "LWPOLYLINE":
-            columns = [[float(value) for code, value in codes if code == wanted] for wanted in (10, 20)]
-            yield Entity(kind, layer, np.column_stack(columns))
-        elif kind in ("CIRCLE", "TEXT"):
-            yield Entity(kind, layer, np.array([[_first(codes, 10), _first(codes, 20)]]), text)
-        k += 1
-
-
-def _first(codes: list[tuple[int, str]], wanted: int) -> float:
-    return next(float(value) for code, value in codes if code == wanted)
+def _points(entity: DXFEntity) -> np.ndarray:
+    kind, dxf = entity.dxftype(), entity.dxf
+    if kind == "LINE":
+        return np.array([list(dxf.start.vec2), list(dxf.end.vec2)])
+    if kind == "LWPOLYLINE":
+        return np.array(entity.get_points("xy"))
+    if kind == "POLYLINE":
+        return np.array([list(point) for point in entity.points()])
+    return np.array([list((dxf.center if kind == "CIRCLE" else dxf.insert).vec2)])
 
 
 def rods_of_dxf(path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -3,17 +3,13 @@
 import csv
 import io
 import re
-import zlib
 from dataclasses import replace
 from itertools import pairwise
-from math import pi
 from pathlib import Path
 
-import ezdxf
 import numpy as np
 import pytest
 from dxf_reader import read_dxf
-from ezdxf.enums import TextEntityAlignment
 from forms import TARGETS, archive, formed, wished
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,13 +18,12 @@ from sample_archive import sample_archive, table_archive
 
 from rodshell.errors import InputError
 from rodshell.output import export
-from rodshell.output.drawing import LAYERS, Drawing, Pencil, Text
+from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
 from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan
-from rodshell.output.drawings.sheets import OVERLAP, SCALES, TEXT, fitted, room, tiled
+from rodshell.output.drawings.sheets import OVERLAP, SCALES, fitted, room, tiled
 from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing
-from rodshell.output.dxf import drawing_dxf
 from rodshell.output.grid import joint_places, rods_of
 from rodshell.output.labels import boxes_meet, lines_meet, spread
 from rodshell.output.options import DrawingStyle, OutputOptions
@@ -90,43 +85,6 @@ def test_every_rod_and_joint_is_labelled_on_the_plan(name: str) -> None:
     plan = flat_plan(archive(name))
     texts = {text.text for text in flat_drawing(plan, plan.text).texts}
     assert {rod.id for rod in plan.rods} | {joint.id for joint in plan.joints} <= texts
-
-
-def pdf_pages(data: bytes) -> list[str]:
-    """What each page draws."""
-    streams = re.findall(rb"/FlateDecode >>\nstream\n(.*?)\nendstream", data, re.DOTALL)
-    return [zlib.decompress(stream).decode("cp1252") for stream in streams]
-
-
-def test_pdf_is_true_to_scale(tmp_path: Path) -> None:
-    """The longest strip of the first strip sheet, in points of the page, is the rod over the sheet's scale."""
-    dome = archive("dome")
-    export(dome, tmp_path, ["pdf"])
-    data = (tmp_path / "drawings/drawings.pdf").read_bytes()
-    sheets, paper = sheet_set(dome, flat_plan(dome))
-    assert len(pdf_pages(data)) == len(sheets) == data.count(b"/Type /Page ")
-    box = re.search(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", data)
-    assert box is not None
-    np.testing.assert_allclose([float(side) / 72 * 25.4 for side in box.groups()], paper, atol=1e-3)
-    page = next(text for text in pdf_pages(data) if "Rod strips" in text)
-    scale = float(re.search(r"\(Scale 1:([\d.]+)\)", page)[1])  # type: ignore[index]
-    assert page.startswith("2.834646 0 0 2.834646 0 0 cm")  # so that what follows is in mm
-    lines = re.findall(r"^([\d.]+) ([\d.]+) m ([\d.]+) ([\d.]+) l S$", page, re.MULTILINE)
-    lengths = [float(x1) - float(x0) for x0, y0, x1, y1 in lines if y0 == y1]
-    for rod in flat_plan(dome).rods[:4]:
-        assert np.abs(np.array(lengths) - 1e3 * rod.cut_length / scale).min() < 2e-3  # mm of paper
-
-
-def test_pdf_opens_in_another_reader(tmp_path: Path) -> None:
-    pypdf = pytest.importorskip("pypdf", reason="no pypdf: pip install pypdf")
-    export(wished(), tmp_path, ["pdf"])
-    reader = pypdf.PdfReader(tmp_path / "drawings/drawings.pdf", strict=True)
-    assert reader.metadata.title == "hemisphere"
-    text = reader.pages[0].extract_text()
-    for words in ("Pavilion", "0.5 mm", "circle, radius 1 mm", "ball"):
-        assert words in text
-    assert "Design aid, not code compliance" in text
-    assert reader.outline[0].title == "Flat plan"
 
 
 def test_scale_is_the_largest_standard_one_that_fits() -> None:
@@ -335,21 +293,6 @@ def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> No
     assert {tuple(np.round(point, 6)) for point in footprint} == expected
 
 
-@pytest.mark.parametrize("name", [*TARGETS, "wished"])
-def test_dxf_of_every_drawing_passes_the_audit(name: str, tmp_path: Path) -> None:
-    names = export(named(name), tmp_path, ["dxf"])
-    assert len(names) == 6
-    for file in names:
-        drawing = ezdxf.readfile(tmp_path / file)
-        audit = drawing.audit()
-        assert audit.errors == []
-        assert audit.fixes == []
-        assert drawing.header["$INSUNITS"] == 4  # mm
-        used = {entity.dxf.layer for entity in drawing.modelspace()}
-        assert used <= {layer.dxf.name for layer in drawing.layers}
-        assert ("LASER" in used, "CUT" in used) == ((True, False) if name == "wished" else (False, True))
-
-
 @pytest.mark.parametrize(
     ("style", "reason"),
     [({"paper": "A5"}, "use A4, A3"), ({"layers": {"CUTS": "x"}}, "there are CUT, MARK"),
@@ -366,80 +309,3 @@ def test_options_that_make_no_sense_are_refused() -> None:
         OutputOptions(strength=0.0)
     with pytest.raises(InputError, match="0 to 1000 stages"):
         OutputOptions(stages=-1)
-
-
-def test_a_text_box_holds_its_text() -> None:
-    """Against the widths of Helvetica, for ids and numbers."""
-    from rodshell.output.pdf import _width
-
-    for words in ("U01/V12", "1234.56", "-0.07", "ends 14 % of the way", "R07.1"):
-        box = Text(words, np.zeros(2), 10.0, "LABEL").box()
-        assert np.ptp(box[:, 0]) >= 10 * _width(words)
-
-
-def by_ezdxf(drawing: Drawing, names: dict[str, str]) -> str:
-    """The same drawing as a DXF file by ezdxf."""
-    file = ezdxf.new("R2010", units=ezdxf.units.MM)
-    for name, layer in LAYERS.items():
-        file.layers.add(names.get(name, name), color=layer.number)
-    space = file.modelspace()
-    for path in drawing.paths:
-        style = {"layer": names.get(path.layer, path.layer)}
-        if not path.flat:
-            space.add_polyline3d(path.points.tolist(), close=path.closed, dxfattribs=style)
-        elif len(path.points) == 2:
-            space.add_line(*path.points.tolist(), dxfattribs=style)
-        else:
-            space.add_lwpolyline(path.points.tolist(), close=path.closed, dxfattribs=style)
-    for mark in drawing.marks:
-        style = {"layer": names.get(mark.layer, mark.layer)}
-        space.add_circle(mark.at.tolist(), mark.radius, dxfattribs=style)
-    align = {"start": TextEntityAlignment.LEFT, "middle": TextEntityAlignment.CENTER, "end": TextEntityAlignment.RIGHT}
-    for text in drawing.texts:
-        style = {"layer": names.get(text.layer, text.layer), "height": 0.72 * text.size}
-        written = space.add_text(text.text, dxfattribs=style | {"rotation": float(np.degrees(text.angle))})
-        written.set_placement(text.at.tolist(), align=align[text.anchor])
-    stream = io.StringIO()
-    file.write(stream)
-    return stream.getvalue()
-
-
-def part(dxf: str, section: str) -> list[tuple[str, str]]:
-    """Tags of one section, without handles, which are only numbers."""
-    lines = dxf.splitlines()
-    tags = list(zip(lines[::2], lines[1::2], strict=True))
-    begin = tags.index(("  2", section))
-    end = tags.index(("  0", "ENDSEC"), begin)
-    return [(code, value) for code, value in tags[begin:end] if code.strip() not in ("5", "105", "330", "350", "360")]
-
-
-@pytest.mark.parametrize("names", [{}, {"CUT": "LASER", "DIM": "Maße"}], ids=["our layers", "named layers"])
-@pytest.mark.parametrize("section", ["TABLES", "BLOCKS", "ENTITIES", "OBJECTS"])
-def test_dxf_says_what_ezdxf_would_write(section: str, names: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Word for word; entities of each kind, open and closed, in the plane and in space, texts of each alignment."""
-    monkeypatch.setattr(ezdxf.options, "write_fixed_meta_data_for_testing", True)  # no clock
-    points = np.array([[0.0, -0.0], [1.0, 2.5], [10 / 3, 1e-7]])
-    pencil = Pencil()
-    for closed in (False, True):
-        pencil.line(points, "MARK", closed=closed)
-        pencil.line(np.column_stack([points, [1.0, 2.0, 3.0]]), "BOUNDARY-FINAL", closed=closed)
-    pencil.line(points[:2], "CUT")
-    pencil.mark((1.0, 2.0), 0.5, "DIM")
-    for anchor, angle in (("start", 0.0), ("middle", 0.3), ("end", -pi / 2)):
-        pencil.write("Stück 50 %", (1.0, 2 / 3), 2.1, "LABEL", anchor=anchor, angle=angle)
-    drawing = pencil.done("a", "b", 2.0)
-    assert part(drawing_dxf(drawing, names), section) == part(by_ezdxf(drawing, names), section)
-
-
-def test_no_two_things_in_a_dxf_have_one_handle(tmp_path: Path) -> None:
-    export(archive("dome"), tmp_path, ["dxf"])
-    for file in (tmp_path / "drawings").iterdir():
-        lines = file.read_text().splitlines()
-        tags = list(zip(lines[::2], lines[1::2], strict=True))
-        seed = tags[tags.index(("  9", "$HANDSEED")) + 1]
-        handles = [int(value, 16) for code, value in tags if code in ("  5", "105") and (code, value) != seed]
-        assert len(set(handles)) == len(handles)
-        assert max(handles) < int(seed[1], 16)
-        ends = [k for k, tag in enumerate(tags) if tag == ("  0", "SEQEND")]
-        lines_in_space = [tags[k + 1][1] for k, tag in enumerate(tags) if tag == ("  0", "POLYLINE")]
-        assert [tags[k + 2][1] for k in ends] == lines_in_space  # each ends the one that it belongs to

@@ -12,14 +12,13 @@ from sample_archive import sample_archive, table_archive
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.joints import Joint, joint_parameters
-from rodshell.output.drawing import LETTER, Drawing
+from rodshell.output.drawing import LETTER, TEXT, Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
-from rodshell.output.drawings.sheets import MARGIN, TEXT, fitted, parts, tiled, title_block
+from rodshell.output.drawings.sheets import MARGIN, fitted, parts, tiled, title_block
+from rodshell.output.fonts import CAPITAL
 from rodshell.output.options import PAPERS, DrawingStyle
 from rodshell.results import Archive, Results
-
-CAPITAL = 0.718  # height of Helvetica's capitals over its size [Adobe's font metrics]
 
 
 def sheets(made: Archive) -> list[Drawing]:

@@ -9,7 +9,7 @@ from rodshell.model import Freedom
 from rodshell.rods.elements import Elements
 from rodshell.solve.constraint import Supports
 from rodshell.solve.contact_euler import ContactEuler
-from rodshell.solve.forces import Gravity
+from rodshell.solve.forces import GravityForce
 from rodshell.solve.implicit_euler import MakeMatrix, Motion, Step
 from rodshell.solve.summed import narrow_or_sparse
 
@@ -49,7 +49,7 @@ class Particles:
         self.velocity = np.zeros_like(self.state)
         nodes = np.arange(len(self.state))
         mass = np.full_like(self.state, MASS)
-        self.motion = Motion(elements, mass, Supports(free or Freedom.free(len(nodes))), (Gravity(nodes),))
+        self.motion = Motion(elements, mass, Supports(free or Freedom.free(len(nodes))), (GravityForce(nodes),))
         self.stepper = ContactEuler(ModifiedMass(target, nodes, stopped, friction), matrix)
 
     def step(self, times: int = 1) -> Step:

@@ -14,7 +14,7 @@ from rodshell.cli import main
 from rodshell.errors import InputError, OutputError, StabilityError
 from rodshell.formfinding.calming import calming, decay
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.methods import Fall
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.results.folder import read_manifest
 from rodshell.solve.report import Status
@@ -32,12 +32,12 @@ FALLS = {
 
 @cache
 def fallen(name: str) -> Draped:
-    return rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=FALLS[name])
+    return rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=FALLS[name])
 
 
 @cache
 def at_rest_by_statics() -> Draped:
-    return rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="gravity")
+    return rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=rs.Gravity())
 
 
 def apart(one: Draped, other: Draped) -> float:
@@ -53,7 +53,7 @@ def test_the_fall_comes_to_rest_where_statics_does(name: str) -> None:
     assert draped.rest is not None
     assert draped.rest.at_rest
     assert apart(draped, at_rest_by_statics()) < TENTH
-    assert draped.max_gap < 1e-9  # nodes are on the planes of their closest points, which lie outside a sphere
+    assert draped.figures.max_gap < 1e-9  # nodes are on the planes of their closest points, which lie outside a sphere
 
 
 def test_stiff_springs_part_by_little_and_shared_unknowns_by_nothing() -> None:
@@ -69,7 +69,7 @@ def test_explicit_springs_part_by_the_force_over_their_stiffness() -> None:
     gaps = []
     for stiffness in (1.0, 2.0):
         fall = Fall(coupling=ExplicitPenalty(C1=stiffness), drag=DRAG)
-        rest = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall).rest
+        rest = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall).rest
         assert rest is not None
         assert rest.at_rest
         gaps.append(rest.joint_gap)
@@ -87,7 +87,7 @@ def test_the_rest_without_friction_is_unstable_sideways_and_says_so() -> None:
 
 
 def test_a_fall_that_is_cut_short_says_that_it_is_not_at_rest() -> None:
-    draped = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=Fall(duration=0.3))
+    draped = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=Fall(duration=0.3))
     assert not draped.converged
     assert draped.report.status is Status.MOVING
     assert "NOT AT REST after 0.3 s" in draped.warnings[0]
@@ -95,12 +95,12 @@ def test_a_fall_that_is_cut_short_says_that_it_is_not_at_rest() -> None:
 
 @pytest.mark.parametrize("key", ["drag", "duration"])
 def test_what_a_fall_that_is_not_at_rest_asks_for_brings_it_to_rest(key: str) -> None:
-    short = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=Fall(drag=1.0, duration=2.5))
+    short = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=Fall(drag=1.0, duration=2.5))
     assert not short.converged
     found = re.search(rf"([\d.]+) \S+ \(drape\.{key}\)", short.warnings[0])
     assert found
     fall = Fall(drag=float(found[1])) if key == "drag" else Fall(drag=1.0, duration=float(found[1]))
-    assert rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall).converged
+    assert rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall).converged
 
 
 @pytest.mark.parametrize("rate", [0.3, 2.0])
@@ -133,12 +133,12 @@ def test_a_remedy_that_would_not_help_is_not_named(drag: float, rate: float, say
 def test_beyond_the_step_limit_of_explicit_springs_a_fall_is_refused() -> None:
     fall = Fall(coupling=ExplicitPenalty(C1=100.0), time_step=0.02)
     with pytest.raises(StabilityError, match=r"unstable at a time step of 0\.02 s \(limit 0\.00"):
-        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall)
 
 
 def test_without_a_time_step_explicit_springs_take_one_that_they_bear() -> None:
     fall = Fall(coupling=ExplicitPenalty(C1=100.0), duration=0.05)
-    draped = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+    draped = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall)
     assert draped.rest is not None
     assert draped.rest.steps >= 6
 
@@ -149,14 +149,14 @@ def test_linkers_fall_alike_with_shared_unknowns_and_with_springs() -> None:
     ends = []
     for coupling in (SharedDofs(), ImplicitPenalty()):
         fall = Fall(coupling=coupling, drag=DRAG, duration=0.15)
-        draped = rs.drape(layout, PAPER_ROD, HEMISPHERE, method="paper", fall=fall, joint=Linker())
+        draped = rs.drape(layout, PAPER_ROD, HEMISPHERE, method=fall, joint=Linker())
         ends.append(draped.positions)
     assert np.linalg.norm(ends[0] - ends[1], axis=1).max() < 1e-3 * RADIUS
 
 
 def test_frames_stream_to_disk(tmp_path: Path) -> None:
     fall = Fall(duration=0.1, stream=tmp_path / "frames", every=2)
-    draped = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+    draped = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall)
     series = TimeSeries.load(tmp_path / "frames")
     np.testing.assert_allclose(series.times, np.arange(6) * 0.02, atol=1e-12)
     nodes = len(draped.positions)
@@ -168,7 +168,7 @@ def test_frames_stream_to_disk(tmp_path: Path) -> None:
 def test_frames_replace_no_file(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("mine")
     with pytest.raises(OutputError, match=f"will not replace .*{name}"):
-        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=Fall(duration=0.1, stream=tmp_path))
+        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=Fall(duration=0.1, stream=tmp_path))
     assert (tmp_path / name).read_text() == "mine"
     assert os.listdir(tmp_path) == [name]
 
@@ -201,7 +201,7 @@ def test_friction_holds_what_else_slides_off() -> None:
     for friction in (0.0, 0.2):
         layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)
         fall = Fall(friction=friction, drag=DRAG, stopped="along the normal", duration=2.0)
-        draped = rs.drape(layout, PAPER_ROD, HEMISPHERE, method="paper", anchor=(1e-3, 0.0), fall=fall)
+        draped = rs.drape(layout, PAPER_ROD, HEMISPHERE, method=fall, anchor=(1e-3, 0.0))
         middle = draped.positions[np.argmin(np.linalg.norm(draped.mesh.flat, axis=1))]
         offsets[friction] = abs(float(middle[0]))
     assert offsets[0.2] < 1.5e-3

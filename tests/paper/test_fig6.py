@@ -12,7 +12,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import rodshell as rs
-from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.methods import Fall
 from rodshell.output.view import TOWARDS
 from rodshell.paper import drape_pictures
 from rodshell.paper.drapefigure import DrapeFigure

@@ -8,13 +8,13 @@ import pytest
 import rodshell as rs
 from rodshell.contact.modified_mass import ModifiedMass
 from rodshell.errors import StabilityError
-from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.methods import Fall
 from rodshell.joints import ExplicitPenalty, Ties
 from rodshell.layout import mesh_grid
 from rodshell.model import Freedom, Shell
 from rodshell.solve.constraint import Supports
 from rodshell.solve.contact_euler import ContactEuler
-from rodshell.solve.forces import Gravity
+from rodshell.solve.forces import GravityForce
 from rodshell.solve.implicit_euler import Motion, Step
 from rodshell.solve.step_limit import step_limit
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, coarse_layout, slope
@@ -27,7 +27,7 @@ APART = 1e-4  # m
 def tied(free: Freedom, weighing: np.ndarray) -> Motion:
     """Two nodes on a table, tied explicitly; those that weigh rest on it at every step."""
     ties = Ties(np.array([[0, 1]]), np.array([C]))
-    return Motion((), np.full((2, 3), MASS), Supports(free), (Gravity(weighing),), (ties,))
+    return Motion((), np.full((2, 3), MASS), Supports(free), (GravityForce(weighing),), (ties,))
 
 
 def swing(motion: Motion, step: float, steps: int = 50) -> np.ndarray:
@@ -81,10 +81,10 @@ def test_a_step_that_the_flat_grid_bears_is_refused_once_it_has_landed() -> None
     step = 0.97 * step_limit(Motion.of(shell), shell.state(shell.mesh.flat))
     fall = Fall(coupling=ExplicitPenalty(C1=C), time_step=step, duration=0.6)
     with pytest.raises(StabilityError, match=r"once the grid has landed: at t = 0\.\d+ s, \d+ nodes touching"):
-        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=fall)
+        rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall)
     # what is stopped along the normal alone keeps its velocity along the surface
     sliding = replace(fall, stopped="along the normal")
-    assert rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method="paper", fall=sliding).rest is not None
+    assert rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=sliding).rest is not None
 
 
 def test_without_a_time_step_the_fall_takes_one_that_is_borne_whatever_touches() -> None:
@@ -99,6 +99,6 @@ def test_without_a_time_step_the_fall_takes_one_that_is_borne_whatever_touches()
     # the rods help, but not wherever they are and whatever touches
     assert step_limit(Motion.of(shell), state, stopped=np.arange(len(state))) > 1.05 * borne
     fall = Fall(coupling=ExplicitPenalty(C1=stiffness), duration=0.08)  # not landed: no step is taken in halves
-    draped = rs.drape(coarse_layout(), thick, HEMISPHERE, method="paper", fall=fall)
+    draped = rs.drape(coarse_layout(), thick, HEMISPHERE, method=fall)
     assert draped.rest is not None
     assert draped.rest.steps == np.ceil(0.08 / (0.9 * borne))

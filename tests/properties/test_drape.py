@@ -83,7 +83,7 @@ def test_bound_drape_converges_in_few_factorisations_to_a_certified_state(name):
     assert draped.report.negative_modes == 0
     assert draped.report.factorizations <= 8  # 3 to 5 were measured
     assert draped.report.max_strain < 2e-5
-    assert draped.max_gap < 1e-12 * draped.target.size
+    assert draped.figures.max_gap < 1e-12 * draped.target.size
 
 
 @every_case
@@ -199,8 +199,9 @@ def test_pulls_are_the_nodes_that_the_target_would_have_to_hold():
         if cut is not None:
             s = draped.mesh.stations[draped.mesh.rod_slice(k)]
             on_target[draped.mesh.nodes_of(k)[(s > cut.start - 1e-9) & (s < cut.end + 1e-9)]] = True
-    assert draped.pulls == np.count_nonzero(push[on_target] < -1e-6 * np.abs(push).max())
-    assert 0 < draped.pulls < on_target.sum()  # rods of a net are straighter than the sphere near the rim
+    pulls = draped.figures.contact_pulls
+    assert pulls == np.count_nonzero(push[on_target] < -1e-6 * np.abs(push).max())
+    assert 0 < pulls < on_target.sum()  # rods of a net are straighter than the sphere near the rim
 
 
 class Lagrangian:
@@ -278,7 +279,7 @@ def test_scale_and_material_do_not_enter(scale):
     large = rs.drape(layout_of(spacing=0.05 * scale, edge=0.0125 * scale), rod, target)
     np.testing.assert_allclose(large.positions / scale, small.positions, rtol=0, atol=SAME * 0.2)
     assert large.report.factorizations == small.report.factorizations
-    assert large.pulls == small.pulls
+    assert large.figures.contact_pulls == small.figures.contact_pulls
 
 
 def test_hemisphere_keeps_the_symmetry_of_the_square_grid():

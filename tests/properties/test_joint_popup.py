@@ -141,7 +141,7 @@ def test_a_gravity_drape_with_pins_ends_where_one_with_balls_does():
     layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=SPACING, length=0.9, edge=0.0126)
     lengths = []
     for joint in (rs.Ball(), rs.Pin()):
-        fallen = rs.drape(layout, ROD, rs.Hemisphere(radius=0.2), method="gravity", joint=joint)
+        fallen = rs.drape(layout, ROD, rs.Hemisphere(radius=0.2), method=rs.Gravity(), joint=joint)
         assert fallen.converged
         lengths.append([rod.length for rod in rs.trim(fallen).mesh.grid.rods])
     assert np.abs(np.subtract(*lengths)).max() < 2e-3 * 0.2

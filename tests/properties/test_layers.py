@@ -56,7 +56,7 @@ def test_each_rod_lies_on_its_own_parallel_surface_with_its_own_lengths(name):
 @every_target
 def test_rods_end_along_the_normal_over_the_targets_end(name):
     boundary, mesh = form(name).trimmed.boundary, form(name).trimmed.mesh
-    feet, off = TARGETS[name].closest(boundary.points), form(name).draped.own_ends.max()
+    feet, off = TARGETS[name].closest(boundary.points), form(name).draped.figures.net_deviation.max()
     assert np.abs(feet[:, 2]).max() <= 1.001 * off  # the drape's own error at this spacing
     away = boundary.points - feet
     normals = TARGETS[name].on_surface(feet).normal
@@ -160,7 +160,7 @@ def test_a_grid_that_falls_in_two_layers_comes_to_rest_as_in_one():
     lengths = []
     for eccentricity in (0.0, 1e-3):
         joint = rs.Pin(eccentricity=eccentricity)
-        fallen = rs.drape(falling, ROD, TARGETS["hemisphere"], method="gravity", joint=joint)
+        fallen = rs.drape(falling, ROD, TARGETS["hemisphere"], method=rs.Gravity(), joint=joint)
         assert fallen.converged
         lengths.append([rod.length for rod in rs.trim(fallen).mesh.grid.rods])
     assert np.abs(np.subtract(*lengths)).max() < 0.01 * R
@@ -197,7 +197,7 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
     target = rs.Cap(radius=2.0, base=1.0)
     rod = lath(height)
     draped = rs.drape(layout(0.3), rod, target, joint=rs.Pin())
-    assert (draped.strong_bending.moment > 1) == buckles
+    assert (draped.figures.strong_bending.moment > 1) == buckles
     assert bool(draped.warnings) == buckles
     cut = rs.trim(draped)
     released = rs.Shell.of(cut.mesh, rod, joint=rs.Pin())
@@ -210,7 +210,7 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
 def test_laths_on_edge_buckle_by_the_curvature_of_the_surface():
     """The moment EI1/R about their strong axis, on the sphere."""
     draped = rs.drape(layout(0.06), lath(1e-3, width=2e-3), TARGETS["hemisphere"], joint=rs.Pin())
-    bent, (strong, weak) = draped.strong_bending, lath(1e-3, width=2e-3).bend_stiffnesses
+    bent, (strong, weak) = draped.figures.strong_bending, lath(1e-3, width=2e-3).bend_stiffnesses
     assert not bent.flat
     assert bent.ratio == pytest.approx(4.0)
     assert bent.curvature == pytest.approx(1 / R, rel=1e-2)  # chords of three nodes

@@ -107,7 +107,7 @@ def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remed
     """Strain is density g length / E whatever the section: no other advice is given where that is the cause."""
     rod = rs.Rod(rs.Circle(1e-3), rs.Material(youngs_modulus=stiffness, density=1e3))
     layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, length=0.9, edge=0.03)
-    form = rs.find_form(HEMISPHERE, layout, rod, method="gravity")
+    form = rs.find_form(HEMISPHERE, layout, rod, method=rs.Gravity())
     assert form.status == "converged"
     found = [text for text in form.warnings if "under their own weight" in text]
     assert len(found) == stretched
@@ -181,7 +181,7 @@ def test_a_layout_beside_the_target_is_refused():
 
 
 @pytest.mark.parametrize(("method", "status", "times"), [
-    ("gravity", Status.STALLED, 1), ("bound", Status.STALLED, 0), ("gravity", Status.SLID_OFF, 1)
+    (rs.Gravity(), Status.STALLED, 1), (rs.Bound(), Status.STALLED, 0), (rs.Gravity(), Status.SLID_OFF, 1)
 ])  # fmt: skip
 def test_a_drape_by_weight_that_fails_is_told_of_the_bound_one_once(method, status, times):
     draped = hemisphere_form().draped
@@ -255,7 +255,7 @@ def test_a_mild_target_that_does_not_converge_blames_no_curvature():
 
 def test_a_gravity_drape_that_slides_off_is_kept_too(tmp_path):
     layout = layout_of(rods=(9, 9), length=0.9, edge=0.05)
-    form = rs.find_form(HEMISPHERE, layout, ROD, method="gravity", anchor=(0.05, 0.02))
+    form = rs.find_form(HEMISPHERE, layout, ROD, method=rs.Gravity(), anchor=(0.05, 0.02))
     assert form.status == f"drape {Status.SLID_OFF.sentence}"
     kept = read(form.save(tmp_path / "slid"))
     assert kept.results.plain()["drape"]["status"] == "slid off"

@@ -92,7 +92,7 @@ def test_checks_that_were_not_reached_are_named_and_the_result_is_not_called_con
     assert kinds == {4, 3, 2, 1}
 
 
-@pytest.mark.parametrize("method", ["gravity", "paper"])
+@pytest.mark.parametrize("method", [rs.Gravity(), rs.Fall()], ids=["gravity", "fall"])
 def test_a_fall_that_is_cut_short_keeps_its_last_state(clock, method):
     layout = rs.GridLayout.orthogonal(rods=(3, 3), spacing=0.06, length=0.7, edge=0.06)
     form = rs.find_form(HEMISPHERE, layout, ROD, method=method, time_limit=3)

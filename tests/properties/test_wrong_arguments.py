@@ -6,6 +6,7 @@ import pytest
 import rodshell as rs
 
 TARGET = rs.Hemisphere(radius=0.2)
+METHODS = r"method must be rodshell.Bound\(\), rodshell.Gravity\(\) or rodshell.Fall\(\)"
 LAYOUT = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=1.0)
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
 
@@ -21,7 +22,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.sew("dome", [[(-1, 0), (1, 0)]], LAYOUT, ROD), 'target must be a rodshell Target, not "dome"'),
         (lambda: rs.drape(TARGET, LAYOUT, ROD), "layout must be a rodshell GridLayout, not a Hemisphere"),
         (lambda: rs.drape(LAYOUT, ROD, 3.0), "target must be a rodshell Target, not 3.0"),
-        (lambda: rs.drape(LAYOUT, ROD, TARGET, start="x"), 'start must be what an earlier rodshell.drape .*, not "x"'),
+        (lambda: rs.drape(LAYOUT, ROD, TARGET, warm_start="x"), 'warm_start must be what .* rodshell.drape .*"x"'),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor="0,0"), "anchor must be two finite numbers x, y in m, not '0,0'"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor=(0.0, np.nan)), "anchor must be two finite numbers"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor=0.1), "anchor must be two finite numbers x, y in m, not 0.1"),
@@ -34,12 +35,24 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
             'ends must be "pinned" or "clamped", not "x"',
         ),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=1), 'one or several of "pinned", "clamped", not 1'),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, method="bond"), '"paper", not "bond": did you mean "bound"?'),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, method="bound"), f"{METHODS}, not 'bound'"),
+        (lambda: rs.drape(LAYOUT, ROD, TARGET, method="gravity"), f"{METHODS}, not 'gravity'"),
+        (lambda: rs.drape(LAYOUT, ROD, TARGET, method=None), f"{METHODS}, not None"),
+        (lambda: rs.drape(LAYOUT, ROD, TARGET, method=rs.Fall), f"{METHODS}, not the class Fall itself"),
+        (lambda: rs.Gravity(acceleration=-5.0), "acceleration of gravity must be positive, not -5.0 m/s2"),
+        (lambda: rs.Fall(acceleration="9.81"), 'acceleration of gravity must be a number in m/s2, not "9.81"'),
+        (lambda: rs.Fall(friction=-0.1), r"the fall's friction must not be negative, not -0.1 \[-\]"),
+        (lambda: rs.Fall(drag=np.nan), "the fall's drag must be finite, not nan 1/s"),
+        (lambda: rs.Fall(coupling="implicit"), r"coupling must be rodshell.SharedDofs\(\), .*, not \"implicit\""),
+        (lambda: rs.Fall(coupling=rs.ImplicitPenalty), r"coupling must be rodshell.SharedDofs\(\), .*, not a type"),
+        (lambda: rs.Fall(stopped="partly"), 'stopped must be "wholly" or "along the normal", not "partly"'),
+        (lambda: rs.Fall(every=0), "every must be a number of steps, 1 or more, not 0"),
+        (lambda: rs.Fall(stream=3), "stream must be the path of a folder, not 3"),
+        (lambda: rs.Fall(settle="no"), 'settle must be True or False, not "no"'),
         (
-            lambda: rs.find_form(TARGET, LAYOUT, ROD, gravity=-5.0),
-            r'gravity = -5.0 m/s2: method "bound" has no gravity',
+            lambda: rs.drape(LAYOUT, ROD, TARGET, joint=(rs.Pin(),)),
+            "joint must be one rodshell .*, not a sequence",
         ),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, fall=rs.Fall()), 'nothing falls with method "bound"'),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint="pin"), r"such as rodshell.Pin\(\), not 'pin'"),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint=rs.Pin), "not the class Pin itself"),
         (lambda: rs.pop_up(None, None, ROD, ends="clampd"), 'ends must be "pinned" or "clamped", not "clampd"'),

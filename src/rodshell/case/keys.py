@@ -1,13 +1,21 @@
-"""The keys of the case file in a row, read off the schema: for messages and command-line options."""
+"""The keys of the case file in a row, read off its tables, for command-line options; and what is wrong with a key, in
+one sentence: the key, its value, and what would do."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cache
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
-from rodshell.case.schema import Case
-from rodshell.case.table import Table
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from rodshell.case.case import Case
+from rodshell.case.stage_tables import IDLE, PatchTable
+from rodshell.case.values import Table
+from rodshell.units import shown
+from rodshell.validation import either, not_a_choice
 
 BY_KIND: dict[str, str] = {
     "target": Case().target.kind,
@@ -94,3 +102,106 @@ def _keys_of(model: type[Table], prefix: str, kind: tuple[str, ...] = ()) -> Ite
         else:
             words = field.description or f"kind of {prefix.rstrip('.')}"
             yield CaseKey(path, words, kind, *_choices(field.annotation))
+
+
+def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
+    """The first thing that is wrong with the case `raw`; a misspelt key goes before the one that it meant."""
+    row = min(error.errors(), key=lambda row: row["type"] != "extra_forbidden")
+    path, value = _path(row), row["input"]
+    match row["type"]:
+        case "extra_forbidden":
+            return unknown_key(path, value, raw)
+        case "missing":
+            return f"{path} is missing: give the {_help(path)}"
+        case "literal_error":
+            return not_a_choice(path, value, case_keys()[path].choices)
+        case "union_tag_invalid":
+            path = f"{path}.kind"
+            return not_a_choice(path, value["kind"], case_keys()[path].choices)
+        case "value_error":
+            reason = str(row["ctx"]["error"])
+            return reason if path in case_tables() else f"{path} = {shown(value)}: {reason}"
+        case "string_type":
+            return f"{path} = {shown(value)}: must be text, the {_help(path)}"
+        case "tuple_type" | "model_type":
+            example = '[{ name = "B", rotate = "10 deg" }]'
+            return f"{path} = {shown(value)}: give tables in a case file, such as {example}"
+    return f"{path} = {shown(value)}: {row['msg']}"
+
+
+def unknown_key(path: str, value: object, raw: Mapping[str, Any]) -> str:
+    """A key that no case has, or not one with the kinds of `raw`; only keys that such a case has are proposed."""
+    keys = case_keys()
+    table, _, name = path.rpartition(".")
+    if path in keys:
+        kind = _table_of(raw, table)["kind"]
+        return (
+            f'{path} = {shown(value)}: a {table.rpartition(".")[2]} of kind "{kind}" has no {name}: '
+            f"leave it out, or set {table}.kind to {either(keys[path].kinds)}"
+        )
+    known = keys_of_kinds(raw)
+    if near := _nearest(path, known):
+        return f"unknown key {path}: did you mean {near}?"
+    if table in case_tables():
+        return f"unknown key {path}: [{table}] has {', '.join(_inside(table, known))}"
+    return f"unknown key {path}: the tables are {', '.join(_inside('', known))}"
+
+
+def keys_of_kinds(raw: Mapping[str, Any]) -> dict[str, CaseKey]:
+    """The keys that a case has whose tables are of the kinds that `raw` says, and its drape of that method."""
+    idle = [f"drape.{name}" for name in IDLE.get(_table_of(raw, "drape").get("method", "bound"), ())]
+    return {
+        path: key
+        for path, key in case_keys().items()
+        if path not in idle
+        and (not key.kinds or _table_of(raw, key.table).get("kind", BY_KIND[key.table]) in key.kinds)
+    }
+
+
+def not_a_table(path: str, value: object) -> str:
+    """A plain value where a table belongs."""
+    return f"{path} = {shown(value)}: must be a table; [{path}] has {', '.join(_inside(path, case_keys()))}"
+
+
+def _table_of(raw: Mapping[str, Any], path: str) -> Mapping[str, Any]:
+    """The table at a dotted path; empty where it is missing."""
+    inner = raw
+    for name in path.split("."):
+        inner = inner.get(name, {})
+    return inner
+
+
+def _help(path: str) -> str:
+    """The line of help of a key; of a key of one patch, without the patch's number."""
+    if path.startswith("seams.patches."):
+        return str(PatchTable.model_fields[path.rpartition(".")[2]].description)
+    return case_keys()[path].help
+
+
+def _nearest(path: str, keys: Mapping[str, CaseKey]) -> str | None:
+    """The key or table whose name looks most like this one: in the same table, else anywhere."""
+    table, _, name = path.rpartition(".")
+    everywhere = {key.name: key.path for key in reversed(list(keys.values()))}
+    everywhere |= {top: top for top in _inside("", keys)}
+    if len(name) < 3:  # one letter from too many names
+        everywhere = {}
+    for candidates in ({inner: f"{table}.{inner}" for inner in _inside(table, keys)} if table else {}, everywhere):
+        if close := get_close_matches(name, candidates, n=1):
+            return candidates[close[0]]
+    return None
+
+
+def _inside(table: str, keys: Mapping[str, CaseKey]) -> list[str]:
+    """Names of the keys and tables directly inside a table; of the outermost tables for ""."""
+    paths = [*keys, *case_tables()]
+    return [name for outer, _, name in (path.rpartition(".") for path in paths) if outer == table]
+
+
+def _path(row: ErrorDetails) -> str:
+    """The dotted key of an error; pydantic puts the kind behind the name of a table."""
+    path = [str(part) for part in row["loc"]]
+    for table in BY_KIND:
+        depth = table.count(".") + 1
+        if ".".join(path[:depth]) == table:
+            del path[depth : depth + 1]
+    return ".".join(path)

@@ -1,7 +1,8 @@
-"""From a name or a file, and what the command line adds, to a complete case or one clear sentence."""
+"""From a name, a file, a text or a mapping, and what is set anew, to a complete case or one clear sentence."""
 
 import tomllib
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from difflib import get_close_matches
 from os import PathLike
@@ -10,9 +11,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from rodshell.case.keys import BY_KIND, case_keys, case_tables
-from rodshell.case.schema import IDLE, Case
-from rodshell.case.sentences import not_a_table, sentence, unknown_key
+from rodshell.case.case import Case
+from rodshell.case.keys import BY_KIND, case_keys, case_tables, not_a_table, sentence, unknown_key
+from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.units import shown
 
@@ -38,7 +39,7 @@ BUILT_IN: dict[str, Raw] = {
         "drawings": {"name": "pavilion"},
     },
 }
-"""The cases that need no file, but for one named like their target's kind; the schema's defaults give the rest.
+"""The cases that need no file, but for one named like their target's kind; the tables' defaults give the rest.
 
 The pavilion is a shell to stand under: 12 m wide, of GFRP tubes as at the cathedral of Creteil.
 """
@@ -52,18 +53,26 @@ CASE_FILE = ".toml"
 FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
+RENAMED: dict[str, str] = {}
+"""Keys that were called otherwise in the last version, old -> new: still read, with a warning, for this version."""
+
+
+class RenamedKeyWarning(FutureWarning):
+    """A case has a key by its old name, which the next version will not know."""
+
 
 def load_case(
-    name_or_path: str | PathLike[str] | None,
+    source: "str | PathLike[str] | Mapping[str, object] | None",
     overrides: Mapping[str, object] | None = None,
     *,
     otherwise: Mapping[str, Raw] | None = None,
 ) -> Case:
-    """The case of this name or in this file, with some keys set anew.
+    """The case of this name, in this file or with this content, with some keys set anew.
 
     Parameters
     ----------
-    name_or_path : one of `BUILT_IN`, or the path of a TOML file, or of a surface (`BY_SUFFIX`); None: an empty case.
+    source : one of `BUILT_IN`; the path of a TOML file, or of a surface (`BY_SUFFIX`); the text of a TOML file; its
+        content as a mapping, in which dots may stand for tables in tables; None: an empty case.
     overrides : values by dotted key, {"target.radius": "250 mm"}; as in a file, or as text. Another `kind`
         keeps those keys of its table that it has too.
     otherwise : tables that stand in for those that the case does not have.
@@ -73,20 +82,63 @@ def load_case(
     InputError : no such case or file, not TOML, an unknown key, a value that cannot be used; in one sentence.
     """
     overrides = dict(overrides or {})
-    raw = {} if name_or_path is None else _read(name_or_path)
+    raw = _raw_of(source)
     raw = {**deepcopy(dict(otherwise or {})), **raw}
+    if str(source) in BUILT_IN and {"seams.lines", "seams.file"} & overrides.keys():
+        for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
+            raw.get("layout", {}).pop(key, None)
+    return _validated(raw, overrides)
+
+
+def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
+    """The same case with some keys set anew, as `load_case` does.
+
+    Raises
+    ------
+    InputError : as of `load_case`; also a key of a table that was made from an object which keys do not describe.
+    """
+    held = case.held
+    for path in overrides:
+        table = path.partition(".")[0]
+        if table in held and path in case_keys():
+            raise InputError(
+                f"{path} cannot be changed: it is {held[table].what}, which no key describes: make a new job of "
+                "another object"
+            )
+    tables = case.model_dump(exclude_none=True, exclude=set(held))
+    changed = _validated(tables, dict(overrides))
+    return changed.model_copy(update={name: getattr(case, name) for name in held})
+
+
+def flattened(changes: Mapping[str, object]) -> dict[str, object]:
+    """Values by dotted key, from a mapping in which tables may be mappings, dots, or double underscores."""
+
+    def leaves(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+        for name, value in table.items():
+            path = prefix + name.replace("__", ".")
+            if isinstance(value, Mapping) and path in case_tables():
+                yield from leaves(f"{path}.", value)
+            else:
+                yield path, value
+
+    return dict(leaves("", changes))
+
+
+def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
+    """The case of tables as they were read, with some keys set anew."""
+    _rename(raw, overrides)
     for path in case_tables():
         if not isinstance(_table(raw, path), dict):
             raise InputError(not_a_table(path, _table(raw, path)))
+    section = raw["rod"]["section"]
+    if section.get("kind") == "auto" and any(key.startswith("rod.section.") for key in overrides):
+        del section["kind"]
     for path, kind in BY_KIND.items():
         table = _table(raw, path)
         if path == "rod.section" and (table or any(key.startswith("rod.section.") for key in overrides)):
             kind = "circle"
         table.setdefault("kind", kind)
     _drop_for_another_kind(raw, overrides)
-    if str(name_or_path) in BUILT_IN and {"seams.lines", "seams.file"} & overrides.keys():
-        for key in ("rods", "length"):  # of the whole; what seams cut has them from its patches
-            raw["layout"].pop(key, None)
     for path, value in overrides.items():
         if path not in case_keys():
             raise InputError(unknown_key(path, value, raw))
@@ -96,6 +148,30 @@ def load_case(
         return Case.model_validate(raw)
     except ValidationError as error:
         raise InputError(sentence(error, raw)) from None
+
+
+def _rename(raw: Raw, overrides: dict[str, object]) -> None:
+    """Give keys that stand under their old names their new ones, with a warning each."""
+    for old, new in RENAMED.items():
+        old_table, _, old_name = old.rpartition(".")
+        new_table, _, new_name = new.rpartition(".")
+        table = _found_table(raw, old_table)
+        if old in overrides or old_name in table:
+            warnings.warn(f"the key {old} is now called {new}: rename it", RenamedKeyWarning, stacklevel=2)
+        if old in overrides:
+            overrides.setdefault(new, overrides.pop(old))
+        if old_name in table:
+            _table(raw, new_table).setdefault(new_name, table.pop(old_name))
+            if not table and old_table not in case_tables():
+                del raw[old_table]
+
+
+def _found_table(raw: Raw, path: str) -> Raw:
+    """The table at a dotted path; empty where there is none."""
+    inner: Any = raw
+    for name in path.split("."):
+        inner = inner.get(name, {}) if isinstance(inner, dict) else {}
+    return inner if isinstance(inner, dict) else {}
 
 
 def _table(raw: Raw, path: str) -> Any:
@@ -126,10 +202,17 @@ def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
             target.pop(name, None)
 
 
-def _read(name_or_path: str | PathLike[str]) -> Raw:
-    name, path = str(name_or_path), Path(name_or_path)
+def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> Raw:
+    """The tables of a source, their keys as they stand there."""
+    if source is None:
+        return {}
+    if isinstance(source, Mapping):
+        return _nested(source)
+    name, path = str(source), Path(source)
     if name in BUILT_IN:
         return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
+    if isinstance(source, str) and ("\n" in source or ("=" in source and not path.exists())):
+        return _parsed("the text", source)
     if kind := BY_SUFFIX.get(path.suffix.lower()):
         return {"target": {"kind": kind, "file": name}}
     if path.is_dir():
@@ -139,13 +222,36 @@ def _read(name_or_path: str | PathLike[str]) -> Raw:
         hint = f"did you mean {near[0]}?" if near else f"give a case file, a surface, or one of {', '.join(BUILT_IN)}"
         raise InputError(f"there is no case and no file named {shown(name)}: {hint}")
     try:
-        return _beside(path, tomllib.loads(path.read_bytes().decode("utf-8-sig")))
+        text = path.read_bytes().decode("utf-8-sig")
     except OSError as reason:
         raise InputError(f"{name} cannot be read: {reason.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(_unknown_type(path) or f"{name} is not text in UTF-8: save it as UTF-8") from None
+    return _from_its_folder(path, _parsed(name, text, _unknown_type(path)))
+
+
+def _parsed(name: str, text: str, wrong_type: str = "") -> Raw:
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as reason:
-        raise InputError(_unknown_type(path) or f"{name} is not valid TOML: {reason}") from None
+        raise InputError(wrong_type or f"{name} is not valid TOML: {reason}") from None
+
+
+def _nested(mapping: Mapping[str, object]) -> Raw:
+    """A mapping as TOML gives it: tables in tables, where a key may also have dots."""
+    raw: Raw = {}
+    for path, value in mapping.items():
+        if not isinstance(path, str):
+            raise InputError(f"the keys of a case are words such as target.radius, not {path!r}")
+        table, _, name = path.rpartition(".")
+        inner = _table(raw, table) if table else raw
+        if not isinstance(inner, dict):
+            raise InputError(not_a_table(table, inner))
+        if isinstance(value, Mapping):
+            inner[name] = {**inner.get(name, {}), **_nested(value)}
+        else:
+            inner[name] = deepcopy(value)
+    return raw
 
 
 def _unknown_type(path: Path) -> str:
@@ -162,7 +268,7 @@ def _wanted_in(folder: Path) -> str:
     return f"a file in it, such as {files[0]}" if files else FILES
 
 
-def _beside(path: Path, raw: Raw) -> Raw:
+def _from_its_folder(path: Path, raw: Raw) -> Raw:
     """Files that a case names lie in its own folder, unless they are given from the root."""
     for name, keys in FILE_KEYS.items():
         table = raw.get(name)

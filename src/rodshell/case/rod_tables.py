@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from rodshell.case.table import Table
 from rodshell.case.values import (
     Angle,
     BendingStiffness,
@@ -24,6 +23,7 @@ from rodshell.case.values import (
     SectionModulus,
     Stiffness,
     Stress,
+    Table,
 )
 from rodshell.errors import InputError
 from rodshell.rods.materials import Material, PresetName, preset_values

@@ -4,8 +4,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
-from rodshell.case.table import Table
-from rodshell.case.values import Angles, Coordinate, Factor, Length, Point3, Size, Unit
+from rodshell.case.values import Angles, Coordinate, Factor, Length, Point3, Size, Table, Unit
 
 if TYPE_CHECKING:
     from rodshell.targets import Target

@@ -1,17 +1,55 @@
-"""The types of single values in a case file. A reader raises ValueError with the reason, without the key."""
+"""What a table of a case file is, and the types of its values.
+
+A reader of a value raises ValueError with the reason, without the key.
+"""
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import date
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BeforeValidator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr
 
 from rodshell.units import Kind, read_quantity, require_unit_of_all, wanted
 
 Auto = Literal["auto"]
 Reader = Callable[[object], float]
 T = TypeVar("T")
+
+
+class Table(BaseModel):
+    """A table of a case file: frozen, and every key in it must be known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    _held: "Held | None" = PrivateAttr(default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """An object of which a table was made whose keys do not describe it: a Python function as a target, say.
+
+    Parameters
+    ----------
+    value : the object.
+    what : it in words.
+    by_value : whether two such objects are the same that are equal; else only one object is the same as itself.
+    writable : whether a case file that leaves out what the keys do not describe gives the same form.
+    """
+
+    value: Any
+    what: str
+    by_value: bool = True
+    writable: bool = False
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Held):
+            return NotImplemented
+        return self.value is other.value or (self.by_value and other.by_value and bool(self.value == other.value))
+
+    def __hash__(self) -> int:
+        return hash(self.what)
 
 
 def quantity(kind: Kind) -> Reader:

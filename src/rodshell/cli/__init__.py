@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 from rodshell.cli.interruption import Interrupted, Interruption, end_at_once
@@ -16,10 +17,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     0 found, 2 bad input, 3 not converged or out of time, 4 found but not buildable, 130 interrupted by Ctrl-C, 143 by
     SIGTERM.
     """
-    with Interruption() as interruption:
+    with Interruption() as interruption, warnings.catch_warnings():
         try:
-            from rodshell.cli.app import app
+            from rodshell.cli.app import app, print_warnings
 
+            print_warnings()
             code = app.main(args=argv, prog_name="rodshell", standalone_mode=False)
             return code if isinstance(code, int) else 0
         except BaseException as error:  # an interrupt in the middle of an import, say, becomes an error of any kind

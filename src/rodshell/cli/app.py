@@ -1,12 +1,14 @@
 """The commands. Only click is imported here, so that --help and --version answer at once."""
 
+import warnings
 from difflib import get_close_matches
 from importlib import import_module
+from typing import Any
 
 import click
 
 from rodshell.cli.interruption import Interrupted
-from rodshell.errors import InputError, OutOfTimeError, RodshellError
+from rodshell.errors import InputError, OutOfTimeError, OutputWarning, RodshellError
 
 COMMANDS = {
     "form": "From a target to the flat grid that pops up into it.",
@@ -72,6 +74,20 @@ def app(ctx: click.Context) -> None:
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
+
+
+def print_warnings() -> None:
+    """From now on, print a warning about written files as one sentence; others as Python does."""
+    usual = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if issubclass(category, OutputWarning):
+            click.echo(f"rodshell: warning: {message}", err=True)
+        else:
+            usual(message, category, *where, **more)
+
+    warnings.simplefilter("always", OutputWarning)
+    warnings.showwarning = show
 
 
 def failed(error: BaseException) -> int:

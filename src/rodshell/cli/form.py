@@ -116,7 +116,7 @@ def _form(
     target, layout, rod, options = case.build()
     _announce_sizes(case, target, layout, quiet=quiet)
     if case.drape.frames:
-        options["fall"] = replace(options["fall"], stream=place.new / case.drape.frames)
+        options["method"] = replace(options["method"], stream=place.new / case.drape.frames)
     from rodshell.form import find_form
 
     found = None

@@ -112,7 +112,7 @@ def _meshes() -> None:
 def _gravity() -> None:
     import rodshell as rs
 
-    rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method="gravity")
+    rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method=rs.Gravity())
 
 
 def _falls() -> None:
@@ -123,9 +123,9 @@ def _falls() -> None:
         for joint in (rs.Ball(), rs.Linker()):
             step = 1e-4 if isinstance(coupling, rs.ExplicitPenalty) else 5e-3
             fall = rs.Fall(coupling=coupling, duration=8 * step, time_step=step)
-            rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method="paper", joint=joint, fall=fall)
+            rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method=fall, joint=joint)
     rubbing = rs.Fall(friction=0.3, duration=0.2, time_step=1e-2, height=1e-3)
-    rs.drape(_few(), _rod(), rs.Ellipsoid(a=0.2, b=0.15, c=0.12), method="paper", fall=rubbing)
+    rs.drape(_few(), _rod(), rs.Ellipsoid(a=0.2, b=0.15, c=0.12), method=rubbing)
 
 
 def _single_rods() -> None:
@@ -139,7 +139,7 @@ def _single_rods() -> None:
         one = rs.Rod(section, rs.Material(youngs_modulus=1e7, density=1e3))
         rod = rs.ElasticRod.of(straight, one, clamped=("start",), twist=twist)
         rs.solve_rod(rod, forces={-1: (0.0, 0.0, -1e-4)})
-        motion = rs.Motion.of(rod, forces=(rs.Gravity(rod.nodes),))
+        motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
         rs.simulate(motion, rod.state(), until=4e-3, step=1e-3)
 
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.contact.bound import BoundToTarget
-from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.draped import Draped, DrapeFigures
+from rodshell.formfinding.methods import Bound
 from rodshell.formfinding.natural import with_natural_ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.thickness import layers_left_out, strong_bending
@@ -44,14 +45,15 @@ def bound_drape(
     rod: Rod,
     *,
     anchor: tuple[float, float] | None = None,
-    near: Draped | None = None,
+    warm_start: Draped | None = None,
     joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Drape `layout` over `target` by its net; see `drape`."""
     progress("net", "marching", 0.0)
     eccentricity = joint.eccentricity if joint else 0.0
-    net = chebyshev_net(target, layout, anchor=anchor, near=near.net if near else None, eccentricity=eccentricity)
+    near = warm_start.net if warm_start else None
+    net = chebyshev_net(target, layout, anchor=anchor, near=near, eccentricity=eccentricity)
     grid = with_apron(net, CLEARANCE * layout.edge)
     cuts = [list[FlatRod]() for _ in grid.rods]
     for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
@@ -98,26 +100,27 @@ def bound_drape(
             f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
             "joints there must close far; another anchor or heading, a smaller part or a seam may open them"
         )
+    figures = DrapeFigures(
+        max_gap=float(np.abs(target.distance(found.state[on_target])).max()),
+        contact_pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
+        min_angle=net.min_angle,
+        min_angle_at=net.min_angle_at,
+        net_deviation=_net_deviation(target, mesh, cuts, found.state),
+        strong_bending=strong,
+    )
     return Draped(
-        method="bound",
+        method=Bound(),
         target=target,
         layout=layout,
         rod=rod,
+        anchor=anchor,
+        eccentricity=eccentricity,
         mesh=mesh,
         positions=found.state,
         rods=tuple(line for line in net.rods if not line.virtual),
         levels=(found.report,),
-        max_gap=float(np.abs(target.distance(found.state[on_target])).max()),
-        pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
-        min_angle=net.min_angle,
-        min_angle_at=net.min_angle_at,
-        own_ends=_own_ends(target, mesh, cuts, found.state),
-        anchor=anchor,
-        gravity=0.0,
+        figures=figures,
         net=net,
-        eccentricity=eccentricity,
-        strong_bending=strong,
-        dropped=net.dropped,
         warnings=tuple(warnings),
     )
 
@@ -210,7 +213,7 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
     ]
 
 
-def _own_ends(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
+def _net_deviation(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
     """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
     windows, places = list[Ints](), list[Floats]()
     for k, pieces in enumerate(cuts):

@@ -1,24 +1,18 @@
-"""Drape: lay the flat grid on the target."""
+"""Drape: lay the flat grid on the target, by one of three methods."""
 
-from typing import Literal, get_args
+from collections.abc import Sequence
 
 from rodshell.errors import InputError
 from rodshell.formfinding.bound import bound_drape
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.fall import Fall
 from rodshell.formfinding.gravity import gravity_drape
+from rodshell.formfinding.methods import Bound, Gravity, Method, require_method
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.joints import Joint
+from rodshell.joints import Joint, require_joint
 from rodshell.layout import GridLayout
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
-from rodshell.validation import choice, instance, point
-
-Method = Literal["bound", "gravity", "paper"]
-
-
-STANDARD_GRAVITY = 9.81  # m/s2, as in the paper
-METHODS: tuple[Method, ...] = get_args(Method)
+from rodshell.validation import instance, point
 
 
 def drape(
@@ -26,54 +20,50 @@ def drape(
     rod: Rod,
     target: Target,
     *,
-    method: Method = "bound",
+    method: Method = Bound(),
     anchor: tuple[float, float] | None = None,
-    gravity: float | None = None,
     joint: Joint | None = None,
-    fall: Fall | None = None,
-    start: Draped | None = None,
+    warm_start: Draped | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Lay a flat grid of rods on a target.
 
     Parameters
     ----------
-    method : "bound" marches the inextensible net and binds the grid to it; "gravity" lets the user's own rods
-        fall on the target (static equilibrium, frictionless unilateral contact), from flat; "paper" lets them
-        fall in time, as the paper does.
+    layout : the flat grid asked for.
+    rod : section and material of every rod.
+    target : the surface, with its end.
+    method : `Bound()` marches the inextensible net and binds the grid to it; `Gravity()` lets the rods hang on the
+        target (static equilibrium, frictionless unilateral contact), from flat; `Fall()` lets them fall on it in
+        time, as the paper does.
     anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
-    gravity : acceleration [m/s2], for methods "gravity" and "paper"; default: 9.81.
-    joint : what the rods do to each other where they cross, for methods "gravity" and "paper"; ball joints
-        without. The bound drape's net is a matter of geometry: the joint's eccentricity lays its rods in two layers.
-    fall : height, time stepping, coupling, friction and drag, for method "paper".
-    start : a grid draped before. Method "bound" looks for the net near the one found then, which changes nothing but
-        the time. The others always fall from flat: without friction a grid that starts where another lay may turn
-        and end elsewhere.
+    joint : what the rods do to each other where they cross; ball joints by default. With `Bound()`, whose net is a
+        matter of geometry, only its eccentricity is of effect: it lays the rods in two layers.
+    warm_start : a grid draped before. `Bound()` starts its net from the earlier one, which changes nothing but the
+        time. The others always start from flat: without friction a grid that starts where another lay may turn and
+        end elsewhere.
+    progress : called as progress(stage, detail, residual) at every iteration.
 
     Raises
     ------
-    InputError, NetLimitError : the layout does not fit the target; no net exists.
+    InputError : a value is of the wrong kind, or the layout does not fit the target.
+    NetLimitError : no net covers the target from this anchor and heading.
+    StabilityError : the fall's time step is beyond the stability limit of explicit ties.
     """
     for name, value, kind in (("layout", layout, GridLayout), ("rod", rod, Rod), ("target", target, Target)):
         instance(name, value, kind)
-    if start is not None:
-        instance("start", start, Draped, "what an earlier rodshell.drape returned")
+    require_method(method)
+    require_joint(joint)
+    if isinstance(joint, Sequence):
+        raise InputError("joint must be one rodshell joint for all crossings of a drape, not a sequence of joints")
+    if warm_start is not None:
+        instance("warm_start", warm_start, Draped, "what an earlier rodshell.drape returned")
     if anchor is not None:
         point("anchor", anchor)
-    _uses_all(choice("method", method, METHODS), gravity, fall)
-    gravity = STANDARD_GRAVITY if gravity is None else gravity
-    if method == "bound":
-        return bound_drape(target, layout, rod, anchor=anchor, near=start, joint=joint, progress=progress)
-    if method == "gravity":
-        return gravity_drape(target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, progress=progress)
-    from rodshell.formfinding.falling import falling_drape  # with the dynamics
+    if isinstance(method, Bound):
+        return bound_drape(target, layout, rod, anchor=anchor, warm_start=warm_start, joint=joint, progress=progress)
+    if isinstance(method, Gravity):
+        return gravity_drape(target, layout, rod, method, anchor=anchor, joint=joint, progress=progress)
+    from rodshell.formfinding.falling import falling_drape  # imported here: it loads the dynamics
 
-    return falling_drape(target, layout, rod, anchor=anchor, gravity=gravity, joint=joint, fall=fall, progress=progress)
-
-
-def _uses_all(method: Method, gravity: float | None, fall: Fall | None) -> None:
-    """InputError where an argument is given that the method does not use."""
-    if method == "bound" and gravity is not None:
-        raise InputError(f'gravity = {gravity} m/s2: method "bound" has no gravity: leave it out, or use "gravity"')
-    if method != "paper" and fall is not None:
-        raise InputError(f'fall: nothing falls with method "{method}": leave it out, or use method "paper"')
+    return falling_drape(target, layout, rod, method, anchor=anchor, joint=joint, progress=progress)

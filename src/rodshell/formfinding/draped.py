@@ -1,4 +1,4 @@
-"""The draped grid: what both ways of draping return."""
+"""The draped grid: what all three methods return."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.methods import Method
 from rodshell.formfinding.thickness import StrongBending
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
@@ -20,49 +20,66 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class DrapeFigures:
+    """How well a grid lies on its target.
+
+    Parameters
+    ----------
+    max_gap : largest distance between the target and a node that should touch it, or depth of a node inside [m].
+    contact_pulls : number of nodes on the target that it would have to pull to hold them.
+    min_angle : smallest angle between two rods at a joint on the target [rad].
+    min_angle_at : x, y, z of that joint [m].
+    net_deviation : (k, 2) how far past its ends in the flat grid each of the `rods` would end by this drape alone, at
+        start and end, along the rod [m]; None where both are the same.
+    strong_bending : of rods with a strong axis whose joints keep them from rolling (`Bound`); else None.
+    """
+
+    max_gap: float
+    contact_pulls: int
+    min_angle: float
+    min_angle_at: tuple[float, float, float]
+    net_deviation: Floats | None = None
+    strong_bending: StrongBending | None = None
+
+
+@dataclass(frozen=True)
 class Draped:
     """A flat grid lying on a target, not yet trimmed.
 
     Parameters
     ----------
+    method : how it was draped.
+    target, layout, rod, anchor : as they were given; anchor is x, y [m], or None.
+    eccentricity : distance of the two layers of rods [m]; 0 where they meet.
     mesh : the whole mesh, with the lines and tails that are cut off later.
     positions : (n, 3) of its nodes [m]; of rods in two layers, of the surface between the layers.
-    rods : the rods to be built, each from end to end of the target (bound), or whole (gravity).
+    rods : the k rods to be built, each from end to end of the target (`Bound`), or whole (`Gravity`, `Fall`).
     levels : report of the solve on each level of refinement, the last at the layout's own edge length.
-    max_gap : largest distance between the target and a node that should touch it, or depth of a node inside [m].
-    pulls : number of nodes on the target that it would have to pull to hold them.
-    min_angle : smallest angle between two rods at a joint on the target [rad], at the point `min_angle_at` [m].
-    own_ends : (k, 2) how far past its ends in the flat grid each of the `rods` would end by this drape alone, along
-        the rod [m]; None where they are the same.
-    anchor : x, y of the anchor as it was given [m], or None; gravity : [m/s2].
+    figures : how well the grid lies on the target.
     net : the net that the drape started from; None where it started from the flat grid.
-    rest, fall : how it came to rest, and how it fell, where it fell in time (paper).
-    eccentricity : distance of the two layers of rods [m]; 0 where they meet.
-    strong_bending : of rods with a strong axis, where joints keep them from rolling (bound).
+    rest : how it came to rest, where it moved in time (`Fall`); else None.
+    warnings : sentences for the user.
     """
 
-    method: str
+    method: Method
     target: Target
     layout: GridLayout
     rod: Rod
+    anchor: tuple[float, float] | None
+    eccentricity: float
     mesh: GridMesh
     positions: Floats
     rods: tuple[FlatRod, ...]
     levels: tuple[SolveReport, ...]
-    max_gap: float
-    pulls: int
-    min_angle: float
-    min_angle_at: tuple[float, float, float]
-    own_ends: Floats | None
-    anchor: tuple[float, float] | None
-    gravity: float
-    net: ChebyshevNet | None
-    dropped: tuple[tuple[str, str], ...] = ()
-    warnings: tuple[str, ...] = ()
+    figures: DrapeFigures
+    net: ChebyshevNet | None = None
     rest: "Rest | None" = None
-    fall: Fall | None = None
-    eccentricity: float = 0.0
-    strong_bending: StrongBending | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def dropped(self) -> tuple[tuple[str, str], ...]:
+        """Names of the rods that have no place on the target, each with the reason."""
+        return self.net.dropped if self.net is not None else ()
 
     @property
     def report(self) -> SolveReport:

@@ -14,8 +14,8 @@ from rodshell.arrays import Floats, Ints
 from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
 from rodshell.formfinding.calming import calming
-from rodshell.formfinding.draped import Draped, middle_surface, smallest_joint_angle
-from rodshell.formfinding.fall import Fall
+from rodshell.formfinding.draped import Draped, DrapeFigures, middle_surface, smallest_joint_angle
+from rodshell.formfinding.methods import Fall
 from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, held_back, joint_gap, lowest_modes, out_of_balance
@@ -25,7 +25,7 @@ from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
 from rodshell.solve.contact_euler import ContactEuler
-from rodshell.solve.forces import Damping, Gravity
+from rodshell.solve.forces import Damping, GravityForce
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.report import SolveReport, Status
 from rodshell.solve.simulate import simulate
@@ -49,11 +49,10 @@ def falling_drape(
     target: Target,
     layout: GridLayout,
     rod: Rod,
+    fall: Fall,
     *,
     anchor: tuple[float, float] | None = None,
-    gravity: float = 9.81,
     joint: Joint | None = None,
-    fall: Fall | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Let `layout` fall on `target` in time; see `drape`.
@@ -63,12 +62,11 @@ def falling_drape(
     StabilityError : the time step is beyond the limit of explicit ties, at the start or where the grid has landed.
     ConvergenceError : the first step fails however small. A later one ends the fall, which is then not at rest.
     """
-    fall = fall or Fall()
-    top = standing_point(target, anchor, gravity)
+    top = standing_point(target, anchor)
     grid = falling_grid(target, layout, anchor)
     mesh = mesh_grid(grid, layout.edge, marks=middle_marks(grid, layout))
     shell = Shell.of(mesh, rod, joint=joint, coupling=fall.coupling)
-    falling = _Falling(target, shell, gravity, fall, progress)
+    falling = _Falling(target, shell, fall, progress)
     series = falling.run(over(shell.mesh, layout, top + [0.0, 0.0, fall.height]))
     rest, report = falling.outcome(series)
     assert series.last is not None
@@ -76,37 +74,36 @@ def falling_drape(
     if not report.reason and slid_off(mesh, positions, layout, top, target):
         report = replace(report, status=Status.SLID_OFF)
     angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
+    figures = DrapeFigures(
+        max_gap=float(max(0.0, -target.contact(positions).distance.min())),
+        contact_pulls=falling.pulls(series.last),
+        min_angle=angle,
+        min_angle_at=where,
+    )
     return Draped(
-        method="paper",
+        method=fall,
         target=target,
         layout=layout,
         rod=rod,
+        anchor=anchor,
+        eccentricity=joint.eccentricity if joint else 0.0,
         mesh=mesh,
         positions=positions,
         rods=grid.rods,
         levels=(report,),
-        max_gap=float(max(0.0, -target.contact(positions).distance.min())),
-        pulls=falling.pulls(series.last),
-        min_angle=angle,
-        min_angle_at=where,
-        own_ends=None,
-        anchor=anchor,
-        gravity=gravity,
-        net=None,
-        eccentricity=joint.eccentricity if joint else 0.0,
-        warnings=_warnings(rest, series, falling),
+        figures=figures,
         rest=rest,
-        fall=fall,
+        warnings=_warnings(rest, series, falling),
     )
 
 
 class _Falling:
     """The motion, and what is asked of it on the way and at its end."""
 
-    def __init__(self, target: Target, shell: Shell, gravity: float, fall: Fall, progress: Progress) -> None:
+    def __init__(self, target: Target, shell: Shell, fall: Fall, progress: Progress) -> None:
         massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # linkers' own nodes, too: they fall and land
         every = len(massive) == len(shell.like)  # a slice is faster
-        pull = Gravity(slice(None) if every else massive, (0.0, 0.0, -gravity))
+        pull = GravityForce(slice(None) if every else massive, (0.0, 0.0, -fall.acceleration))
         self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
         self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
         self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)

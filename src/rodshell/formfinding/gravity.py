@@ -13,7 +13,15 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.contact.unilateral import UnilateralContact
-from rodshell.formfinding.draped import Draped, laid_in_layers, middle_surface, node_normals, smallest_joint_angle
+from rodshell.formfinding.draped import (
+    Draped,
+    DrapeFigures,
+    laid_in_layers,
+    middle_surface,
+    node_normals,
+    smallest_joint_angle,
+)
+from rodshell.formfinding.methods import Gravity
 from rodshell.formfinding.overhead import falling_grid, middle_marks, over, slid_off, standing_point
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint
@@ -36,14 +44,14 @@ def gravity_drape(
     target: Target,
     layout: GridLayout,
     rod: Rod,
+    method: Gravity,
     *,
     anchor: tuple[float, float] | None = None,
-    gravity: float = 9.81,
     joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
     """Let `layout` fall on `target`; see `drape`."""
-    top = standing_point(target, anchor, gravity)
+    gravity, top = method.acceleration, standing_point(target, anchor)
     grid = falling_grid(target, layout, anchor)
     mesh: GridMesh | None = None
     state: Floats | None = None
@@ -74,24 +82,24 @@ def gravity_drape(
             f"the draped state is a saddle or near one ({levels[-1].negative_modes} negative modes): without friction "
             'the grid would slide off; method "bound" does not depend on this'
         )
+    figures = DrapeFigures(
+        max_gap=float(max(0.0, -target.contact(state).distance.min())),
+        contact_pulls=int(np.count_nonzero(contact.multipliers < 0)),
+        min_angle=angle,
+        min_angle_at=where,
+    )
     return Draped(
-        method="gravity",
+        method=method,
         target=target,
         layout=layout,
         rod=rod,
+        anchor=anchor,
+        eccentricity=apart,
         mesh=mesh,
         positions=state,
         rods=grid.rods,
         levels=tuple(levels),
-        max_gap=float(max(0.0, -target.contact(state).distance.min())),
-        pulls=int(np.count_nonzero(contact.multipliers < 0)),
-        min_angle=angle,
-        min_angle_at=where,
-        own_ends=None,
-        anchor=anchor,
-        gravity=gravity,
-        net=None,
-        eccentricity=apart,
+        figures=figures,
         warnings=tuple(warnings),
     )
 

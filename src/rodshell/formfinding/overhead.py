@@ -12,15 +12,13 @@ OVERHANG = 4.0  # spacings that a rod of automatic length hangs over the target'
 SLIPPED = 0.2  # of the size: a joint of the axes that has moved so far from its vertical plane has slid off
 
 
-def standing_point(target: Target, anchor: tuple[float, float] | None, gravity: float) -> Floats:
+def standing_point(target: Target, anchor: tuple[float, float] | None) -> Floats:
     """(3,) the point of the target under the layout's middle [m].
 
     Raises
     ------
-    InputError : gravity does not pull; the anchor lies outside the target.
+    InputError : the anchor lies outside the target.
     """
-    if not gravity > 0:
-        raise InputError(f"gravity must be positive, not {gravity} m/s2")
     x, y = anchor if anchor is not None else target.summit
     top = target.lift(np.array([[x, y]]))[0]
     if target.margin(top[None])[0] <= 0:

@@ -9,10 +9,10 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.agreement import Agreement, agreement
-from rodshell.formfinding.drape import Method, drape
+from rodshell.formfinding.drape import drape
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.fall import Fall
 from rodshell.formfinding.flatness import flat_warning
+from rodshell.formfinding.methods import Bound, Method
 from rodshell.formfinding.popup import ENDS, Ends, Popped, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.roll import roll
@@ -68,7 +68,7 @@ class FoundForm:
             return self.draped.report.reason
         if not self.draped.converged:
             sentence = self.draped.report.status.sentence
-            weighed = self.draped.method != "bound" and "bound" not in sentence
+            weighed = not isinstance(self.draped.method, Bound) and "bound" not in sentence
             other = ', or use method = "bound", which asks for no weight' if weighed else ""
             return f"drape {sentence}{other}"
         return _popped_status(self.popped)
@@ -107,11 +107,9 @@ def find_stages(
     layout: GridLayout,
     rod: Rod,
     *,
-    method: Method = "bound",
+    method: Method = Bound(),
     anchor: tuple[float, float] | None = None,
-    gravity: float | None = None,
     joint: Joint | None = None,
-    fall: Fall | None = None,
     ends: Ends | Sequence[Ends] = ENDS,
     start: FoundForm | None = None,
     cut: Callable[[Draped], Trimmed] = trim,
@@ -126,10 +124,10 @@ def find_stages(
     joint = joint or Ball()
     draped = drape(
         layout, rod, target,
-        method=method, anchor=anchor, gravity=gravity, joint=joint, fall=fall,
-        start=start.draped if start else None, progress=progress,
+        method=method, anchor=anchor, joint=joint,
+        warm_start=start.draped if start else None, progress=progress,
     )  # fmt: skip
-    trimmed = cut(draped) if draped.converged or draped.method == "bound" else untrimmed(draped)
+    trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
     footprint = map_back(trimmed)
     popped, last = dict[Ends, Popped](), start.popped if start else {}
     for end in ends if draped.converged else ():
@@ -207,7 +205,7 @@ def _popped_status(popped: dict[Ends, Popped]) -> str:
 def _stretched(draped: Draped) -> tuple[str, ...]:
     """Rods that hang stretch by weight over stiffness, in which their section's area cancels out."""
     strain = draped.report.max_strain
-    if draped.method == "bound" or not draped.converged or strain <= STRETCHED:
+    if isinstance(draped.method, Bound) or not draped.converged or strain <= STRETCHED:
         return ()
     return (
         f"on the target the rods stretch by {100 * strain:.2g} % under their own weight, so that they are cut too "

@@ -7,6 +7,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.draped import Draped, laid_in_layers, node_normals
+from rodshell.formfinding.methods import Bound
 from rodshell.geometry.vectors import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
@@ -74,7 +75,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     """
     margin = NEAREST_JOINT * min(draped.layout.spacing)
     rods, positions, dropped = draped.rods, draped.positions, list(draped.dropped)
-    if draped.method == "bound":
+    if isinstance(draped.method, Bound):
         source = draped.mesh
     else:
         rods, lost = _cut_rods(draped)
@@ -90,7 +91,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     positions = positions[nodes]
     normals: Floats | None = None
     if draped.eccentricity:
-        bound = draped.method == "bound"
+        bound = isinstance(draped.method, Bound)
         normals = draped.target.on_surface(positions).normal if bound else node_normals(mesh, positions)
         mesh, positions, normals = laid_in_layers(mesh, positions, normals, draped.eccentricity)
     boundary = Boundary(positions[mesh.ends.ravel()], end_tangents(mesh, positions), positions, normals)

@@ -15,7 +15,7 @@ Anchor = Literal["start", "middle", "end"]
 
 INK, SOFT, PALE, PAPER = "#22282f", "#6c757d", "#c9ced3", "#ffffff"
 LETTER = 0.62  # width of a capital or digit over the text size
-CAP = 0.72  # height of a capital over the text size
+TEXT = 3.43  # mm: size of usual texts on paper, whose capitals are 2.5 mm high, the usual nominal size of ISO 3098
 SMALL = 0.75  # size of the smallest texts over the usual one: where capitals are 2.5 mm high, these have 1.9 mm
 LINE = 0.95  # height of a line of text over its size, a little air included,
 BELOW = 0.2  # of which this much is below its baseline
@@ -65,7 +65,7 @@ class Path:
 
     @property
     def flat(self) -> bool:
-        return self.points.shape[1] == 2
+        return bool(self.points.shape[1] == 2)
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Drawing:
 
     Parameters
     ----------
-    text : usual size of its texts [mm]; pens are as wide as on paper with texts of 3.5 mm.
+    text : usual size of its texts [mm]; pens are as wide as on paper with texts of the size TEXT.
     left_out : what found no room, in words.
     """
 
@@ -130,8 +130,13 @@ class Drawing:
 
     def pen(self, item: Path | Mark) -> Pen:
         """The item's own pen, or that of its layer."""
-        layer, wide = LAYERS[item.layer], self.text / 3.5
+        layer, wide = LAYERS[item.layer], self.pen_scale
         return item.pen or Pen(layer.colour, wide * layer.pen, tuple(wide * dash for dash in layer.dash))
+
+    @property
+    def pen_scale(self) -> float:
+        """Width of its lines over that of the same lines on paper."""
+        return self.text / TEXT
 
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest x and y of all that is in the plane (2,), (2,)."""

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rodshell.output.colours import HEIGHT, hex_colours
+from rodshell.output.colour_scale import HEIGHT, hex_colours
 
 CELL, ROW, LEFT, TOP = 84, 30, 190, 64
 

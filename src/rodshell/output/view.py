@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.output.colours import mixed
+from rodshell.output.colour_scale import mixed
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.svg import number
 from rodshell.results.wording import MINUS, nice_ticks

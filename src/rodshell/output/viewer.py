@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
+from rodshell.output.colour_scale import Colour, Scale, scale_of
 from rodshell.output.grid import Shape, rods_of, shape_names, shape_of
 from rodshell.output.pictures import FAMILIES, SEGMENTS
-from rodshell.output.scale import Colour, Scale, scale_of
 from rodshell.results import Archive
 from rodshell.results.wording import nice_ticks
 

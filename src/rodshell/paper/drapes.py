@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.formfinding import Draped, Fall, Trimmed, drape, trim
-from rodshell.formfinding.drape import Method
+from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
+from rodshell.formfinding.methods import MethodName
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.nets import chebyshev_net
 from rodshell.rods.materials import Material
@@ -22,7 +22,7 @@ ROD = Rod(Circle(radius=1e-3), Material(youngs_modulus=1e6, density=1e3))  # [HQ
 LENGTH, HEIGHT = 1.2, 0.05  # [m]
 EDGE = 0.015  # [m]; the paper's "8000 DOFs" are this mesh, its stated 5 mm have four times as many
 FALL = Fall(height=HEIGHT, drag=3.0)  # shared DOFs: the paper's *mapping*
-METHODS: tuple[Method, ...] = ("paper", "gravity", "bound")
+METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")
 WORDS = {"paper": "paper's, in time", "gravity": "gravity statics", "bound": "bound to the target"}
 COLUMNS = (
     "target", "rods", "method", "unknowns", "time [s]", "ends off the net, max [mm]", "rms [mm]", "how it rests",
@@ -57,7 +57,7 @@ class Drape:
     """
 
     case: Case
-    method: Method
+    method: MethodName
     draped: Draped
     trimmed: Trimmed
     seconds: float
@@ -109,25 +109,25 @@ class Drape:
 
 
 def drape_all(
-    cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[Method] = METHODS
+    cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[MethodName] = METHODS
 ) -> tuple[Drape, ...]:
     """Every case by every method."""
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
 
-def _drape(case: Case, method: Method, fall: Fall, progress: Progress) -> Drape:
+def _drape(case: Case, method: MethodName, fall: Fall, progress: Progress) -> Drape:
     def told(stage: str, detail: str, residual: float) -> None:
         progress(f"({case.label}) {case.target.name}, {stage}", detail, residual)
 
     begun = perf_counter()
-    falls = fall if method == "paper" else None
-    draped = drape(case.layout, ROD, case.target, method=method, fall=falls, progress=told)
+    options: dict[MethodName, Method] = {"paper": fall, "gravity": Gravity(), "bound": Bound()}
+    draped = drape(case.layout, ROD, case.target, method=options[method], progress=told)
     trimmed = trim(draped)
     seconds = perf_counter() - begun
     exact: dict[str, FlatRod] = {rod.name: rod for rod in chebyshev_net(case.target, case.layout).rods}
     rods = trimmed.mesh.grid.rods
     ends, net = (np.array([[rod.start, rod.end] for rod in some]) for some in (rods, [exact[r.name] for r in rods]))
-    if draped.own_ends is not None:
-        past = dict(zip([rod.name for rod in draped.rods], draped.own_ends, strict=True))
+    if draped.figures.net_deviation is not None:
+        past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
         ends += np.array([past[rod.name] for rod in rods]) * [-1.0, 1.0]
     return Drape(case, method, draped, trimmed, seconds, ends, net)

@@ -143,7 +143,7 @@ def timed_fall(case: Case, coupling: Coupling, step: float, falling: float, prog
 
 def _fall(case: Case, coupling: Coupling, step: float, falling: float, progress: Progress) -> Draped:
     fall = Fall(coupling=coupling, time_step=step, duration=falling, settle=False)
-    return drape(case.layout, ROD, case.target, method="paper", fall=fall, progress=progress)
+    return drape(case.layout, ROD, case.target, method=fall, progress=progress)
 
 
 def timed_ours(case: Case) -> Timing:

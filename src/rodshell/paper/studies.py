@@ -16,7 +16,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding import Draped, Fall, drape, trim
+from rodshell.formfinding import Draped, Fall, Gravity, drape, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
 from rodshell.nets import chebyshev_net
@@ -104,12 +104,12 @@ def make(progress: Progress) -> Studies:
 
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
     """E, r, g, EA and EI by gravity statics."""
-    base = drape(layout, ROD, TARGET, method="gravity")
+    base = drape(layout, ROD, TARGET, method=Gravity())
     for changed, (powers, given) in _PARAMETERS.items():
         for factor in (10.0**power for power in powers):
             value, rod, gravity = given(factor)
             progress(f"gravity statics, {changed}", value, 0.0)
-            hung = partial(drape, layout, rod, TARGET, method="gravity", gravity=gravity)
+            hung = partial(drape, layout, rod, TARGET, method=Gravity(acceleration=gravity))
             yield _line(changed, value, factor, base, hung)
 
 
@@ -145,11 +145,12 @@ def of_penalties(progress: Progress) -> Iterator[Line]:
 
 
 def _fallen(fall: Fall, joint: Joint | None = None) -> Draped:
-    return drape(COARSE, ROD, TARGET, method="paper", fall=fall, joint=joint)
+    return drape(COARSE, ROD, TARGET, method=fall, joint=joint)
 
 
 def _line(changed: str, value: str, factor: float, base: Draped, run: Callable[[], Draped]) -> Line:
-    on = f"{len(base.rods) // 2}x{len(base.rods) // 2}, " + ("statics" if base.method == "gravity" else "in time")
+    how = "statics" if isinstance(base.method, Gravity) else "in time"
+    on = f"{len(base.rods) // 2}x{len(base.rods) // 2}, {how}"
     try:
         draped = run()
         ends = _ends(draped)

@@ -193,24 +193,24 @@ def _drape(draped: Draped) -> Drape:
         more["fall"] = Rest(**asdict(draped.rest))
     if draped.eccentricity:
         more["eccentricity"] = draped.eccentricity
-    if draped.strong_bending is not None:
-        more["strong_bending"] = StrongBending(**asdict(draped.strong_bending))
-    if draped.own_ends is not None:
-        off = np.abs(draped.own_ends)
+    if draped.figures.strong_bending is not None:
+        more["strong_bending"] = StrongBending(**asdict(draped.figures.strong_bending))
+    if draped.figures.net_deviation is not None:
+        off = np.abs(draped.figures.net_deviation)
         more["net_deviation"] = NetDeviation(max=float(off.max()), median=float(np.median(off)))
     return Drape(
-        method=draped.method,
+        method=draped.method.name,
         status=draped.report.status.value,
         dofs=draped.report.dofs,
         levels=tuple(Solve(**_effort(level)) for level in draped.levels),
         seconds=sum(level.seconds for level in draped.levels),
         force_residual=draped.report.force_residual,
         max_strain=draped.report.max_strain,
-        max_gap=draped.max_gap,
+        max_gap=draped.figures.max_gap,
         negative_modes=draped.report.negative_modes,
-        min_angle_deg=degrees(draped.min_angle),
-        min_angle_at=draped.min_angle_at,
-        contact_pulls=draped.pulls,
+        min_angle_deg=degrees(draped.figures.min_angle),
+        min_angle_at=draped.figures.min_angle_at,
+        contact_pulls=draped.figures.contact_pulls,
         **more,
     )
 

@@ -25,7 +25,7 @@ class Force(Protocol):
 
 
 @dataclass(frozen=True)
-class Gravity:
+class GravityForce:
     """Weight of the nodes. Twist angles have inertia but no weight.
 
     Parameters

@@ -1,10 +1,9 @@
 """The drawing set: each drawing at 1:1 for DXF and SVG, and all of them on sheets of paper for the PDF."""
 
-from rodshell.output.drawing import Drawing
+from rodshell.output.drawing import TEXT, Drawing
 from rodshell.output.drawings.flat import FlatPlan, flat_drawing, per_sheet, strips_drawing
 from rodshell.output.drawings.sheets import (
     SCALES,
-    TEXT,
     Compose,
     Sheet,
     bound,

@@ -13,7 +13,7 @@ from textwrap import wrap
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, Drawing, Pen, Pencil, Text
+from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text
 from rodshell.output.labels import Room
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
@@ -30,7 +30,6 @@ TRUE_SIZE = ", 1:1"  # after the title of a drawing that is its own file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
-TEXT = 3.5  # mm of paper: capitals are 2.5 mm high, the nominal size of ISO 3098 that is usual on A3
 FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the least on a sheet
 MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
 LEADING = 1.9 * FINE  # from line to line of a table

@@ -1,12 +1,12 @@
-"""What a colour means in a picture: the gap to the target, the stress, or the height where there is no target."""
+"""Colours that stand for numbers in a picture: the gap to the target, the stress, or the height without a target."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.colours import HEIGHT, SIGNED, STRESS, hex_colours
 from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import number
@@ -16,6 +16,11 @@ from rodshell.units import PRESSURES
 
 Colour = Literal["gap", "stress"]
 
+# Maps of even steps in lightness, by a few control points.
+# Signed: dark in the middle, so that rods without a gap are drawn in ink on light paper.
+SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f28c3a")
+STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
+HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
 STRESSES = ("stress_pinned", "stress_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
@@ -130,3 +135,18 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
         shown = number(value, 6).replace("-", MINUS)
         pencil.write(shown, (x, y), 12.5, "DIM", anchor="middle")
     pencil.write(scale.caption, (left - 12, y + 13), 13.0, "TITLE", anchor="end")
+
+
+def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
+    """Colours at `shares` (k,) of the way through a map, 0 to 1."""
+    table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
+    at = np.linspace(0.0, 1.0, len(points))
+    channels = [np.interp(shares, at, table[:, k]) for k in range(3)]
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(channels).astype(int).T.tolist()]
+
+
+@lru_cache(maxsize=4096)
+def mixed(colour: str, other: str, share: float) -> str:
+    """`colour` with a `share` of the `other`, 0 to 1."""
+    pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
+    return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)

@@ -1,17 +1,10 @@
-"""The tables and keys of a case file, each listed once, with its type, default and help.
-
-Those of targets, and of rods and joints, have modules of their own.
-"""
+"""The tables of a case's stages: layout, drape, pop-up, seams, checks, fabrication and drawings."""
 
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from rodshell.case.rod_tables import BallTable, JointKinds, RodTable
-from rodshell.case.table import Table
-from rodshell.case.target_tables import HemisphereTable, TargetTable
-from rodshell.case.toml import toml_text
 from rodshell.case.values import (
     Acceleration,
     Angle,
@@ -31,21 +24,19 @@ from rodshell.case.values import (
     Polylines,
     Share,
     Stress,
+    Table,
     Unit,
     Whole,
     polylines,
     unit,
 )
 from rodshell.errors import InputError
-from rodshell.units import length_text, rounded_down, shown
+from rodshell.units import rounded_down, shown
 
 if TYPE_CHECKING:
-    from rodshell.checks.sizing import Fit
-    from rodshell.formfinding.fall import Fall
+    from rodshell.formfinding.methods import Method
     from rodshell.formfinding.sewn import PatchLayout
     from rodshell.layout import GridLayout
-    from rodshell.output.options import OutputOptions
-    from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
 
@@ -123,18 +114,22 @@ class DrapeTable(Table):
         if getattr(self, name) != type(self).model_fields[name].default:
             raise ValueError(f"drape.{name} = {shown(getattr(self, name))}: {why}")
 
-    def fall(self) -> "Fall":
-        """How the paper's method falls."""
-        from rodshell.formfinding.fall import Fall
+    def build(self) -> "Method":
+        """The method with its options."""
+        from rodshell.formfinding.methods import Bound, Fall, Gravity
         from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 
+        if self.method == "bound":
+            return Bound()
+        if self.method == "gravity":
+            return Gravity(acceleration=self.gravity)
         coupling: Coupling = SharedDofs()
         if self.coupling != "shared":
             penalty = ImplicitPenalty if self.coupling == "implicit" else ExplicitPenalty
             coupling = penalty(C1=self.C1, C2=self.C2)
         return Fall(
-            coupling=coupling, height=self.height, time_step=self.time_step, duration=self.duration,
-            friction=self.friction, drag=self.drag, stream=self.frames,
+            acceleration=self.gravity, height=self.height, coupling=coupling, time_step=self.time_step,
+            duration=self.duration, friction=self.friction, drag=self.drag, stream=self.frames,
         )  # fmt: skip
 
 
@@ -236,143 +231,3 @@ class DrawingsTable(Table):
     name: str = Field(default="", description="title of the drawings; default: the target's name")
     author: str = Field(default="", description="for the title block: who drew or answers for the drawings")
     date: IsoDate = Field(default="", description='for the title block, "2026-11-22"; default: the day of writing')
-
-
-class Built(NamedTuple):
-    """A case as library objects; `drape_options` are keyword arguments of `formfinding.find_form`."""
-
-    target: "Target"
-    layout: "GridLayout"
-    rod: "Rod"
-    drape_options: dict[str, Any]
-
-
-class Case(Table):
-    """Everything that decides one job, complete and in SI. Make one with `load_case`."""
-
-    target: TargetTable = Field(default=HemisphereTable(), discriminator="kind")
-    layout: LayoutTable = LayoutTable()
-    rod: RodTable = RodTable()
-    joint: JointKinds = Field(default=BallTable(), discriminator="kind")
-    drape: DrapeTable = DrapeTable()
-    pop_up: PopUpTable = PopUpTable()
-    seams: SeamsTable = SeamsTable()
-    checks: ChecksTable = ChecksTable()
-    fabrication: FabricationTable = FabricationTable()
-    drawings: DrawingsTable = DrawingsTable()
-
-    def to_toml(self) -> str:
-        """The full input as a case file with SI numbers: loading it from anywhere gives the same case."""
-        content = self.model_dump(exclude_none=True)
-        for key in ("file", "boundary"):
-            if key in content["target"]:
-                content["target"][key] = str(Path(content["target"][key]).absolute())
-        return toml_text(content)
-
-    def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
-        """The rod; material and section that were left to the target are chosen by the bends of its net."""
-        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.checks.strength)
-
-    def fit_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Fit":
-        """What a rod that is left to the target has to fit."""
-        from rodshell.checks.sizing import Fit
-
-        return Fit.on(target, layout, anchor=anchor, joint=self.joint.build())
-
-    def with_rod(self, rod: "Rod") -> "Case":
-        """The same case with this rod spelled out."""
-        return self.model_copy(update={"rod": RodTable.model_validate(rod.parameters())})
-
-    @property
-    def undecided(self) -> bool:
-        """Whether anchor or heading are to be searched for."""
-        return "auto" in (self.drape.anchor, self.layout.rotate)
-
-    def decided(self, anchor: tuple[float, float], rotate: float) -> "Case":
-        """The same case with its anchor [m] and heading [rad]: nothing is left to an objective."""
-        drape = self.drape.model_copy(update={"anchor": anchor, "objective": "shear"})
-        return self.headed(rotate).model_copy(update={"drape": drape})
-
-    def headed(self, rotate: float) -> "Case":
-        """The same case with its heading [rad]."""
-        return self.model_copy(update={"layout": self.layout.model_copy(update={"rotate": rotate})})
-
-    def build(self) -> Built:
-        """The target, layout, rod and drape options.
-
-        Raises
-        ------
-        InputError : values that are fine alone do not fit together, or the formula cannot be used.
-        """
-        ends = ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
-        drape = self.drape
-        if drape.objective != "shear" and not self.undecided:
-            raise InputError(
-                f"drape.objective = {shown(drape.objective)}: nothing is searched for: set drape.anchor or "
-                'layout.rotate to "auto", or leave it out'
-            )
-        anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.method, "anchor": anchor, "ends": ends}
-        options["gravity"] = None if drape.method == "bound" else drape.gravity
-        options["fall"] = drape.fall() if drape.method == "paper" else None
-        options["joint"] = self.joint.build()
-        target = self.target.build()
-        layout = self.layout.build(target)
-        self._require_stock(layout)
-        rod = self.rod_on(target, layout, anchor=anchor)
-        self.output_options().require_known_stress(rod, options["joint"])
-        return Built(target, layout, rod, options)
-
-    def _require_stock(self, layout: "GridLayout") -> None:
-        """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
-        own = [patch.spacing for patch in self.seams.patches if patch.spacing is not None]
-        shortest, stock = min(map(min, (layout.spacing, *own))), self.fabrication.stock_length
-        if stock is not None and stock < shortest:
-            raise InputError(
-                f"fabrication.stock_length = {shown(stock)}: shorter than the {length_text(shortest)} between joints, "
-                "of which no rod could be spliced: give longer stock"
-            )
-
-    def build_sewn(self) -> Built:
-        """The same of a case with seams; the options are those of `rodshell.sew`.
-
-        Raises
-        ------
-        InputError : moreover, keys that a form in patches does not have.
-        """
-        patches = "each patch of a target cut by seams has its own"
-        for key, value, default, instead in (
-            ("layout.rods", self.layout.rods, "auto", f'{patches}: use "auto"'),
-            ("layout.length", self.layout.length, "auto", f'{patches}: use "auto"'),
-            ("layout.offset", self.layout.offset, (0.0, 0.0), f"{patches}: leave it out"),
-            ("drape.method", self.drape.method, "bound", 'seams need the bound drape: use "bound", or no seams'),
-            ("drape.anchor", self.drape.anchor, None, f"{patches}: leave it out, or give it in seams.patches"),
-            ("drape.objective", self.drape.objective, "shear", "with seams the fewest rods are left out: leave it out"),
-        ):
-            if value != default:
-                raise InputError(f"{key} = {shown(value)}: {instead}")
-        target, layout, rod, options = self.build()
-        kept = {key: options[key] for key in ("joint", "ends")}
-        return Built(target, layout, rod, {"seams": self.seams.lines, "own": self.seams.own(), **kept})
-
-    def output_options(self) -> "OutputOptions":
-        """What checks, workshop and drawings are told.
-
-        Raises
-        ------
-        InputError : a value cannot be used.
-        """
-        from rodshell.fabrication import Fabrication
-        from rodshell.output.options import DrawingStyle, OutputOptions
-
-        style = self.drawings.model_dump(exclude={"layers"})
-        layers = self.drawings.layers.model_dump(exclude_none=True)
-        style["layers"] = {name.upper().replace("_", "-"): shown for name, shown in layers.items()}
-        return OutputOptions(
-            self.checks.strength,
-            self.checks.stages,
-            Fabrication(**self.fabrication.model_dump()),
-            DrawingStyle(**style),
-            rod_chosen=self.rod.left_open,
-            shear_strength=self.checks.shear_strength,
-        )

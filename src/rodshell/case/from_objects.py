@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from math import fmod, tau
 from typing import Any
 
-from rodshell.case.schema import Case
-from rodshell.formfinding import Fall
+from rodshell.case.case import Case
+from rodshell.formfinding import Bound, Fall, Method
 from rodshell.formfinding.popup import ENDS, Ends
 from rodshell.formfinding.sewn import SewnForm
 from rodshell.joints import Joint, joint_parameters
@@ -21,10 +21,8 @@ def case_text(
     rod: Rod,
     *,
     joint: Joint,
-    method: str = "bound",
+    method: Method = Bound(),
     anchor: tuple[float, float] | None = None,
-    gravity: float = 9.81,
-    fall: Fall | None = None,
     ends: Sequence[Ends] = ENDS,
     options: OutputOptions | None = None,
     sewn: SewnForm | None = None,
@@ -39,9 +37,7 @@ def case_text(
         )
     if "turn" in shape:
         shape = {**shape, "turn": [_within_a_turn(angle) for angle in shape["turn"]]}
-    drape: dict[str, Any] = {"method": method, **(fall.parameters() if fall else {})}
-    if method != "bound":
-        drape["gravity"] = gravity
+    drape = _method_table(method)
     if anchor is not None:
         drape["anchor"] = anchor
     case = Case.model_validate(
@@ -58,6 +54,19 @@ def case_text(
     )
     note = "" if ends else "# the grid was not popped up; a case file always asks for a pop-up\n"
     return note + case.to_toml()
+
+
+def _method_table(method: Method) -> dict[str, Any]:
+    """[drape] of a method, in SI; without the folder of a fall's frames, which may be none of the next result's."""
+    table: dict[str, Any] = {"method": method.name}
+    if not isinstance(method, Bound):
+        table["gravity"] = method.acceleration
+    if isinstance(method, Fall):
+        ties = {name: getattr(method.coupling, name, None) for name in ("C1", "C2")}
+        given = {name: getattr(method, name) for name in ("height", "time_step", "duration", "friction", "drag")}
+        table |= {name: value for name, value in (given | ties).items() if value is not None}
+        table["coupling"] = method.coupling.name
+    return table
 
 
 def _within_a_turn(angle: float) -> float:

@@ -1,0 +1,1 @@
+"""A project that uses rodshell as a library, checked with `mypy --strict` by `test_downstream.py`."""
