@@ -20,7 +20,7 @@ from rodshell.checks import bending
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
 from rodshell.output import export
 from rodshell.output.files import DEFAULT
-from rodshell.results import Archive
+from rodshell.results import Archive, Results
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
 from tests.acceptance.rows import Row, print_table
 
@@ -174,7 +174,7 @@ def vault(across: int) -> Archive:
     result = {"format": "rodshell-result", "version": 1, "status": "converged", "name": "vault", "rods": entries,
               "footprint": mesh.flat[ends, :2].tolist(), "boundary": bent[ends].tolist()}  # fmt: skip
     states = {"flat": mesh.flat, "popped_pinned": bent, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
-    return with_deployment(Archive(result, states), 9)
+    return with_deployment(Archive(Results.of(result), states), 9)
 
 
 def _seconds(archive: Archive) -> float:

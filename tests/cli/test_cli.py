@@ -488,7 +488,7 @@ def test_popup_writes_only_the_kinds_that_are_asked_for(
     assert main(["popup", "dome", "--only", "csv, dxf"]) == 0
     assert kinds == [["csv", "dxf"]]
     capsys.readouterr()
-    assert '"docx" is no kind of file' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
+    assert 'unknown kind of file "docx"' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
 
 
 def test_a_result_takes_the_rod_that_is_asked_for_in_place_of_its_own(finder: FakeFinder, dome: Path) -> None:

@@ -338,7 +338,7 @@ def test_report_puts_failure_and_then_warnings_once_before_all_else(archive: Arc
 def test_no_name_breaks_a_page_or_a_drawing(tmp_path: Path) -> None:
     plain = table_archive()
     name = '"><script>x</script> & \N{GREEK SMALL LETTER ALPHA}\x07'
-    archive = Archive({**plain.results.plain(), "name": name}, plain.states, "# </pre><script>x</script>")
+    archive = Archive(Results.of({**plain.results.plain(), "name": name}), plain.states, "# </pre><script>x</script>")
     out = save(archive, tmp_path / "named")
     assert "<script>x" not in (out / "report.html").read_text()
     root = ET.parse(out / "drawings/plan.svg").getroot()
@@ -353,7 +353,9 @@ def test_least_result_is_written(tmp_path: Path) -> None:
     """A result with nothing but rods (a run stopped early) still gives its files."""
     full = sample_archive()
     result = {key: full.results.plain()[key] for key in ("format", "version", "units", "rods")}
-    out = save(Archive({**result, "status": "diverged"}, {"flat": full.states["flat"]}, ""), tmp_path / "least")
+    out = save(
+        Archive(Results.of({**result, "status": "diverged"}), {"flat": full.states["flat"]}, ""), tmp_path / "least"
+    )
     assert "Not buildable: it did not converge: diverged" in (out / "report.html").read_text()
     assert len(rows(out, "rods.csv")) == 18
     assert rows(out, "joints.csv")[0]["final_deg"] == ""

@@ -131,5 +131,5 @@ def test_long_names_are_shortened_to_their_place() -> None:
 
 def test_a_result_without_rod_or_joint_says_so() -> None:
     bare = {key: value for key, value in sample_archive(3, 2).results.plain().items() if key not in ("rod", "joint")}
-    entries = dict(title_block(replace(sample_archive(3, 2), result=bare), "").entries)
+    entries = dict(title_block(replace(sample_archive(3, 2), results=Results.of(bare)), "").entries)
     assert entries["Section"] == entries["Material"] == "not given"

@@ -201,11 +201,11 @@ def test_gaps_are_shown_in_a_unit_of_their_size(gap: float, unit: str, high: flo
 
 def test_what_is_made_of_an_archive_is_made_again_for_another() -> None:
     first = sample_archive(5)
-    second = replace(first, results=Results.of({**first.results.plain(), "rods": first.results.plain()["rods"][:3]}))
+    second = replace(first, results=first.results.changed(rods=first.results.rods[:3]))
     assert rods_of(first) is rods_of(first)
     assert len(rods_of(first)) == 10
     assert len(rods_of(second)) == 3
-    assert first == replace(second, result=first.results.plain())
+    assert first == replace(second, results=first.results)
 
 
 def test_mixed_colours_lie_between() -> None:

@@ -246,13 +246,15 @@ def _dumps(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """`value` in JSON's own types; NumPy's arrays and numbers are converted, texts are printable."""
+    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable."""
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):
         return printable(value)
     if isinstance(value, Mapping):
         return {printable(str(name)): plain(item) for name, item in value.items()}
+    if isinstance(value, Record):
+        return value.plain()
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
     if isinstance(value, list | tuple):
