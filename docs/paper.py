@@ -8,8 +8,8 @@ from importlib import import_module
 from pathlib import Path
 
 from rodshell.cli.reporting import Progress
-from rodshell.output import open_folder
 from rodshell.paper import FIGURES
+from rodshell.results.folder import open_folder
 
 HERE = Path(__file__).parent
 HEAD = """# The paper's figures

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from rodshell.cli import main, paper
-from rodshell.output.folder import ResultFolder
 from rodshell.paper import FIGURES
+from rodshell.results.folder import ResultFolder
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-from rodshell.output.folder import ResultFolder
 from rodshell.paper.drape_pictures import rows_svg
 from rodshell.paper.drapes import COLUMNS, METHODS, Drape
 from rodshell.paper.tables import aligned, result_of, write
+from rodshell.results.folder import ResultFolder
 
 
 @dataclass(frozen=True)

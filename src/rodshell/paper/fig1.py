@@ -13,12 +13,12 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.formfinding import PatchForm, find_stages
-from rodshell.output.folder import ResultFolder
 from rodshell.output.svg import tag
 from rodshell.paper.drapes import ROD, Case, Progress
 from rodshell.paper.fig6 import CASES
 from rodshell.paper.panels import FINAL, FLAT, SOFT, Place, closed, dots, from_above, rods, rows_of_panels, standing
 from rodshell.paper.tables import aligned, result_of, write
+from rodshell.results.folder import ResultFolder
 
 EDGE = 0.005  # [m], the paper's
 TITLE = "Fig 1 [HQK]: three shells popped up, their ends moved from G0 to G"

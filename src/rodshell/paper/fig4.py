@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
-from rodshell.output.folder import ResultFolder
 from rodshell.paper.fig4_pictures import animation_svg, instants_svg, lag_svg
 from rodshell.paper.tables import aligned, result_of, write
 from rodshell.paper.two_rods import RATE, Demonstration, Run, run, run_statics
+from rodshell.results.folder import ResultFolder
 
 DEMONSTRATIONS: tuple[Demonstration, ...] = ("twisting", "bending")
 LETTER = {"twisting": "a", "bending": "b"}

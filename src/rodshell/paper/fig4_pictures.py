@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.output.plan import nice_ticks
 from rodshell.output.svg import document, label, number, tag
 from rodshell.output.view import RIGHT, UP
 from rodshell.paper.two_rods import EDGE, LENGTH, RATE, Run
+from rodshell.results.wording import nice_ticks
 
 PAPER, INK, SOFT, FAINT = "#fdfdfb", "#22282f", "#7b838a", "#c9cdd0"
 RODS = ("#1f5f8b", "#a8552a")

@@ -13,12 +13,12 @@ from typing import Any
 from rodshell.formfinding import Draped, Fall, drape, map_back, trim
 from rodshell.formfinding.progress import silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
-from rodshell.output.folder import ResultFolder
 from rodshell.paper.bare_solves import BareSolves
 from rodshell.paper.drapes import ROD, Case, Progress
 from rodshell.paper.fig6 import CASES
 from rodshell.paper.fig8_pictures import times_svg
 from rodshell.paper.tables import aligned, result_of, write
+from rodshell.results.folder import ResultFolder
 
 FALLING = 2.0  # [s]
 STEPS = {"explicit": (0.01, 0.005, 0.0025), "shared": (0.1, 0.05, 0.02, 0.01), "implicit": (0.01,)}  # [s]

@@ -18,7 +18,6 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
 from rodshell.formfinding.progress import silent
-from rodshell.output.folder import ResultFolder
 from rodshell.paper.charts import Chart, Series, charts_svg
 from rodshell.paper.drapes import ROD, Case, Progress
 from rodshell.paper.fig6 import CASES
@@ -28,6 +27,7 @@ from rodshell.paper.genetic_history import WINDOW, History, stored, stored_footp
 from rodshell.paper.genetic_search import MOST, POPULATION, search
 from rodshell.paper.panels import INK
 from rodshell.paper.tables import aligned, result_of, write
+from rodshell.results.folder import ResultFolder
 
 __all__ = ["Comparison", "Genetic", "compare", "find", "make", "stored", "stored_footprint"]
 

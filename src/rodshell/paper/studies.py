@@ -20,10 +20,10 @@ from rodshell.formfinding import Draped, Fall, Gravity, drape, trim
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
 from rodshell.nets import chebyshev_net
-from rodshell.output.folder import ResultFolder
 from rodshell.paper.drapes import EDGE, HEIGHT, LENGTH, ROD, Progress
 from rodshell.paper.studies_pictures import studies_svg
 from rodshell.paper.tables import aligned, result_of, write
+from rodshell.results.folder import ResultFolder
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere
