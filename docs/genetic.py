@@ -7,15 +7,9 @@ of one processor. `make paper` then writes the table and the pictures.
 import sys
 from pathlib import Path
 
-<<<<<<< HEAD
-from rodshell.cli.progress import Progress
+from rodshell.cli.reporting import Progress
 from rodshell.paper.cases import CASES
 from rodshell.paper.genetic import SEARCHES, SEED, find
-=======
-from rodshell.cli.reporting import Progress
-from rodshell.paper.fig6 import CASES
-from rodshell.paper.genetic import KEPT, SEED, find
->>>>>>> main
 
 DATA = Path(__file__).parents[1] / "src" / "rodshell" / "paper" / "data"
 

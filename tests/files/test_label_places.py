@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from sample_archive import table_archive
 from test_callouts import cross, off
 
-from rodshell.output import Archive
-from rodshell.output.callouts import callouts, outward
 from rodshell.output.drawing import Drawing
-from rodshell.output.drawings.flat import flat_drawing
+from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import fitted
-from rodshell.output.drawings.supports import supports_drawing
-from rodshell.output.labels import Room, boxes_meet, lines_meet
-from rodshell.output.plan import FlatPlan, flat_plan
+from rodshell.output.drawings.shell import supports_drawing
+from rodshell.output.labels import Room, boxes_meet, callouts, lines_meet, outward
+from rodshell.results import Archive
 
 Floats = NDArray[np.float64]
 
@@ -91,7 +89,7 @@ def test_the_edge_of_a_sewn_shell_has_no_notches_at_its_seam() -> None:
     made, plan = named("sewn")
     drawing = supports_drawing(made, plan, plan.text)
     (edge,) = (path.points for path in drawing.paths if path.layer == "BOUNDARY-FINAL" and path.closed)
-    meetings = 1e3 * np.array([one["point"][:2] for seam in made.result["seams"] for one in seam["meetings"]])
+    meetings = 1e3 * np.array([one["point"][:2] for seam in made.results.plain()["seams"] for one in seam["meetings"]])
     assert len(edge) + 2 * len(meetings) == 2 * len(plan.rods)
     apart = np.linalg.norm(edge - np.roll(edge, 1, axis=0), axis=1) > 1.0
     smooth = edge[apart]  # places within a millimetre have no direction

@@ -102,7 +102,7 @@ def test_a_saved_form_is_read_again(tmp_path):
     form = rs.find_form(TARGET, LAYOUT, ROD, ends=("clamped",))
     saved = rs.read(form.save(tmp_path / "dome"))
     assert isinstance(saved, rs.Archive)
-    assert saved.result["agreement"]["clamped"]["rms"] == form.agreement["clamped"].rms
+    assert saved.results.plain()["agreement"]["clamped"]["rms"] == form.agreement["clamped"].rms
     np.testing.assert_array_equal(saved.states["popped_clamped"], form.popped["clamped"].positions)
     assert 'kind = "hemisphere"' in saved.case_toml
     with pytest.raises(rs.OutputError):

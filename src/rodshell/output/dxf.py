@@ -7,8 +7,8 @@ from itertools import chain, count
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
-from rodshell.output.archive import printable
 from rodshell.output.drawing import LAYERS, Drawing, Path, Text
+from rodshell.results.records import printable
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing as Document

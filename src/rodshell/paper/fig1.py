@@ -11,13 +11,8 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-<<<<<<< HEAD
-from rodshell.formfinding import FoundForm, find_stages
-from rodshell.formfinding.progress import Progress
-=======
 from rodshell.formfinding import PatchForm, find_stages
-from rodshell.output.folder import ResultFolder
->>>>>>> main
+from rodshell.formfinding.progress import Progress
 from rodshell.output.svg import tag
 from rodshell.paper.cases import CASES, ROD, Case
 from rodshell.paper.figure import Figure

@@ -15,31 +15,13 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-<<<<<<< HEAD
-from rodshell.formfinding import Agreement, FoundForm, agreement, find_stages
+from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.paper.cases import CASES, ROD, Case
 from rodshell.paper.figure import Figure
 from rodshell.paper.genetic_records import WINDOW, History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
 from rodshell.paper.plotting import INK, TARGET_COLOURS, Chart, Series, charts_svg
-=======
-from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
-from rodshell.formfinding.progress import silent
-from rodshell.output.folder import ResultFolder
-from rodshell.paper.charts import Chart, Series, charts_svg
-from rodshell.paper.drapes import ROD, Case, Progress
-from rodshell.paper.fig6 import CASES
-from rodshell.paper.fig8_pictures import COLOURS
-from rodshell.paper.genetic_design import Design
-from rodshell.paper.genetic_history import WINDOW, History, stored, stored_footprint
-from rodshell.paper.genetic_search import MOST, POPULATION, search
-from rodshell.paper.panels import INK
-from rodshell.paper.tables import aligned, result_of, write
-
-__all__ = ["Comparison", "Genetic", "compare", "find", "make", "stored", "stored_footprint"]
-
->>>>>>> main
 
 SEED = 1
 SEARCHES = Path("out") / "genetic-searches"
