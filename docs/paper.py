@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from rodshell.cli.reporting import Progress
-from rodshell.output import open_folder
 from rodshell.paper import FIGURES, figure_maker
+from rodshell.results.folder import open_folder
 
 HERE = Path(__file__).parent
 HEAD = """# The paper's figures

@@ -50,7 +50,7 @@ def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
 
 
 def not_a_choice(name: str, value: object, choices: Sequence[str]) -> str:
-    """The sentence on a `value` that is none of the words in `choices`; the same for arguments, keys and options."""
+    """The sentence on a `value` that is not one of the words in `choices`; the same for arguments, keys and options."""
     near = get_close_matches(value, choices, n=1) if isinstance(value, str) else []
     hint = f": did you mean {shown(near[0])}?" if near else ""
     return f"{name} must be {either(choices)}, not {described(value)}{hint}"

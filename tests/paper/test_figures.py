@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rodshell.cli import main, paper
-from rodshell.output.folder import ResultFolder
 from rodshell.paper import FIGURES, figure_maker
+from rodshell.results.folder import ResultFolder
 
 
 @dataclass(frozen=True)

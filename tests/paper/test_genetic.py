@@ -118,7 +118,7 @@ def test_bounds_run_from_taut_to_twice_as_long_on_a_hemisphere_and_hold_the_dire
 
 @pytest.mark.parametrize("case", [SMALL, *CASES], ids=lambda case: f"{case.target.name}-{case.rods[0]}")
 def test_the_objective_at_the_direct_answer_is_the_direct_methods_own_agreement(case: Case) -> None:
-    """PopUp up from flat on a mesh of its own, not released from the draped state. Newton's steps end at 1e-6."""
+    """Popped up from flat on a mesh of its own, not released from the draped state. Newton's steps end at 1e-6."""
     assert design(case).error(direct_variables(case)) == pytest.approx(direct(case).agreement["pinned"].rms, rel=1e-5)
 
 

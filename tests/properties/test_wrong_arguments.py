@@ -72,6 +72,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint=rs.Pin), "not the class Pin itself"),
         (lambda: rs.pop_up(None, None, ROD, ends="clampd"), 'ends must be "pinned" or "clamped", not "clampd"'),
         (lambda: rs.pop_up(None, None, ROD, start="drapped"), 'not "drapped": did you mean "draped"?'),
+        (lambda: rs.pop_up(None, None, ROD, warm_start="flat"), "what an earlier rodshell.pop_up returned"),
         (lambda: rs.Rod(ROD.material, ROD.section), "section must be a circle, .* section, not a Material"),
         (lambda: rs.Rod(ROD.section, 1e9), "material must be a rodshell Material, not 1000000000.0"),
         (lambda: rs.Hemisphere(radius="20"), 'target radius must be a number in m, not "20"'),
@@ -101,7 +102,7 @@ def test_a_saved_form_is_read_again(tmp_path):
     form = rs.find_form(TARGET, LAYOUT, ROD, ends=("clamped",))
     saved = rs.read(form.save(tmp_path / "dome"))
     assert isinstance(saved, rs.Archive)
-    assert saved.result["agreement"]["clamped"]["rms"] == form.agreement["clamped"].rms
+    assert saved.results.plain()["agreement"]["clamped"]["rms"] == form.agreement["clamped"].rms
     np.testing.assert_array_equal(saved.states["popped_clamped"], form.popped["clamped"].positions)
     assert 'kind = "hemisphere"' in saved.case_toml
     with pytest.raises(rs.OutputError):

@@ -13,7 +13,7 @@ from rodshell.errors import InputError
 from rodshell.paper import FIGURES, figure_maker, reserved
 
 if TYPE_CHECKING:
-    from rodshell.output.folder import ResultFolder
+    from rodshell.results.folder import ResultFolder
 
 
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))

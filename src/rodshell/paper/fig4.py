@@ -12,12 +12,12 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.formfinding.progress import Progress
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
-from rodshell.output.plan import nice_ticks
 from rodshell.output.svg import document, label, number, tag
 from rodshell.output.view import RIGHT, UP
 from rodshell.paper.figure import Figure
 from rodshell.paper.plotting import INK, PAPER, SOFT
 from rodshell.paper.two_rods import EDGE, LENGTH, RATE, Demonstration, Run, run_in_time, run_statics
+from rodshell.results.wording import nice_ticks
 
 DEMONSTRATIONS: tuple[Demonstration, ...] = ("twisting", "bending")
 LETTER = {"twisting": "a", "bending": "b"}

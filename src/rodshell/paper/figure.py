@@ -6,10 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from typing import Any
 
-from rodshell.output.csvtext import csv_text
-from rodshell.output.folder import FORMAT, VERSION, ResultFolder, open_folder
+from rodshell.output.schedules import csv_text
+from rodshell.results.folder import ResultFolder, open_folder
+from rodshell.results.results import FORMAT
 
 Row = tuple[str, ...]
+VERSION = 1  # of the keys of a figure's result.json
 
 
 class Figure(ABC):
