@@ -66,8 +66,9 @@ if TYPE_CHECKING:
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
-    from rodshell.output.archive import Archive, export, read
-    from rodshell.output.takeaway import DrawingStyle, Takeaway
+    from rodshell.output import export, save
+    from rodshell.output.options import DrawingStyle, OutputOptions
+    from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
     from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
@@ -112,8 +113,9 @@ _HOMES = {
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
-    "rodshell.output.archive": ("Archive", "export", "read"),
-    "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
+    "rodshell.output": ("export", "save"),
+    "rodshell.output.options": ("DrawingStyle", "OutputOptions"),
+    "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
     "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
@@ -134,12 +136,12 @@ __all__ = [
     "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform",
     "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
     "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Motion", "NetLimitError",
-    "OutOfTimeError", "OutputError", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads", "PopUp",
-    "Rectangle", "RectangularSection", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample",
-    "SharedDofs", "Shell", "Spring", "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube",
-    "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export", "fabricate", "find_form",
-    "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "search", "simulate", "solve_rod",
-    "straight_rods", "surface_from", "trim",
+    "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads",
+    "PopUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports",
+    "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed",
+    "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export", "fabricate",
+    "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save", "search",
+    "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

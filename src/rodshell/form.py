@@ -25,13 +25,12 @@ from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
-from rodshell.output import Archive
+from rodshell.output.files import save
+from rodshell.output.options import OutputOptions
 from rodshell.output.pictures import picture_svg
-from rodshell.output.result import States, form_result, form_states, table_result, table_states
-from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
-from rodshell.output.takeaway import Takeaway
-from rodshell.output.verdict import Verdict, verdict
-from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
+from rodshell.results import Archive, Results, Verdict
+from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
+from rodshell.results.from_form import results_of, states_of, with_seam_forces
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 
@@ -56,7 +55,7 @@ class Form:
     case: Case
     asked: Case
     stages: Stages
-    options: Takeaway
+    options: OutputOptions
     inputs: Mapping[str, bytes]
     search: Search | None = None
     reused: tuple[str, ...] = ()
@@ -162,7 +161,7 @@ class Form:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences of form finding that a user should read before anything else; those of checks are in `result`."""
+        """Sentences of form finding that a user should read; those of checks are in the archive."""
         return self.stages.warnings
 
     # Checks, fabrication, verdict
@@ -177,7 +176,8 @@ class Form:
         """Cut list, layers, splices, stock and bracing; made as `checks` are."""
         if self._known_fabrication is not None:
             return self._known_fabrication
-        shape = next((self.popped[ends].positions for ends in PREFERRED if ends in self.checks.bending), None)
+        ends = final_ends(self.checks)
+        shape = None if ends is None else self.popped[ends].positions
         return fabricate(
             self.footprint.mesh, self.rod, self.options.fabrication, curvature=sharpest(self.checks), final=shape
         )
@@ -197,7 +197,7 @@ class Form:
         """What the form is worth, all checks done: good, check or unbuildable, with the reasons."""
         return self._archive.verdict
 
-    def with_options(self, options: Takeaway) -> "Form":
+    def with_options(self, options: OutputOptions) -> "Form":
         """The same stages, to be checked, fabricated and drawn with other options."""
         same = options.stages == self.options.stages and self._weight(options) == self._weight(self.options)
         known = self.known_checks if same else None
@@ -213,13 +213,11 @@ class Form:
 
     # Files
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json before anything was checked."""
-        if isinstance(self.stages, PatchedForm):
-            return sewn_result(self.stages)
-        return table_result(self.stages, "popup") if self.stages.from_table else form_result(self.stages)
+    def results(self) -> Results:
+        """The typed content of result.json before anything was checked."""
+        return results_of(self.stages)
 
-    def archive(self, *, options: Takeaway | None = None) -> Archive:
+    def archive(self, *, options: OutputOptions | None = None) -> Archive:
         """Everything that is kept, checked and made ready to be built.
 
         options : of checks, fabrication and drawings in place of the form's own.
@@ -234,7 +232,7 @@ class Form:
         self,
         folder: str | PathLike[str],
         *,
-        options: Takeaway | None = None,
+        options: OutputOptions | None = None,
         kinds: Iterable[str] | None = None,
         force: bool = False,
     ) -> Path:
@@ -250,7 +248,7 @@ class Form:
         ------
         OutputError : the folder cannot be written, or such files are there and `force` is False.
         """
-        return self.archive(options=options).save(folder, kinds, force=force)
+        return save(self.archive(options=options), folder, kinds, force=force)
 
     # Python manners
 
@@ -288,7 +286,7 @@ class Form:
             raise InputError(f"this form has {len(self.patches)} patches: take patches[k].{what}")
         return self.stages
 
-    def _weight(self, options: Takeaway) -> float:
+    def _weight(self, options: OutputOptions) -> float:
         return options.judged_by(self.rod).shear_weight
 
     def _checked(self, progress: Progress) -> Checks:
@@ -307,28 +305,17 @@ class Form:
 
     @cached_property
     def _archive(self) -> Archive:
-        checks, judged = self.checks, self.options.judged_by(self.rod)
-        result = self.result()
+        checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
+        results = self.results()
         if isinstance(self.stages, PatchedForm):
-            result = with_seam_forces(result, self.stages, checks)
-        result = workshop_result(
-            result, self.footprint.mesh, checks, self.fabrication, judged.strength, judged.shear_strength
-        )
-        result["bending"]["strength_of"] = judged.strength_of
-        if self.options.rod_chosen:
-            result["rod"] = {**result["rod"], "chosen": dict.fromkeys(self.options.rod_chosen, True)}
-        if checks.out_of_time and result["status"] == "converged":
-            result["status"] = checks.out_of_time
-        result["drawings"] = self.options.drawings.parameters()
-        result["name"] = self.options.drawings.name or result["name"]
-        result["verdict"] = verdict(result).table()
-        states = self._states() | workshop_states(checks)
-        return Archive(result, states, self._case_with_options().text(), self.inputs).as_stored()
-
-    def _states(self) -> States:
-        if isinstance(self.stages, PatchedForm):
-            return sewn_states(self.stages)
-        return table_states(self.stages) if self.stages.from_table else form_states(self.stages)
+            results = with_seam_forces(results, self.stages, checks)
+        results = checked_results(
+            results, self.footprint.mesh, checks, self.fabrication,
+            strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
+        )  # fmt: skip
+        results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
+        states = states_of(self.stages) | checked_states(checks)
+        return Archive(results, states, self._case_with_options().text(), self.inputs)
 
     def _case_with_options(self) -> Case:
         """The case with the tables of the options."""

@@ -27,8 +27,8 @@ from rodshell.formfinding.progress import Progress, limited, silent
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout
-from rodshell.output.folder import reading
-from rodshell.output.takeaway import Takeaway
+from rodshell.output.options import OutputOptions
+from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run
 from rodshell.targets import Target
@@ -88,7 +88,7 @@ class Job:
         ends: AskedEnds | Sequence[AskedEnds] = "both",
         seams: Iterable[ArrayLike] = (),
         patches: Mapping[str, PatchLayout] | None = None,
-        options: Takeaway | None = None,
+        options: OutputOptions | None = None,
     ) -> None:
         if target is None or layout is None or rod is None:
             raise InputError(OBJECTS)
@@ -99,14 +99,14 @@ class Job:
         if anchor is not None and anchor != "auto":
             point("anchor", anchor)
         if options is not None:
-            instance("options", options, Takeaway)
+            instance("options", options, OutputOptions)
         for name, patch in (patches or {}).items():
             instance(f"patches {name}", patch, PatchLayout)
         case = case_of(
             target, layout, rod,
             joint=joint or Ball(), method=method, anchor=anchor, rotate=rotate,
             objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
-            seams=seams, patches=patches or {}, options=options or Takeaway(),
+            seams=seams, patches=patches or {}, options=options or OutputOptions(),
         )  # fmt: skip
         self._set(case, target)
 
@@ -169,7 +169,7 @@ class Job:
         if rod is not None:
             instance("rod", rod, Rod)
         ends, case = _ends_and_case(source, unit, flattened({**(overrides or {}), **more}))
-        given = case_of_rod_ends(ends, rod, joint or built(case.joint), Takeaway())
+        given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
         return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))
 

@@ -14,9 +14,9 @@ from rodshell.formfinding import Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
 from rodshell.formfinding.progress import Progress
 from rodshell.formfinding.search import Search, search
-from rodshell.output.inputs import read_inputs
-from rodshell.output.result import rod_table
-from rodshell.output.summary import chosen, rod_text
+from rodshell.results.from_form import rod_type
+from rodshell.results.inputs import read_inputs
+from rodshell.results.summary import chosen, rod_text
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
@@ -54,7 +54,7 @@ class Run:
         self.asked, self.target, self.progress = case, target, progress
         self.announce, self.frames_in = announce, frames_in
         self.inputs = read_inputs(case.text())
-        self.options = case.takeaway()
+        self.options = case.output_options()
         self.earlier = warm_start
         if warm_start is not None and warm_start.from_table != (case.target.kind == "table"):
             self.earlier = None
@@ -196,7 +196,7 @@ class Run:
         left_open, strength = self.asked.rod.left_open, self.asked.checks.strength
         if not left_open or self.announce is None:
             return
-        said = f"rod: {rod_text(rod_table(rod))}; {chosen(left_open)}"
+        said = f"rod: {rod_text(rod_type(rod))}; {chosen(left_open)}"
         if "section" in left_open and rod.material and not isinstance(rod.section, GivenSection):
             why = fit().reason(rod.section, rod.material, strength=strength, shape=self.asked.rod.shape)
             said += f", {why}"

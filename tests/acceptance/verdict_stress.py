@@ -135,7 +135,7 @@ def strength_rows() -> Iterator[Row]:
     assert alone is not None
     for share, says in ((0.5, "200 %"), (1.25, None)):
         strength = share * float(alone.max())
-        result = form.archive(options=rs.Takeaway(strength=strength, stages=0)).result
+        result = form.archive(options=rs.OutputOptions(strength=strength, stages=0)).results.plain()
         used = result["bending"]["pinned"]["utilisation"]
         case = f"laths, strength {share:g} of the stress"
         yield Row(case, "utilisation off", abs(used * share - 1), 1e-6, "", f"{100 * used:.0f} %")
@@ -144,7 +144,7 @@ def strength_rows() -> Iterator[Row]:
         yield Row(case, "said wrongly", float(not said), 0)
     given = rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=0.7))
     try:
-        rs.Takeaway(strength=1e8).require_known_stress(given, rs.Pin())
+        rs.OutputOptions(strength=1e8).require_known_stress(given, rs.Pin())
         refused = ""
     except rs.InputError as error:
         refused = str(error)

@@ -459,7 +459,7 @@ FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (0, 0, 0)}), "tangent .* must not be zero"),
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (1, 0)}), "three numbers"),
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"end": (-1, 0, 0)}), "points against the rod"),
-        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped="start"), "in a row"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped="start"), "must be a sequence of ends"),
         (lambda: CLAMPED.state(np.zeros((3, 3))), r"shape \(5, 3\)"),
         (lambda: CLAMPED.state(angles=np.zeros(3)), r"shape \(4,\)"),
         (

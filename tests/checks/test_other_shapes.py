@@ -259,7 +259,7 @@ def test_two_shapes_of_a_search_are_never_the_same() -> None:
 
 def test_result_and_summary_say_what_was_found() -> None:
     archive = square_cap().archive()
-    way, searched = archive.result["deployment"], archive.result["other_shapes"]["pinned"]
+    way, searched = archive.results.plain()["deployment"], archive.results.plain()["other_shapes"]["pinned"]
     assert way["reached_from_flat"] is True
     assert way["elsewhere"] is None
     assert way["snaps"] == way["snapped_by"] == []

@@ -420,7 +420,7 @@ def test_values_that_do_not_fit_together_are_refused_when_built(overrides: dict[
 def test_what_would_do_nothing_is_refused_before_the_job(overrides: dict[str, object], message: str) -> None:
     case = load_case("hemisphere", overrides)
     with pytest.raises(InputError) as caught:
-        case.build(), case.takeaway()
+        case.build(), case.output_options()
     assert message in str(caught.value)
 
 
@@ -437,7 +437,7 @@ def test_a_patch_of_finer_spacing_may_have_shorter_stock() -> None:
         load_case("hemisphere", short).build()
     case = load_case("hemisphere", {**seams, **short})
     assert case.build()
-    assert case.takeaway().fabrication.stock_length == 0.01
+    assert case.output_options().fabrication.stock_length == 0.01
 
 
 def test_another_method_keeps_what_it_uses_alone(load: Any) -> None:

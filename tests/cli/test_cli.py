@@ -25,11 +25,11 @@ from rodshell.cli import main
 from rodshell.cli.options import ALIASES
 from rodshell.errors import NetLimitError
 from rodshell.formfinding.search import Search
-from rodshell.output import folder as folder_module
-from rodshell.output import read
-from rodshell.output.archive import export
-from rodshell.output.folder import ResultFolder
-from rodshell.output.takeaway import Takeaway
+from rodshell.output import export
+from rodshell.output.options import OutputOptions
+from rodshell.results import Results, read
+from rodshell.results import folder as folder_module
+from rodshell.results.folder import ResultFolder
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -41,7 +41,7 @@ CROSS = [
 class FakeArchive:
     def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
         verdict = {"level": level, "reasons": ["the rods touch"]}
-        self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
+        self.results = Results.model_validate({"format": "rodshell-result", "status": status, "verdict": verdict})
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
@@ -58,11 +58,11 @@ class FakeForm:
     case: Case
     asked: Case
     stages: tuple[str, str]
-    options: Takeaway
+    options: OutputOptions
     inputs: dict[str, bytes]
     search: Search | None
 
-    told: ClassVar = list[Takeaway]()
+    told: ClassVar = list[OutputOptions]()
 
     def finished(self, progress: Callable[[str, str, float], None]) -> "FakeForm":
         return self
@@ -93,6 +93,7 @@ class FakeFinder:
         for name in ("find_stages", "pop_up_stages"):
             monkeypatch.setattr(rodshell.run, name, lambda *args, **options: self.find_stages(*args, **options))
         monkeypatch.setattr(rodshell.run, "Form", FakeForm)
+        monkeypatch.setattr("rodshell.output.files.save", lambda archive, *args, **more: archive.save(*args, **more))
 
 
 @pytest.fixture(autouse=True)
@@ -491,7 +492,7 @@ def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dom
     for source in (["dome"], [write_table(Path("rods.csv"), CROSS), "--unit", "m"]):
         assert main(["popup", *source, *options]) == 0
         told = FakeForm.told[-1]
-        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).takeaway()
+        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).output_options()
 
 
 def test_popup_writes_only_the_kinds_that_are_asked_for(
@@ -503,7 +504,7 @@ def test_popup_writes_only_the_kinds_that_are_asked_for(
     assert main(["popup", "dome", "--only", "csv, dxf"]) == 0
     assert kinds == [["csv", "dxf"]]
     capsys.readouterr()
-    assert '"docx" is no kind of file' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
+    assert 'unknown kind of file "docx"' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
 
 
 def test_a_result_takes_the_rod_that_is_asked_for_in_place_of_its_own(finder: FakeFinder, dome: Path) -> None:
@@ -615,7 +616,7 @@ def dome() -> Path:
 
 def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinder, dome: Path) -> None:
     """As of a target that was a Python function, or of a table of rods."""
-    from rodshell.output.result import rod_table
+    from rodshell.results.from_form import rod_type
 
     result = json.loads((dome / "result.json").read_text())
     (dome / "case.toml").write_text("# the target was a Python function\n")
@@ -623,7 +624,7 @@ def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinde
         rs.Rod(rs.Tube(radius=0.02, thickness=0.003), rs.Material.preset("gfrp")),
         rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=2.0, GJ=0.5, mass=0.3)),
     ):
-        told = result | {"rod": rod_table(rod), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
+        told = result | {"rod": rod_type(rod).plain(), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
         (dome / "result.json").write_text(json.dumps(told))
         assert main(["popup", str(dome), "--force", "-q"]) == 0
         (_, _, same), options = finder.calls[-1]
@@ -671,7 +672,7 @@ def test_an_earlier_result_that_cannot_be_read_is_refused(
     (dome / "result.json").write_text(json.dumps(result))
     assert "dome has no rods" in refused(capsys, "popup", "dome")
     (dome / "result.json").write_text(json.dumps({**result, "rods": [{"id": "U01"}]}))
-    assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
+    assert "dome/result.json: rods[0].family is missing" in refused(capsys, "popup", "dome")
     (dome / "result.json").unlink()
     assert "no rodshell result" in refused(capsys, "popup", "dome")
 

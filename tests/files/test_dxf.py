@@ -12,7 +12,7 @@ from ezdxf.document import Drawing as Document
 from ezdxf.enums import TextEntityAlignment as Alignment
 from forms import TARGETS, archive, wished
 
-from rodshell.output.archive import export
+from rodshell.output import export
 from rodshell.output.drawing import LAYERS, Drawing, Pencil
 from rodshell.output.dxf import CAPITAL, drawing_dxf
 

@@ -5,20 +5,18 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 from forms import formed
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sample_archive import table_archive
 from test_callouts import cross, off
 
-from rodshell.output import Archive
-from rodshell.output.callouts import callouts, outward
 from rodshell.output.drawing import Drawing
-from rodshell.output.drawings.flat import flat_drawing
+from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import fitted
-from rodshell.output.drawings.supports import supports_drawing
-from rodshell.output.labels import Room, boxes_meet, lines_meet
-from rodshell.output.plan import FlatPlan, flat_plan
+from rodshell.output.drawings.shell import supports_drawing
+from rodshell.output.labels import Room, boxes_meet, callouts, lines_meet, outward
+from rodshell.results import Archive
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +90,7 @@ def test_the_edge_of_a_sewn_shell_has_no_notches_at_its_seam() -> None:
     made, plan = named("sewn")
     drawing = supports_drawing(made, plan, plan.text)
     (edge,) = (path.points for path in drawing.paths if path.layer == "BOUNDARY-FINAL" and path.closed)
-    meetings = 1e3 * np.array([one["point"][:2] for seam in made.result["seams"] for one in seam["meetings"]])
+    meetings = 1e3 * np.array([one["point"][:2] for seam in made.results.plain()["seams"] for one in seam["meetings"]])
     assert len(edge) + 2 * len(meetings) == 2 * len(plan.rods)
     apart = np.linalg.norm(edge - np.roll(edge, 1, axis=0), axis=1) > 1.0
     smooth = edge[apart]  # places within a millimetre have no direction
@@ -105,6 +103,7 @@ def test_the_edge_of_a_sewn_shell_has_no_notches_at_its_seam() -> None:
 
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
+@example(count=4, size=1.0, long=1.0, letters=3, seed=0)  # two ends side by side, whose lines lean to each other
 @given(st.integers(4, 24), st.floats(0.24, 1.28), st.floats(1.0, 2.5), st.integers(3, 7), st.integers(0, 99))
 def test_names_around_any_opening_are_clear_and_near(
     count: int, size: float, long: float, letters: int, seed: int

@@ -16,7 +16,7 @@ from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.methods import Fall
 from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
-from rodshell.output.manifest import read_manifest
+from rodshell.results.folder import read_manifest
 from rodshell.solve.report import Status
 from rodshell.solve.simulate import TimeSeries
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout

@@ -149,7 +149,7 @@ def test_a_grid_that_slid_off_advises_the_bound_drape():
     assert form.status.startswith("drape")
     assert "method = bound" in form.status
     assert not form.popped
-    assert form.result()["status"] == form.status
+    assert form.results().plain()["status"] == form.status
 
 
 def test_a_saddle_is_reported_with_its_negative_modes():

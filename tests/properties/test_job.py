@@ -64,7 +64,7 @@ def test_a_job_of_objects_is_the_job_of_their_case() -> None:
     other = rs.Job(
         rs.Hemisphere(SIZE), layout, ROD,
         method=rs.Gravity(acceleration=1.6), anchor=(0.1, 0.0), ends="pinned", joint=rs.Pin(mass=0.1),
-        options=rs.Takeaway(strength=3e7, stages=2),
+        options=rs.OutputOptions(strength=3e7, stages=2),
     )  # fmt: skip
     asked = {"drape.method": "gravity", "drape.gravity": 1.6, "drape.anchor": "0.1, 0", "pop_up.ends": "pinned"}
     asked |= {"joint.kind": "pin", "joint.mass": "100 g", "checks.strength": "30 MPa", "checks.stages": 2}
@@ -127,7 +127,7 @@ def test_equality_of_targets_from_python_is_by_the_object() -> None:
 
 
 def test_a_job_of_python_objects_runs_with_them(tmp_path: Path) -> None:
-    form = rs.Job(FUNCTION, LAYOUT, ROD, ends="clamped", options=rs.Takeaway(stages=0)).run()
+    form = rs.Job(FUNCTION, LAYOUT, ROD, ends="clamped", options=rs.OutputOptions(stages=0)).run()
     assert form.target is FUNCTION
     assert form.status == "converged"
     assert "no case file can give the Python function" in form.archive().case_toml
@@ -200,8 +200,10 @@ def test_only_stages_from_the_first_changed_one_run_again_and_give_the_cold_resu
             np.testing.assert_allclose(ours.states[name], theirs.states[name], rtol=0, atol=SAME)
     assert ours.case_toml == theirs.case_toml == job.to_toml()
     for key in ("verdict", "drawings", "warnings", "status", "dropped"):
-        assert ours.result[key] == theirs.result[key]
-    assert ours.result["fabrication"]["end_allowance"] == theirs.result["fabrication"]["end_allowance"]
+        assert getattr(ours.results, key) == getattr(theirs.results, key)
+    made, wanted = warm.fabrication, cold.fabrication
+    assert made.options == wanted.options
+    np.testing.assert_allclose(made.cut_length, wanted.cut_length, rtol=0, atol=SAME)
 
 
 def earlier_job() -> rs.Job:
@@ -272,13 +274,13 @@ def test_what_the_time_limit_cut_short_is_run_again(monkeypatch: pytest.MonkeyPa
             part = job.run(time_limit=limit)
         except OutOfTimeError:
             continue
-        if part.archive().result["status"] == "converged":
+        if part.archive().results.plain()["status"] == "converged":
             break
         again = job.run(warm_start=part)
         seen.add(again.reused)
         for ends, shell in whole.popped.items():
             np.testing.assert_allclose(again.popped[ends].positions, shell.positions, rtol=0, atol=SAME)
-        assert again.archive().result["status"] == "converged"
+        assert again.archive().results.plain()["status"] == "converged"
     assert {ALL[:1], ALL[:3], ALL[:4]} <= seen
 
 
@@ -336,7 +338,8 @@ def test_the_command_line_runs_the_job(tmp_path: Path) -> None:
     assert saved.case_toml == made.case_toml
     for name, state in made.states.items():
         np.testing.assert_array_equal(saved.states[name], state)
-    assert {key for key in made.result if made.result[key] != saved.result[key]} <= {"drape", "pop_up"}  # seconds
+    ours, theirs = made.results.plain(), saved.results.plain()
+    assert {key for key in ours if ours[key] != theirs[key]} <= {"drape", "pop_up"}  # seconds
 
 
 # The form

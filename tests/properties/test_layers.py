@@ -13,7 +13,7 @@ from rodshell.formfinding.section_limits import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.vectors import unit
 from rodshell.nets.sphere import crossing_angle
-from rodshell.output.rods import joint_places
+from rodshell.output.grid import joint_places
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import Status

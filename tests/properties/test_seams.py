@@ -17,7 +17,7 @@ from rodshell.formfinding.seams import End, in_a_row
 from rodshell.formfinding.target_patches import carried_heading, patches_of
 from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.side_by_side import side_by_side
-from rodshell.output import read
+from rodshell.results import read
 from rodshell.targets.patch import Seam
 
 Floats = NDArray[np.float64]
@@ -191,9 +191,9 @@ def test_seams_carry_what_the_patches_do_not() -> None:
     """Forces on the seam and at the edge balance; each is the sum of both rods'."""
     form = sewn("two bumps, in the valley")
     archive = form.archive()
-    held = archive.result["reactions"]["clamped"]
+    held = archive.results.plain()["reactions"]["clamped"]
     forces = np.array(held["forces"])
-    (seam,) = archive.result["seams"]
+    (seam,) = archive.results.plain()["seams"]
     rows = {f"{rod.name}.{side}": 2 * k + side for k, rod in enumerate(form.footprint.rods) for side in (0, 1)}
     both = [[rows[end] for end in meeting["ends"]] for meeting in seam["meetings"]]
     each = np.array(seam["forces"]["clamped"]["each"])
@@ -207,7 +207,7 @@ def test_seams_carry_what_the_patches_do_not() -> None:
 def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> None:
     form = sewn("two bumps, in the valley")
     archive = form.archive()
-    for ends, weighed in archive.result["self_weight"].items():
+    for ends, weighed in archive.results.plain()["self_weight"].items():
         popped = [patch.popped[ends] for patch in form.patches]
         own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
         assert weighed["load_factor"] == min(one.load_factor for one in own)
@@ -252,7 +252,7 @@ def test_the_strong_bending_of_patches_is_that_of_the_worst() -> None:
     """Here not of the patch whose rods meet at the smallest angle."""
     lath = rs.Rod(rs.RectangularSection(width=1e-3, height=8e-3), rs.Material(youngs_modulus=1e9, density=1e3))
     target, seams, spacing = CASES["two bumps, in the valley"]
-    result = rs.find_form(target, layout_of(spacing), lath, seams=seams, joint=rs.Pin(), ends=()).result()
+    result = rs.find_form(target, layout_of(spacing), lath, seams=seams, joint=rs.Pin(), ends=()).results().plain()
     bent = [patch["drape"]["strong_bending"] for patch in result["patches"]]
     assert bent[0]["beyond"] > 1.1 * bent[1]["beyond"]
     assert result["patches"][0]["drape"]["min_angle_deg"] > result["patches"][1]["drape"]["min_angle_deg"]
@@ -275,10 +275,10 @@ def test_running_a_result_again_gives_the_same(tmp_path, monkeypatch) -> None:
     assert first.case_toml == second.case_toml
     for state, positions in first.states.items():
         np.testing.assert_array_equal(positions, second.states[state])
-    assert first.result["patches"][1]["rotate"] == pytest.approx(np.radians(12))
-    assert {rod["id"][:2] for rod in first.result["rods"]} == {"A-", "B-"}
+    assert first.results.plain()["patches"][1]["rotate"] == pytest.approx(np.radians(12))
+    assert {rod["id"][:2] for rod in first.results.plain()["rods"]} == {"A-", "B-"}
     assert (tmp_path / "first/schedule/seams.csv").read_text().count("\n") == 1 + len(
-        first.result["seams"][0]["meetings"]
+        first.results.plain()["seams"][0]["meetings"]
     )
 
 
@@ -477,5 +477,5 @@ def test_the_way_up_of_all_patches_ends_where_they_stand() -> None:
     assert archive.states["history_curvature"].shape == (len(share), len(archive.states["rod_nodes"]))
     sharpest = archive.states["history_curvature"].max(axis=1)
     np.testing.assert_allclose(
-        [1 / stage["min_radius"] for stage in archive.result["deployment"]["stages"]], sharpest, rtol=1e-5
+        [1 / stage["min_radius"] for stage in archive.results.plain()["deployment"]["stages"]], sharpest, rtol=1e-5
     )

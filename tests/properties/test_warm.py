@@ -162,6 +162,15 @@ def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last)
         assert largest(again.positions - popped.positions) < SETTLED
 
 
+def test_a_warm_start_that_would_be_ignored_is_refused(last):
+    """An earlier pop-up serves the same ends, and no start from flat."""
+    popped, boundary = last.popped["pinned"], last.trimmed.boundary
+    with pytest.raises(rs.InputError, match="has pinned ends, not clamped"):
+        rs.pop_up(last.footprint, boundary, ROD, ends="clamped", warm_start=popped)
+    with pytest.raises(rs.InputError, match='first guess for start="draped" alone'):
+        rs.pop_up(last.footprint, boundary, ROD, ends="pinned", start="flat", warm_start=popped)
+
+
 # What is carried
 
 

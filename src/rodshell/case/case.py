@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.popup import Ends
     from rodshell.joints import Joint
     from rodshell.layout import GridLayout
-    from rodshell.output.takeaway import Takeaway
+    from rodshell.output.options import OutputOptions
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -177,7 +177,7 @@ class Case(Table):
         layout = built(self.layout, target)
         self._require_stock(layout)
         rod = self.rod_on(target, layout, anchor=anchor)
-        self.takeaway().require_known_stress(rod, joint)
+        self.output_options().require_known_stress(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
 
     def _require_stock(self, layout: "GridLayout") -> None:
@@ -204,7 +204,7 @@ class Case(Table):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")
 
-    def takeaway(self) -> "Takeaway":
+    def output_options(self) -> "OutputOptions":
         """What checks, workshop and drawings are told.
 
         Raises
@@ -212,12 +212,12 @@ class Case(Table):
         InputError : a value cannot be used.
         """
         from rodshell.fabrication import Fabrication
-        from rodshell.output.takeaway import DrawingStyle, Takeaway
+        from rodshell.output.options import DrawingStyle, OutputOptions
 
         style = self.drawings.model_dump(exclude={"layers"})
         layers = self.drawings.layers.model_dump(exclude_none=True)
         style["layers"] = {name.upper().replace("_", "-"): shown for name, shown in layers.items()}
-        return Takeaway(
+        return OutputOptions(
             self.checks.strength,
             self.checks.stages,
             Fabrication(**self.fabrication.model_dump()),

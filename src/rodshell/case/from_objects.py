@@ -27,7 +27,7 @@ from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.search import Objective
 from rodshell.joints import Joint, joint_parameters
 from rodshell.layout import GridLayout
-from rodshell.output.takeaway import Takeaway
+from rodshell.output.options import OutputOptions
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
@@ -49,7 +49,7 @@ def case_of(
     ends: Sequence[Ends],
     seams: Iterable[ArrayLike],
     patches: Mapping[str, PatchLayout],
-    options: Takeaway,
+    options: OutputOptions,
 ) -> Case:
     """The case of a target, a layout and a rod; arguments as of `rodshell.Job`, each of its kind."""
     heading = layout.rotate if rotate is None else rotate
@@ -70,7 +70,7 @@ def case_of(
     return Case.model_validate(options.parameters()).model_copy(update=tables)
 
 
-def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint, options: Takeaway) -> Case:
+def case_of_rod_ends(ends: RodEnds, rod: Rod | None, joint: Joint, options: OutputOptions) -> Case:
     """The case of rods that a table gives by where their ends lie flat and in the end."""
     update = {"target": table_target(ends), "joint": joint_table(joint), "pop_up": PopUpTable(ends="pinned")}
     if rod is not None:

@@ -177,22 +177,24 @@ def read_result(folder: Path) -> ResultRods:
     OutputError : the folder holds no result that can be read.
     InputError : the result has no rods, or no shell in space; its rods lie in two layers, or have linkers of their own.
     """
-    from rodshell.output.archive import SHELLS, read
-    from rodshell.output.rods import rods_of
+    from rodshell.output.grid import rods_of
+    from rodshell.results.archive import SHELLS, read
 
     archive = read(folder)
-    if archive.result.get("patches"):
+    results = archive.results
+    if results.patches:
         raise InputError(
             f"{folder} holds patches, whose flat grids lie side by side: pop up a table of one patch's rods"
         )
-    apart = (archive.result.get("drape") or {}).get("eccentricity")
+    apart = results.drape.eccentricity if results.drape else None
     if apart:
         raise InputError(
             f"{folder} holds rods in two layers {length_text(apart)} apart, and popup joins its rods at one point: "
             "see the result's own deployment"
         )
-    joint = archive.result.get("joint") or {}
-    rod = {key: table for key, table in archive.result.get("rod", {}).items() if key in ("section", "material")}
+    joint = results.joint.plain() if results.joint else {}
+    kept = results.rod.plain() if results.rod else {}
+    rod = {key: table for key, table in kept.items() if key in ("section", "material")}
     if "rod" in joint:
         raise InputError(
             f"the joints in {folder} are linkers of another rod, which popup cannot take over: use "
@@ -207,5 +209,5 @@ def read_result(folder: Path) -> ResultRods:
         raise InputError(f"the result in {folder} lacks its rods or its states: run it again") from None
     if not rods:
         raise InputError(f"the result in {folder} has no rods")
-    edge = (archive.result.get("layout") or {}).get("edge")
+    edge = results.layout.edge if results.layout else None
     return ResultRods(RodEnds(straight_rods(flat, names=[rod.id for rod in rods]), final, edge), rod, joint)

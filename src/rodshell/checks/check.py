@@ -22,6 +22,7 @@ from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
 from rodshell.rods.section_stress import VON_MISES
 from rodshell.solve.critical import MOST_FACTORIZATIONS
+from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.units import length_text, stress_text
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
@@ -167,7 +168,7 @@ def check(
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
         was found until then is returned.
     """
-    done = {ends: shape for ends, shape in popped.items() if shape.report.converged}
+    done = {ends: _settled(shape) for ends, shape in popped.items() if shape.report.converged}
     checks = Checks(
         bending={
             ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()
@@ -194,10 +195,17 @@ def check(
     )
 
 
+def _settled(shape: PopUp) -> PopUp:
+    """Settled once more from where the pop-up has ended: the order of equal figures depends on the last bits."""
+    last = shape.equilibrium
+    found = find_equilibrium(last.problem, last.state, last.forces)
+    return replace(shape, shell=shape.shell.with_elements(found.elements), equilibrium=found)
+
+
 def _long_checks(
     popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, progress: Progress
 ) -> dict[str, Any]:
-    """Fields of `Checks`, of those shells that are `done`, as far as the time limit allows."""
+    """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     follow = "pinned" in done and stages > 0
     deployment, turned, stopped = None, None, ""
     weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
@@ -208,14 +216,14 @@ def _long_checks(
             weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
             missing.pop(0)
         if follow:
-            deployment = _deployed(done["pinned"], stages, progress)
+            deployment = _deployed(popped["pinned"], stages, progress)
             missing[0] = "whether the clamped shell is reached from flat"
             if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
-                turned = reached_by_turning(done["pinned"], done["clamped"])
+                turned = reached_by_turning(popped["pinned"], popped["clamped"])
             missing.pop(0)
         weighing = sum(weight.factorizations for weight in weighed.values())
-        for ends, search in _other_shapes(popped, deployment, weighing, progress):
+        for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
             others[ends] = search
         missing.pop(0)
     except OutOfTimeError as error:
@@ -231,15 +239,16 @@ def _long_checks(
 
 
 def _other_shapes(
-    popped: Mapping[Ends, PopUp], deployment: Deployment | None, weighing: int, progress: Progress
-) -> Iterator[tuple[Ends, OtherShapes]]:
+    popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], deployment: Deployment | None, weighing: int,
+    progress: Progress,
+) -> Iterator[tuple[Ends, OtherShapes]]:  # fmt: skip
     """Other stable shapes, with half of the factorisations that the shells, their deployment and their `weighing` took.
 
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
-    done = weighing + sum(shape.report.factorizations for shape in popped.values())
-    left = (done + (0 if deployment is None else deployment.factorizations)) // 2
-    stable = {ends: shape for ends, shape in popped.items() if shape.report.stable}
+    work = weighing + sum(shape.report.factorizations for shape in popped.values())
+    left = (work + (0 if deployment is None else deployment.factorizations)) // 2
+    stable = {ends: shape for ends, shape in done.items() if shape.report.stable}
     for number, (ends, shape) in enumerate(stable.items()):
         most = 2 * left // 3 if number == 0 else left
         left -= most

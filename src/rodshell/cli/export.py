@@ -19,8 +19,8 @@ def command(folder: str, only: str | None, out: str | None, force: bool, quiet: 
 
     KINDS are dxf, svg, pdf, csv, obj, gltf, vtp, compas, png, report, and 3dm, which needs the package rhino3dm.
     """
-    from rodshell.output import read
-    from rodshell.output.archive import export
+    from rodshell.output import export
+    from rodshell.results import read
 
     where = Path(out or folder).expanduser()
     with Progress(quiet=quiet) as progress:

@@ -106,7 +106,7 @@ def overrides_of(values: Mapping[str, str | None]) -> dict[str, object]:
 
 
 @dataclass(frozen=True)
-class OutputOptions:
+class RunOptions:
     """What commands that run a job are told of their output.
 
     Parameters
@@ -135,7 +135,7 @@ TIME_LIMIT = 'Longest time such as "60 s" for all but the files; what was found 
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The options of `OutputOptions`; read them with `read_output_options`.
+    """The options of `RunOptions`; read them with `read_output_options`.
 
     out : help of --out.
     """
@@ -156,7 +156,7 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
     return decorate
 
 
-def read_output_options(values: dict[str, Any]) -> OutputOptions:
+def read_output_options(values: dict[str, Any]) -> RunOptions:
     """Take these options out of the `values` of a command.
 
     Raises
@@ -165,7 +165,7 @@ def read_output_options(values: dict[str, Any]) -> OutputOptions:
     """
     kinds = wanted_kinds(values.pop("only"))
     limit = seconds_of(values.pop("time_limit"))
-    return OutputOptions(
+    return RunOptions(
         kinds=kinds, limit=limit, **{name: values.pop(name) for name in ("out", "force", "as_json", "quiet")}
     )
 

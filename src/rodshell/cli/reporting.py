@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from rodshell.case import Case
-    from rodshell.cli.options import OutputOptions
+    from rodshell.cli.options import RunOptions
     from rodshell.form import Form
-    from rodshell.output import Archive
-    from rodshell.output.folder import ResultFolder
+    from rodshell.results import Archive
+    from rodshell.results.folder import ResultFolder
 
 UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one"
 SILENCE = 10.0  # s: the longest without a word, away from a terminal
@@ -150,22 +150,24 @@ class Kept:
 
     @property
     def status(self) -> str:
-        return str(self.archive.result["status"])
+        return self.archive.results.status
 
     def summary(self) -> str:
         return self.archive.summary()
 
     def result(self) -> dict[str, Any]:
-        return self.archive.result
+        return self.archive.results.plain()
 
     def save(self, folder: "ResultFolder", progress: Progress) -> Path:
-        return self.archive.save(folder, self.kinds, more=self.more, progress=progress)
+        from rodshell.output.files import save
+
+        return save(self.archive, folder, self.kinds, more=self.more, progress=progress)
 
 
 def run_and_deliver(
     case: "Case",
     name: str,
-    output: "OutputOptions",
+    output: "RunOptions",
     names: Iterable[str],
     *,
     pictures: "Callable[[Form], dict[str, str]]" = lambda form: {},
@@ -214,7 +216,7 @@ def output_folder(
     ------
     OutputError : it cannot be written, or holds files of these names that rodshell did not write.
     """
-    from rodshell.output.folder import open_folder
+    from rodshell.results.folder import open_folder
 
     return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)
 
@@ -251,7 +253,7 @@ def deliver(
 
 def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:
     """Where a result was saved: beside its place, if somebody put files there while the job ran."""
-    from rodshell.output.folder import ForeignFileError, open_folder
+    from rodshell.results.folder import ForeignFileError, open_folder
 
     try:
         save(place)

@@ -17,7 +17,7 @@ from rodshell.formfinding.layers import node_normals
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.formfinding.warm_start import transferred_edges, transferred_nodes
-from rodshell.geometry.vectors import dot, unit
+from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
@@ -28,7 +28,7 @@ from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem, half_width
 from rodshell.solve.report import SolveReport, Status
 from rodshell.units import length_text
-from rodshell.validation import choice
+from rodshell.validation import choice, instance
 
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
@@ -116,6 +116,8 @@ def pop_up(
     """
     choice("ends", ends, ENDS)
     choice("start", start, STARTS)
+    if warm_start is not None:
+        instance("warm_start", warm_start, PopUp, "what an earlier rodshell.pop_up returned")
     if warm_start is not None and start != "draped":
         raise InputError('an earlier pop-up is a first guess for start="draped" alone: leave out warm_start, or start')
     if warm_start is not None and warm_start.ends != ends:
@@ -314,11 +316,11 @@ def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
     """
     flat, ends = mesh.flat, mesh.flat[mesh.ends.ravel()]
     centre, there = ends.mean(axis=0), points.mean(axis=0)
-    a, b = (ends - centre)[:, :2], (points - there)[:, :2]
-    angle = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    a, b = (ends - centre) * (1.0, 1.0, 0.0), (points - there) * (1.0, 1.0, 0.0)
+    angle = np.arctan2(cross(a, b)[:, 2].sum(), np.sum(a * b))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     result = np.empty_like(flat)
-    result[:, :2] = (flat - centre)[:, :2] @ turn.T + there[:2]
+    result[:, :2] = (flat - centre)[:, :2] @ turn + there[:2]
     result[:, 2] = height + flat[:, 2]
     return result
 

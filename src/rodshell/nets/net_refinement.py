@@ -55,7 +55,7 @@ def march_near(
     target, u, v, anchor, heading, heights : see `march`.
     near : the similar net.
     coarser : the same net as `near` in longer steps, from which the start is extrapolated.
-    wanted : (nu, nv) nodes to find besides the axes, with all between them and the axes; others stay NaN.
+    wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
     """
     guess = near if coarser is None else _extrapolated(near, coarser, u, v)
     net = Net(u, v, interpolated(guess, u, v), heights=heights)

@@ -7,12 +7,11 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.archive import SHELLS, Archive, made_once
 from rodshell.output.drawing import Pen, Pencil
-from rodshell.output.plan import nice_step, nice_ticks
-from rodshell.output.shapes import Shape, shape_of
+from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import number
-from rodshell.output.wording import MINUS
+from rodshell.results.archive import SHELLS, Archive, made_once
+from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 
 Colour = Literal["gap", "stress"]
@@ -70,7 +69,7 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
         limit = _rounded_up(max(largest, FINEST) / factor)
         caption = f"gap to target in {unit}, + outside"
         return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
-    if shape.flat or archive.result.get("target"):
+    if shape.flat or archive.results.target:
         return None
     heights = 1e3 * shape.positions[nodes, 2]  # mm, as at the axes of the picture
     low, high = float(heights.min()), float(heights.max())
@@ -85,12 +84,12 @@ def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
     assert shape.gap is not None
     points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
     worst = int(np.argmax(np.abs(gaps)))
-    found = (archive.result.get("agreement") or {}).get(shape.name.removeprefix("popped_")) or {}
-    if found.get("where") is None or found.get("max") is None:
+    found = next((gap for ends, gap in archive.results.agreement.items() if shape.name == f"popped_{ends}"), None)
+    if found is None or found.where is None or found.max is None:
         return float(gaps[worst]), points[worst]
-    place = np.array(found["where"], dtype=float)
+    place = np.array(found.where, dtype=float)
     nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
-    return float(np.copysign(1e3 * found["max"], gaps[nearest])), place
+    return float(np.copysign(1e3 * found.max, gaps[nearest])), place
 
 
 @made_once
@@ -108,7 +107,7 @@ def length_unit(largest: float) -> tuple[float, str]:
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     """Utilisation where the strength is known, else the stress in a unit of its size."""
     assert shape.stress is not None
-    strength = (archive.result.get("bending") or {}).get("strength")
+    strength = archive.results.bending.strength if archive.results.bending else None
     known = [values for name, values in archive.states.items() if name == "history_stress" or name in STRESSES]
     top = max(float(np.max(values)) for values in known)
     if strength:

@@ -6,14 +6,13 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.layout.outline import opens
-from rodshell.output.archive import SHELLS, Archive, made_once
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, length_unit, mixed, scale_of
 from rodshell.output.drawing import Drawing, Path, Pen, Pencil
-from rodshell.output.rods import RodRecord, outlines_of, rods_of
-from rodshell.output.shapes import Shape, shape_of
+from rodshell.output.grid import GridRod, Shape, outlines_of, rods_of, shape_of
 from rodshell.output.svg import picture_document
 from rodshell.output.view import View, ground_axes
-from rodshell.output.wording import MINUS
+from rodshell.results.archive import SHELLS, Archive, made_once
+from rodshell.results.wording import MINUS
 
 Polylines = list[list[tuple[int, slice]]]
 
@@ -189,7 +188,7 @@ def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
     return lines
 
 
-def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[RodRecord]) -> None:
+def _ground_curves(pencil: Pencil, view: View, shape: Shape, rods: list[GridRod]) -> None:
     """The boundary: closed curves through the rods' ends, openings on top of what they open."""
     drawn = [rod for rod in rods if len(rod.nodes) > 1]
     ends = np.array([rod.nodes[[0, -1]] for rod in drawn], dtype=np.intp).ravel()

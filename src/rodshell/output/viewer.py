@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.archive import Archive
 from rodshell.output.colour_scale import Colour, Scale, scale_of
+from rodshell.output.grid import Shape, rods_of, shape_names, shape_of
 from rodshell.output.pictures import FAMILIES, SEGMENTS
-from rodshell.output.plan import nice_ticks
-from rodshell.output.rods import rods_of
-from rodshell.output.shapes import Shape, shape_names, shape_of
+from rodshell.results import Archive
+from rodshell.results.wording import nice_ticks
 
 STEPS = 65535  # of a coordinate: 16 bits
 

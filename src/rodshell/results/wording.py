@@ -1,12 +1,55 @@
-"""Numbers as they stand in a report, with their units."""
+"""Numbers in words, with their units, and how finely lengths are shown: one rule for drawings, tables and texts."""
 
 import re
-from collections.abc import Mapping, Sequence
-from math import isfinite, pi
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, floor, isfinite, log10, pi
 from typing import Any
 
-from rodshell.output.rounding import FINEST, Rounding
+from rodshell.results.checked import SelfWeight
+from rodshell.results.records import Record
+from rodshell.results.results import Results
 from rodshell.units import stress_text
+
+FINEST, COARSEST = 1e-3, 1.0  # mm
+OF_ROD = 1e-4  # share of the longest rod to which lengths are shown where no tolerance is given
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """Lengths to the next `step` [mm], a power of ten; each from its exact value, never from rounded ones."""
+
+    step: float
+
+    @property
+    def digits(self) -> int:
+        """Decimals of a length in mm."""
+        return max(round(-log10(self.step)), 0)
+
+    def mm(self, metres: float | None) -> str:
+        """A length [m] in mm, without its unit and without a minus before a zero; "" where it is not known."""
+        if metres is None or not isfinite(metres):
+            return ""
+        return f"{round(1e3 * metres, self.digits) + 0.0:.{self.digits}f}"
+
+    @property
+    def words(self) -> str:
+        return f"{self.step:g} mm"
+
+
+def rounding_of(results: Results) -> Rounding:
+    """The rule for a result: the power of ten not above half of the tolerance, so that rounding takes a quarter of it.
+
+    Where no tolerance is given, the power of ten not above a ten-thousandth of the longest rod.
+    """
+    tolerance = results.drawings.tolerance if results.drawings else None
+    if tolerance is None:
+        asked = 1e3 * OF_ROD * max((rod.length or 0.0 for rod in results.rods), default=0.0)
+    else:
+        asked = 0.5 * 1e3 * tolerance
+    power = 10.0 ** floor(log10(max(asked, FINEST)) + 1e-9)
+    return Rounding(min(max(power, FINEST), COARSEST))
+
 
 EXACT = Rounding(FINEST)
 UNKNOWN = "\N{EN DASH}"
@@ -58,6 +101,21 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
     return f"{value:.{min(max(digits - whole, 0), rounding.digits)}f} mm"
 
 
+def nice_step(span: float, count: int) -> float:
+    """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less."""
+    if span <= 0:
+        return 1.0
+    power = 10.0 ** floor(log10(span / count))
+    return next(k * power for k in (1.0, 2.0, 5.0, 10.0) if k * power >= span / count * (1 - 1e-9))
+
+
+def nice_ticks(low: float, high: float, count: int) -> list[float]:
+    """Round numbers from `low` to `high`, `count` + 1 at most."""
+    step = nice_step(high - low, count)
+    first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
+    return [k * step for k in range(first, last + 1)]
+
+
 def percent(share: float | None) -> str:
     """A share as a percentage with two significant digits."""
     if share is None or not isfinite(share):
@@ -67,21 +125,21 @@ def percent(share: float | None) -> str:
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
-def share_of_weight(found: Mapping[str, Any]) -> str:
-    """What an entry of `self_weight` says: how much of its own weight a shell bears."""
-    factor, limit = found.get("load_factor"), found.get("limit")
-    if limit == "no mass":
+def share_of_weight(found: SelfWeight) -> str:
+    """How much of its own weight a shell bears."""
+    factor = found.load_factor
+    if found.limit == "no mass":
         return "unknown: no mass was given"
     if factor is None:
         return "more than 100 times"
-    if limit == "unstable unloaded":
+    if found.limit == "unstable unloaded":
         return "none: unstable unloaded"
-    least = "at least " if limit == "not followed" else ""
+    least = "at least " if found.limit == "not followed" else ""
     return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
 
 
 def stage(share: float) -> str:
-    """A share of the way up from flat in whole percents, as warnings and drawings name stages."""
+    """A share of the deployment in whole percents, as warnings and drawings name stages."""
     return f"{100 * share:.0f} %"
 
 
@@ -114,8 +172,9 @@ def degrees(angle: float) -> str:
     return f"{angle:.1f}\N{DEGREE SIGN}"
 
 
-def small(value: float) -> str:
-    return f"{value:.1e}"
+def small(value: float | None) -> str:
+    """A number of which the power of ten matters."""
+    return UNKNOWN if value is None else f"{value:.1e}"
 
 
 def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
@@ -133,29 +192,39 @@ def plain(value: object) -> str:
     return UNKNOWN if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def case_rows(table: object, rounding: Rounding = EXACT) -> list[tuple[str, str]]:
+def case_rows(table: Record | None, rounding: Rounding = EXACT) -> list[tuple[str, str]]:
     """The entries of a table of the case, in the units of a drawing, files by their names.
 
     rounding : how finely lengths are shown at most.
     """
-    if not isinstance(table, dict):
-        return []
     return [
         (NAMES.get(key, key.replace("_", " ")), _case_value(key, value, CASE_UNITS, rounding))
-        for key, value in table.items()
+        for key, value in (table.plain() if table else {}).items()
         if value is not None and key != "unit" and not isinstance(value, dict)  # all is shown in units of its own
     ]
 
 
-def joint_rows(joint: object) -> list[tuple[str, str]]:
+def joint_rows(joint: Record | None) -> list[tuple[str, str]]:
     """The same of the joints, without what they do not have: "pin", eccentricity, mass, stiffnesses."""
-    if not isinstance(joint, dict):
-        return []
     return [
         (key.replace("_", " "), _case_value(key, value, JOINT_UNITS, EXACT))
-        for key, value in joint.items()
+        for key, value in (joint.plain() if joint else {}).items()
         if value and not isinstance(value, dict)
     ]
+
+
+def shown_length(results: Results) -> Callable[[float | None], str]:
+    """How texts show lengths [m]: to three figures, no finer than on the drawings."""
+    rounding = rounding_of(results)
+
+    def shown(metres: float | None) -> str:
+        if metres is None:
+            return UNKNOWN
+        if abs(metres) >= 1.0:
+            return f"{rounded(metres)} m"
+        return millimetres(metres, rounding=rounding) if abs(metres) >= 1e-9 else "0 mm"
+
+    return shown
 
 
 def _case_value(key: str, value: Any, units: Mapping[str, tuple[float, str]], rounding: Rounding) -> str:

@@ -1,4 +1,4 @@
-"""What checks, workshop and drawings are told that does not decide the form."""
+"""Options of checks, fabrication and drawings: all that does not decide the form."""
 
 import datetime
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ class DrawingStyle:
     ----------
     paper : of the PDF's sheets, landscape: A4 to A0.
     project, revision : for the title block.
-    tolerance : to which lengths are to be kept [m], and by which they are rounded (see `rounding.rounding_of`); None:
+    tolerance : to which lengths are to be kept [m], and by which they are rounded (see `wording.rounding_of`); None:
         the title block says that it is not given.
     layers : for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name.
     name : of the drawings; "": the target's. author : for the title block.
@@ -43,7 +43,7 @@ class DrawingStyle:
 
     def __post_init__(self) -> None:
         if self.paper not in PAPERS:
-            raise InputError(f'drawings cannot be on "{self.paper}": use {", ".join(PAPERS)}')
+            raise InputError(f'unknown paper size "{self.paper}": use {", ".join(PAPERS)}')
         if self.tolerance is not None and not self.tolerance > 0:
             raise InputError(f"the tolerance of drawings must be positive, not {self.tolerance} m")
         try:
@@ -66,13 +66,13 @@ class DrawingStyle:
 
 
 @dataclass(frozen=True)
-class Takeaway:
-    """All that does not decide the form.
+class OutputOptions:
+    """What is checked, made and drawn.
 
     Parameters
     ----------
     strength : of the rods' material [Pa], by which utilisation is counted; None: it is not counted.
-    stages : equilibria of the way up from flat; 0: it is not followed.
+    stages : equilibria of the deployment from flat; 0: it is not followed.
     rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
     shear_strength : of the rods' material [Pa], beside its `strength`; None: stress is counted by von Mises.
     strength_of : the preset material that the strengths are of, where they were not given.
@@ -96,7 +96,7 @@ class Takeaway:
                 "give the strength too (checks.strength), or leave it out"
             )
         if not 0 <= self.stages <= MOST_STAGES:
-            raise InputError(f"the way up can have 0 to {MOST_STAGES} stages, not {self.stages}")
+            raise InputError(f"the deployment can have 0 to {MOST_STAGES} stages, not {self.stages}")
 
     @property
     def shear_weight(self) -> float:
@@ -105,7 +105,7 @@ class Takeaway:
             return VON_MISES
         return self.strength / self.shear_strength
 
-    def judged_by(self, rod: Rod) -> "Takeaway":
+    def judged_by(self, rod: Rod) -> "OutputOptions":
         """The same with the strengths of the rod's preset material, where none was given."""
         material = rod.material
         if self.strength is not None or material is None or material.bending_strength is None:

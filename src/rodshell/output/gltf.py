@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from rodshell.arrays import Floats
 from rodshell.geometry.frames import directors_along
 from rodshell.geometry.vectors import cross, unit
-from rodshell.output.archive import Archive
 from rodshell.output.colour_scale import scale_of
-from rodshell.output.rods import rods_of
-from rodshell.output.shapes import shape_of
+from rodshell.output.grid import rods_of, shape_of
+from rodshell.results import Archive
+from rodshell.results.records import Section
 
 ROUND = 8  # sides of a circle
 SLENDER = 1e-3  # of the shell's size: thickness of a rod whose section has no shape
@@ -42,12 +42,12 @@ def section_outline(archive: Archive, size: float) -> Floats:
 
     Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
     """
-    section = (archive.result.get("rod") or {}).get("section") or {}
-    if section.get("kind") == "rectangle":
-        w, h = 0.5 * section["height"], 0.5 * section["width"]
+    section = (archive.results.rod.section if archive.results.rod else None) or Section()
+    if section.kind == "rectangle" and section.height is not None and section.width is not None:
+        w, h = 0.5 * section.height, 0.5 * section.width
         return np.array([[w, -h], [w, h], [-w, h], [-w, -h]])
-    radius = float(section.get("radius") or SLENDER * size)
-    a, b = float(section.get("a") or radius), float(section.get("b") or radius)
+    radius = section.radius or SLENDER * size
+    a, b = section.a or radius, section.b or radius
     angle = np.linspace(0, 2 * np.pi, ROUND, endpoint=False)
     return np.column_stack([b * np.cos(angle), a * np.sin(angle)])
 

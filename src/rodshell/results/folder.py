@@ -4,8 +4,12 @@ New files are staged in a hidden folder inside the result folder (so that it may
 down what is to be moved, and from then on the new result counts: should the process be killed while files are moved,
 readers take what was not moved from the stage, and the next writer moves it. What a killed process left before its
 commit is removed by the next writer.
+
+manifest.json lists the files that rodshell wrote with size and SHA-256. A file that is not listed, or whose content is
+no longer the listed one, belongs to the user.
 """
 
+import hashlib
 import json
 import os
 import shutil
@@ -13,25 +17,26 @@ import signal
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from rodshell.errors import OutputError
-from rodshell.output.manifest import FILE, Mark, above, foreign, manifest_text, mark, read_manifest
 
 try:
     import fcntl
 except ImportError:  # Windows: two runs into one folder at the same time are not kept apart there
     fcntl = None  # type: ignore[assignment]
 
-FORMAT = "rodshell-result"
-FORMATS = (FORMAT, "gridshell-result")  # what is read: the second was written until November 2026
-VERSION = 1
+MANIFEST, MANIFEST_FORMAT, MANIFEST_VERSION = "manifest.json", "rodshell-manifest", 1
 STAGE, NEW, RECORD = ".rodshell-stage-", "new", "commit.json"
 FORGOTTEN = 3600.0  # s: age of a stage that has lost its process, where locks do not tell
+
+Mark = dict[str, object]
+"""What stands at a name: {"size", "sha256"} of a file, {"link"} of a symbolic link, {"folder"} or {"other"}; {"behind"}
+of a name whose folder is none, but a link, a file or another mount."""
 
 
 class ForeignFileError(OutputError):
@@ -109,13 +114,13 @@ class ResultFolder:
             written = {name: found for name in sorted(staged) if (found := mark(self.new, name)) is not None}
             with _locked(self.path):
                 _recover(self.path, but=self.stage)
-                there = self.check([*written, FILE])
+                there = self.check([*written, MANIFEST])
                 old = {name: found for name, found in read_manifest(self.path).items() if name not in written}
                 now = {} if keep_others else {name: mark(self.path, name) for name in old}
                 removed = {name: found for name, found in now.items() if found == old[name]}
                 self.kept = tuple(name for name, found in now.items() if found is not None and name not in removed)
-                self.put(FILE, manifest_text({**(old if keep_others else {}), **written}))
-                record = {"files": [*written, FILE], "replaces": there | removed, "removes": list(removed)}
+                self.put(MANIFEST, manifest_text({**(old if keep_others else {}), **written}))
+                record = {"files": [*written, MANIFEST], "replaces": there | removed, "removes": list(removed)}
                 (self.stage / "record").write_text(json.dumps(record), encoding="utf-8")
                 with _uninterrupted():
                     (self.stage / "record").replace(self.stage / RECORD)  # from here on the new result counts
@@ -157,7 +162,7 @@ def open_folder(
                 lock = _lock(stage)
             (stage / NEW).mkdir()
             place = ResultFolder(path, stage, force)
-            place.check(_standing(path, [*reserved, FILE]))
+            place.check(_standing(path, [*reserved, MANIFEST]))
         except OSError as error:
             if isinstance(error, OutputError):
                 raise
@@ -190,28 +195,10 @@ def reading(folder: str | os.PathLike[str]) -> Iterator[Callable[[str], Path]]:
         yield where
 
 
-def read_json(path: Path) -> dict[str, Any]:
-    """The table in `path`, checked to be a result that this version understands."""
-    try:
-        result = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise OutputError(f"{path.parent} holds no rodshell result: it has no {path.name}") from error
-    except (OSError, ValueError) as error:
-        raise OutputError(f"cannot read {path}: {error}") from error
-    if not isinstance(result, dict) or result.get("format") not in FORMATS:
-        raise OutputError(f'{path} is not a rodshell result: its "format" is not "{FORMAT}"')
-    version = result.get("version")
-    if not isinstance(version, int) or version > VERSION:
-        raise OutputError(f"{path} has version {version}, this rodshell reads {VERSION}: install a newer one")
-    if "version_gridshell" in result:
-        result["version_rodshell"] = result.pop("version_gridshell")
-    return result
-
-
 def _refusal(path: Path, names: list[str]) -> str:
     shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
     if not read_manifest(path) and "result.json" in names:
-        why = f"there is no {FILE}: the result was copied, or written by an earlier version"
+        why = f"there is no {MANIFEST}: the result was copied, or written by an earlier version"
     else:
         why = "not written by rodshell, or changed since"
     return (
@@ -352,3 +339,66 @@ def _uninterrupted() -> Iterator[None]:
             signal.signal(one, signal.SIG_DFL if handler is None else handler)
         for number in late:
             signal.raise_signal(number)
+
+
+def mark(folder: Path, name: str) -> Mark | None:
+    """What stands at a name in a folder, links not followed; None where nothing does."""
+    path = folder / name
+    behind = next((part for part in above(name) if _is_no_folder(folder / part)), None)
+    if behind is not None:
+        return {"behind": behind}
+    if path.is_symlink():
+        return {"link": str(path.readlink())}
+    if path.is_file():
+        with path.open("rb") as stream:
+            return {"size": path.stat().st_size, "sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
+    if path.is_dir():
+        return {"folder": True}
+    return {"other": True} if path.exists() else None
+
+
+def read_manifest(folder: Path) -> dict[str, Mark]:
+    """What was written to `folder`, by name; empty where there is no manifest of ours."""
+    try:
+        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        if content["format"] != MANIFEST_FORMAT:
+            return {}
+        return {name: found for name, found in content["files"].items() if _inside(name) and isinstance(found, dict)}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+
+
+def manifest_text(files: Mapping[str, Mark]) -> str:
+    """The content of manifest.json, a line for each file."""
+    lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(files[name])}" for name in sorted(files))
+    head = f' "format": {json.dumps(MANIFEST_FORMAT)},\n "version": {MANIFEST_VERSION},\n "files": {{\n'
+    return "{\n" + head + lines + "\n }\n}\n"
+
+
+def above(name: str) -> list[str]:
+    """The folders that a name stands in, the outermost first."""
+    return [str(folder) for folder in reversed(PurePosixPath(name).parents)][1:]
+
+
+def foreign(folder: Path, marks: Mapping[str, Mark | None]) -> list[str]:
+    """Of names and what stands there, those that rodshell did not write, or that stand in the way of such a name."""
+    listed = read_manifest(folder)
+    found = list[str]()
+    for name, here in marks.items():
+        if here is None or (bool(listed) if name == MANIFEST else here == listed.get(name)):
+            continue
+        found.append(str(here.get("behind", name)))
+    return list(dict.fromkeys(found))
+
+
+def _is_no_folder(path: Path) -> bool:
+    """Whether something else stands there; another mount too, into which files cannot be moved in one step."""
+    if path.is_dir() and not path.is_symlink():
+        return path.stat().st_dev != path.parent.stat().st_dev
+    return path.is_symlink() or path.exists()
+
+
+def _inside(name: object) -> bool:
+    """Whether a name cannot lead out of the folder."""
+    path = PurePosixPath(str(name))
+    return isinstance(name, str) and not path.is_absolute() and ".." not in path.parts and "\\" not in name
