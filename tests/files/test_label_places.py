@@ -84,6 +84,7 @@ def turns(outline: Floats) -> Floats:
     return np.asarray((way - np.roll(way, 1) + np.pi) % (2 * np.pi) - np.pi)
 
 
+@pytest.mark.slow
 def test_the_edge_of_a_sewn_shell_has_no_notches_at_its_seam() -> None:
     """Around a dome of two patches it is convex, passes every rod end that is not sewn once, and no seam."""
     made, plan = named("sewn")
