@@ -39,7 +39,7 @@ CROSS = [
 class FakeArchive:
     def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
         verdict = {"level": level, "reasons": ["the rods touch"]}
-        self.results = Results.of({"format": "rodshell-result", "status": status, "verdict": verdict})
+        self.results = Results.model_validate({"format": "rodshell-result", "status": status, "verdict": verdict})
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
@@ -93,6 +93,7 @@ def finder(monkeypatch: pytest.MonkeyPatch) -> FakeFinder:
     fake = FakeFinder()
     monkeypatch.setitem(sys.modules, "rodshell.form", fake)
     monkeypatch.setattr("rodshell.cli.progress.compiled_before", lambda: True)
+    monkeypatch.setattr("rodshell.output.files.save", lambda archive, *args, **options: archive.save(*args, **options))
     return fake
 
 
@@ -390,6 +391,7 @@ def test_the_first_run_announces_the_compilation(
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "rodshell.form", finder)
+    monkeypatch.setattr("rodshell.output.files.save", lambda archive, *args, **options: archive.save(*args, **options))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     numba.config.reload_config()  # type: ignore[attr-defined]
     assert main(["form", "hemisphere", "--out", "a"]) == 0
@@ -608,7 +610,7 @@ def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinde
         rs.Rod(rs.Tube(radius=0.02, thickness=0.003), rs.Material.preset("gfrp")),
         rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=2.0, GJ=0.5, mass=0.3)),
     ):
-        told = result | {"rod": rod_type(rod), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
+        told = result | {"rod": rod_type(rod).plain(), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
         (dome / "result.json").write_text(json.dumps(told))
         assert main(["popup", str(dome), "--force", "-q"]) == 0
         (_, _, same), options = finder.calls[-1]
@@ -656,7 +658,7 @@ def test_an_earlier_result_that_cannot_be_read_is_refused(
     (dome / "result.json").write_text(json.dumps(result))
     assert "dome has no rods" in refused(capsys, "popup", "dome")
     (dome / "result.json").write_text(json.dumps({**result, "rods": [{"id": "U01"}]}))
-    assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
+    assert "dome/result.json: rods[0].family is missing" in refused(capsys, "popup", "dome")
     (dome / "result.json").unlink()
     assert "no rodshell result" in refused(capsys, "popup", "dome")
 

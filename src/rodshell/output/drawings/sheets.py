@@ -249,6 +249,8 @@ def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Ite
 def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
     """A table over as many sheets as it takes, in as many columns side by side as fit."""
     (columns, rows), (low, high) = content, room(paper)
+    if not columns:
+        return
     cells = [max((len(row[k]) for row in rows), default=0) for k in range(len(columns))]
     heads = [_wrapped(*head(column), width) for column, width in zip(columns, cells, strict=True)]
     widths = [max(width, *map(len, words)) for width, words in zip(cells, heads, strict=True)]
