@@ -1,5 +1,5 @@
 # The habits of the house. `make` alone shows them.
-.PHONY: help lint words types test accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-house house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -14,6 +14,9 @@ words:     ## words that the project does not use, with what it says instead
 
 types:     ## mypy
 	mypy
+
+test-fast: ## tests that are not marked slow, over every kind of input and output
+	python -m pytest -m "not slow"
 
 test:      ## all tests
 	python -m pytest
@@ -39,6 +42,9 @@ accept-paper: ## print the table of the paper's own time stepping (some minutes)
 
 accept-verdict: ## print the table of harm and verdicts (some minutes)
 	python -m tests.acceptance.verdict
+
+accept-house: ## print the table of what must not be lost: results before and after, archives, misuses (ten minutes)
+	python -m tests.acceptance.house
 
 house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
 	python -m tests.acceptance.house_figures

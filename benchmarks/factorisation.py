@@ -19,10 +19,9 @@ from threadpoolctl import threadpool_limits
 
 import rodshell as rs
 from benchmarks.rows import Row, Section, clock, ms
-from rodshell.solve.constraint import Supports
-from rodshell.solve.multifrontal import Multifrontal
 from rodshell.solve.newton_step import NewtonStep
-from rodshell.solve.problem import Problem
+from rodshell.solve.problem import Problem, Supports
+from rodshell.solve.sparse_ldl import Multifrontal
 
 PATIENCE = 20.0
 RADIUS = 0.2
@@ -37,11 +36,13 @@ def system(unknowns: int) -> tuple[csc_matrix, np.ndarray]:
     trimmed = rs.trim(rs.drape(layout, rod, rs.Hemisphere(radius=RADIUS)))
     shell = rs.Shell.of(trimmed.mesh, rod, joint=rs.Pin())
     state, free = shell.state(trimmed.positions), shell.held_ends()
-    step = NewtonStep(Problem(shell.elements, shell.stretch, Supports(free), RADIUS, places=shell.places), state)
+    step = NewtonStep(
+        Problem(shell.elements, shell.stretch, Supports(free), RADIUS, flat_coordinates=shell.flat_coordinates), state
+    )
     step.take(state, np.zeros(len(shell.stretch.blocks)), False)
     pattern = step._assembly
     matrix = csc_matrix((step._data, pattern.indices, pattern.indptr), shape=(free.size, free.size))
-    return matrix, np.repeat(shell.places, free.count, axis=0)
+    return matrix, np.repeat(shell.flat_coordinates, free.count, axis=0)
 
 
 def least(work: Callable[[], object]) -> float:
@@ -94,7 +95,13 @@ Solver = tuple[Callable[[], object], Callable[[np.ndarray], np.ndarray]]
 
 def _ours(upper: csc_matrix, whole: csc_matrix, places: np.ndarray) -> Solver:
     solver = Multifrontal(upper.indptr, upper.indices, places)
-    return lambda: solver.factor(upper.data), solver.solve
+    factors = solver.factor(upper.data)
+
+    def factor() -> None:
+        nonlocal factors
+        factors = solver.factor(upper.data, reuse=factors)
+
+    return factor, lambda right: factors.solve(right)
 
 
 def _qdldl(upper: csc_matrix, whole: csc_matrix, places: np.ndarray) -> Solver:

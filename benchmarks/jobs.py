@@ -17,7 +17,7 @@ from rodshell.solve.newton_step import NewtonStep
 RADIUS = 0.2
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 DOME = rs.Hemisphere(radius=RADIUS)
-bound = importlib.import_module("rodshell.formfinding.bound")
+bound = importlib.import_module("rodshell.formfinding.bound_drape")
 
 
 def auto(spacing: float = 0.03, edge: float = 0.005) -> rs.GridLayout:
@@ -151,7 +151,7 @@ def warm(runs: int) -> Section:
             for _ in range(runs + 1):
                 for start, times in ((None, cold), (last, again)):
                     begin = clock()
-                    form = rs.find_form(target, layout, ROD, start=start)
+                    form = rs.find_form(target, layout, ROD, warm_start=start)
                     times.append(clock() - begin)
                     solves = [popped.report.factorizations for popped in form.popped.values()]
                     counts = f"{form.draped.report.factorizations} + {' + '.join(map(str, solves))}"

@@ -5,8 +5,8 @@
 A *step* is all that `simulate` does between two records for a heavy cantilever that swings down: one Newton iteration
 (one Hessian, one factorisation, two solutions, one more evaluation of the forces) and the refresh of the frames. A
 *banded solve* is one factorisation and one solution of a symmetric positive system of the same size and band, which
-is given as a band: by LAPACK (`scipy.linalg.solveh_banded`), and by `rodshell.solve.banded`. The three take turns in
-one thread, and the least processor time of each is taken: other work on the machine can only add to it.
+is given as a band: by LAPACK (`scipy.linalg.solveh_banded`), and by `rodshell.solve.newton_matrix`. The three
+take turns in one thread, and the least processor time of each is taken: other work on the machine can only add to it.
 """
 
 import resource
@@ -21,9 +21,9 @@ from threadpoolctl import threadpool_limits
 
 import rodshell as rs
 from rodshell.model.elastic_rod import ElasticRod
-from rodshell.solve.banded import Banded
-from rodshell.solve.constraint import NO_CURVATURE
 from rodshell.solve.implicit_euler import Step
+from rodshell.solve.newton_matrix import Banded
+from rodshell.solve.problem import NO_CURVATURE
 
 NODES = (100, 316, 1000, 3162, 10_000, 31_623, 100_000)
 EDGE = 0.01

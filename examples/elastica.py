@@ -31,7 +31,7 @@ errors = []
 for edges in (40, 80, 160):
     nodes = np.linspace((0, 0, 0), (LENGTH, 0, 0), edges + 1)
     rod = rs.ElasticRod.of(nodes, wire, clamped={"start": (1, 0, 0)})
-    shape = rs.solve_rod(rod, forces={-1: (0, 0, -load)})
+    shape = rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0, 0, -load)}))
     errors.append(np.linalg.norm(shape.positions[-1] - exact))
     print(f"{edges:4d} edges: tip off by {1e3 * errors[-1]:.4f} mm, {shape.report.iterations} iterations")
 

@@ -31,7 +31,7 @@ print(f"pitch  {1e3 * pitch:.3f} mm (exact {1e3 * 2 * pi * TAU / (KAPPA**2 + TAU
 print(f"energy left {coiled.energy / rod.energy(rod.state()):.1e} of the straight strip's")
 
 reach = (coiled.positions[-1] - coiled.positions[0]) @ axis
-drawn = rs.solve_rod(coiled.rod, start=coiled, forces={-1: 0.05 * axis}, steps=4)
+drawn = rs.solve_rod(coiled.rod, loads=rs.RodLoads(forces={-1: 0.05 * axis}), start=coiled, steps=4)
 longer = (drawn.positions[-1] - drawn.positions[0]) @ axis
 print(f"a pull of 50 mN draws it from {1e3 * reach:.1f} to {1e3 * longer:.1f} mm")
 

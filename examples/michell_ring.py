@@ -27,9 +27,8 @@ for share in (0.9, 0.98, 1.02, 1.1):
     ring = rs.ElasticRod.of(circle, rubber, closed=True, natural_twist=share * critical / LENGTH)
     shape = rs.solve_rod(
         ring,
+        rs.RodSupports(positions={0: None}, along={EDGES // 2: [(1, 0, 0)], EDGES // 4: [(1, 0, 0), (0, 1, 0)]}),
         start=ring.state(nudged),
-        positions={0: None},  # with two more supports, as many as hold a rigid body and no more
-        along={EDGES // 2: [(1, 0, 0)], EDGES // 4: [(1, 0, 0), (0, 1, 0)]},
         steps=4,
     )
     glued = share * critical / (2 * pi)

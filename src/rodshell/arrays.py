@@ -1,4 +1,4 @@
-"""The arrays that functions take and return: double precision, and indices."""
+"""Types of arrays: double precision, indices, 64-bit integers, booleans."""
 
 import numpy as np
 from numpy.typing import NDArray

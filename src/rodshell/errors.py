@@ -1,8 +1,8 @@
-"""Every error that a user can meet. Each says what is wrong, which value, and what would do."""
+"""The errors that rodshell raises. Each message says what is wrong, with which value, and what to do."""
 
 
 class RodshellError(Exception):
-    """Base of all errors raised on purpose by rodshell; `exit_code` is the command line's."""
+    """Base of all errors that rodshell raises; `exit_code` is that of the command line."""
 
     exit_code = 2
 
@@ -12,11 +12,11 @@ class InputError(RodshellError, ValueError):
 
 
 class NetLimitError(RodshellError):
-    """No inextensible net exists on this target for this anchor and heading: a crossing angle reaches 0."""
+    """No inextensible net exists on this target for this anchor and heading: a crossing angle is too small."""
 
 
 class StabilityError(RodshellError):
-    """A time step is beyond the limit of an explicit scheme, whose motion would blow up."""
+    """A time step is above the stability limit of an explicit scheme."""
 
 
 class OutputError(RodshellError, OSError):
@@ -28,13 +28,19 @@ class OutputWarning(UserWarning):
 
 
 class OutOfTimeError(RodshellError):
-    """A job took longer than its time limit; nothing was found that could be kept."""
+    """A job reached its time limit before it had a result."""
 
     exit_code = 3
 
 
 class ConvergenceError(RodshellError):
-    """A solve stopped short of its tolerance; `report` holds what was reached."""
+    """A solver did not reach its tolerance.
+
+    Parameters
+    ----------
+    message : one sentence.
+    report : what was reached, as the solver reports it.
+    """
 
     exit_code = 3
 

@@ -1,18 +1,21 @@
-"""Kernels where no folder can keep them: compiled anew in each run, where Numba by itself would refuse to go on."""
+"""Compiled kernels where no folder for Numba's cache is writable.
+
+Numba refuses to declare a cached kernel there. With `allow_uncached` it is compiled again in each run instead.
+"""
 
 import os
 from contextlib import suppress
 
 
 def kernels_are_kept() -> bool:
-    """Whether Numba finds a folder that can be written: its own setting's, the package's, or one at home."""
+    """Whether Numba finds a writable folder for its cache: by its settings, in the package, or in the home folder."""
     named = [os.environ.get(name, "") for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")]
-    places = [*filter(None, named), os.path.dirname(__file__), os.path.expanduser("~")]
-    return any(_writable(os.path.abspath(place)) for place in places)
+    folders = [*filter(None, named), os.path.dirname(__file__), os.path.expanduser("~")]
+    return any(_writable(os.path.abspath(folder)) for folder in folders)
 
 
 def allow_uncached() -> None:
-    """Let Numba declare kernels that it cannot keep; without effect, and without its import, where it can."""
+    """Let Numba declare kernels that it cannot cache. Does nothing, and does not import Numba, where it can."""
     if kernels_are_kept():
         return
     from numba.core.dispatcher import Dispatcher
@@ -26,8 +29,8 @@ def allow_uncached() -> None:
     Dispatcher.enable_caching = enable_if_possible  # type: ignore[method-assign]
 
 
-def _writable(place: str) -> bool:
-    """Whether a folder can be written, or made."""
-    while not os.path.exists(place):
-        place = os.path.dirname(place)
-    return os.path.isdir(place) and os.access(place, os.W_OK | os.X_OK)
+def _writable(folder: str) -> bool:
+    """Whether a folder is writable, or can be made."""
+    while not os.path.exists(folder):
+        folder = os.path.dirname(folder)
+    return os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)

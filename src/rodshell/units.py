@@ -1,4 +1,7 @@
-"""Quantities as people write them, "30 mm", "45 deg", "25 GPa", become SI numbers: at the edge only."""
+"""Quantities as people write them, "30 mm", "45 deg", "25 GPa", converted to SI numbers and back.
+
+Only input and messages use this: inside, everything is in SI units.
+"""
 
 import re
 from collections.abc import Iterable
@@ -111,17 +114,17 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\
 
 
 def parse_quantity(value: object, kind: Kind, key: str) -> float:
-    """A quantity in SI: a number as it is, a string by its unit (without one: SI).
+    """Convert a quantity to SI.
 
     Parameters
     ----------
-    value : number, or text such as "30 mm", "1 g/cm3", "1.5e-3".
-    kind : of quantity that is wanted: m, rad, Pa, kg/m3, m/s2 or a plain number.
+    value : number in SI, or text such as "30 mm", "1 g/cm3", "1.5e-3" (SI without a unit).
+    kind : the kind of quantity that is wanted.
     key : how the user knows the value, for the error message.
 
     Raises
     ------
-    InputError : not a number, not finite, an unknown unit or one of another kind; it says what would do.
+    InputError : not a number, not finite, an unknown unit or a unit of another kind.
     """
     try:
         return read_quantity(value, kind)
@@ -130,9 +133,9 @@ def parse_quantity(value: object, kind: Kind, key: str) -> float:
 
 
 def read_quantity(value: object, kind: Kind) -> float:
-    """As `parse_quantity`, but raises ValueError with the reason alone: the caller names the key.
+    """As `parse_quantity`, but raises ValueError with the reason only: the caller adds the key.
 
-    An angle of more than a full turn needs a unit, and is given within one turn.
+    An angle of more than a full turn needs a unit, and is reduced to one turn.
     """
     units = _KINDS[kind]
     if isinstance(value, str):
@@ -141,7 +144,7 @@ def read_quantity(value: object, kind: Kind) -> float:
             raise ValueError(f"not a finite number; give {units.wanted}")
         number = _scaled(match[1], read_unit(match[2], kind) if match[2] else Decimal(1))
     elif isinstance(value, Real) and not isinstance(value, bool):
-        number = _plain(value)
+        number = as_float(value)
     else:
         raise ValueError(f"not a number; give {units.wanted}")
     if not isfinite(number):
@@ -154,15 +157,15 @@ def read_quantity(value: object, kind: Kind) -> float:
 
 
 def require_unit_of_all(values: Iterable[object]) -> None:
-    """Of values in one text, as "30, 40 mm", all but zeros have a unit or none has; else ValueError."""
+    """Raise ValueError where only some values of one text have a unit, as in "30, 40 mm"; 0 needs none."""
     texts = [text.strip() for text in values if isinstance(text, str) and _QUANTITY.fullmatch(text)]
     bare = [text for text in texts if not _unit_of(text) and float(text) != 0]
     full = [text for text in texts if _unit_of(text)]
     if bare and full:
         unit = _unit_of(full[-1])
         raise ValueError(
-            "only some of these have a unit, and a decimal takes a point, not a comma: give each its own, such as "
-            f'"{bare[0]} {unit}, {full[-1]}"'
+            "only some of these have a unit, and a decimal takes a point, not a comma: give each its "
+            f'unit, such as "{bare[0]} {unit}, {full[-1]}"'
         )
 
 
@@ -173,7 +176,12 @@ def _unit_of(value: object) -> str:
 
 
 def read_unit(text: str, kind: Kind) -> Decimal:
-    """SI value of one unit of this kind; ValueError with the reason where there is no such unit."""
+    """The SI value of one unit of this kind.
+
+    Raises
+    ------
+    ValueError : an unknown unit, or a unit of another kind.
+    """
     unit = re.sub(r"\s|\^|\*\*", "", text).replace("²", "2").replace("³", "3")
     units = _KINDS[kind]
     if unit in units.factors:
@@ -190,12 +198,12 @@ def read_unit(text: str, kind: Kind) -> Decimal:
 
 
 def wanted(kind: Kind) -> str:
-    """What would do for this kind: 'a length such as "200 mm", or a plain number in m'."""
+    """The input that is accepted for this kind: 'a length such as "200 mm", or a plain number in m'."""
     return _KINDS[kind].wanted
 
 
 def shown(value: object) -> str:
-    """A value as it would stand in a case file, cut short, on one line."""
+    """A value as it is written in a case file, on one line of at most 80 characters."""
     if isinstance(value, str):
         text = '"' + value.replace("\n", " ") + '"'
     elif isinstance(value, bool):
@@ -210,13 +218,13 @@ def shown(value: object) -> str:
 
 
 def rounded_down(length: float) -> float:
-    """The nearest length below of 1, 1.5, 2, 3, 5 or 7 times a power of ten [m]."""
+    """Round a length [m] down to 1, 1.5, 2, 3, 5 or 7 times a power of ten."""
     decade = 10.0 ** floor(log10(length))
     return max(decade * step for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if decade * step <= length * (1 + 1e-9))
 
 
 def length_text(metres: float) -> str:
-    """A length in the unit that reads well: 83.3 mm, 20 m."""
+    """A length [m] as text, in mm or m: 83.3 mm, 20 m."""
     in_mm = metres < 0.9995
     return f"{float(f'{1e3 * metres if in_mm else metres:.3g}'):g} {'mm' if in_mm else 'm'}"
 
@@ -225,20 +233,26 @@ PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 
 
 def stress_text(pascals: float) -> str:
-    """A stress in the unit that reads well: 14.4 MPa, 83 kPa."""
-    size, name = next((one for one in PRESSURES if abs(pascals) >= one[0]), PRESSURES[-1])
+    """A stress [Pa] as text, in a unit of a suitable size: 14.4 MPa, 83 kPa."""
+    size, name = next((unit for unit in PRESSURES if abs(pascals) >= unit[0]), PRESSURES[-1])
     return f"{float(f'{pascals / size:.3g}'):g} {name}"
 
 
-def _plain(value: Real) -> float:
+def percent_text(share: float) -> str:
+    """A share as a percentage: with two significant digits below 10 %, else in whole percents."""
+    return f"{100 * share:.0f} %" if share >= 0.095 else f"{100 * share:.2g} %"
+
+
+def as_float(value: Real) -> float:
+    """`value` as a float; infinite where it is too large for one."""
     try:
         return float(value)
-    except OverflowError:  # an integer past the largest float
+    except OverflowError:  # an integer larger than any float
         return inf
 
 
 def _scaled(number: str, factor: Decimal) -> float:
-    """number * factor, rounded once; infinite where no float can hold it."""
+    """number * factor, rounded once; infinite where it is too large for a float."""
     try:
         return float(Decimal(number) * factor)
     except ArithmeticError:

@@ -1,36 +1,48 @@
-"""Arguments as callers give them: of the right kind, sign, shape and spelling, or one sentence that says what is wrong.
+"""Checks of arguments: kind, sign, shape and spelling.
 
-Every function raises InputError, which calls the argument by its `name`.
+Every function raises InputError with one sentence, in which the argument is called by its `name`.
 """
 
 from collections.abc import Sequence
 from difflib import get_close_matches
-from math import isfinite
+from math import inf, isfinite
 from numbers import Real
+from os import PathLike
+from pathlib import Path
 from reprlib import repr as short
 from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.units import shown
+from rodshell.units import as_float, shown
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
-    Floats = Floats
+    from rodshell.arrays import Floats
+
 Choice = TypeVar("Choice", bound=str)
+_Scalar = TypeVar("_Scalar", bound="np.generic")
 
 
 def instance(name: str, value: object, kind: type | UnionType, wanted: str = "") -> None:
-    """Refuse a `value` that is no `kind`; `wanted` says in words what it must be, by default a rodshell `kind`."""
+    """Refuse a `value` that is not of a `kind`.
+
+    Parameters
+    ----------
+    name : of the argument.
+    value : of the argument.
+    kind : class or union of classes.
+    wanted : what the value must be, in words; default "a rodshell KIND".
+    """
     if not isinstance(value, kind):
         what = wanted or f"a rodshell {getattr(kind, '__name__', kind)}"
-        raise InputError(f"{name} must be {what}, not {_described(value)}")
+        raise InputError(f"{name} must be {what}, not {described(value)}")
 
 
 def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
-    """`value`, if it is one of the words in `choices`."""
+    """Return `value` if it is one of the words in `choices`; the message suggests the closest of them."""
     for word in choices:
         if value == word:
             return word
@@ -38,10 +50,10 @@ def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
 
 
 def not_a_choice(name: str, value: object, choices: Sequence[str]) -> str:
-    """The sentence on a `value` that is none of the words in `choices`; the same for arguments, keys and options."""
+    """The sentence on a `value` that is not one of the words in `choices`; the same for arguments, keys and options."""
     near = get_close_matches(value, choices, n=1) if isinstance(value, str) else []
     hint = f": did you mean {shown(near[0])}?" if near else ""
-    return f"{name} must be {either(choices)}, not {_described(value)}{hint}"
+    return f"{name} must be {either(choices)}, not {described(value)}{hint}"
 
 
 def either(words: Sequence[str]) -> str:
@@ -51,38 +63,87 @@ def either(words: Sequence[str]) -> str:
 
 
 def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice, ...]:
-    """`value` as a tuple of different words out of `choices`, or of none; one may come without a sequence around it."""
+    """Return `value` as a tuple of different words out of `choices`.
+
+    Parameters
+    ----------
+    name : of the argument.
+    value : one word, or a sequence of words, which may be empty.
+    choices : the words that are allowed.
+    """
     words = [value] if isinstance(value, str) else list(value) if isinstance(value, Sequence) else None
     if words is None:
-        raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {_described(value)}")
+        raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {described(value)}")
     return tuple(dict.fromkeys(choice(name, word, choices) for word in words))
 
 
-def number(name: str, value: object, unit: str) -> None:
-    """Refuse what is not a finite number of this `unit`."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{name} must be a number in {unit}, not {_described(value)}")
-    if not isfinite(value):
-        raise InputError(f"{name} must be finite, not {value} {unit}")
+def number(name: str, value: object, unit: str = "") -> float:
+    """Return `value`, a finite number, as a float; `unit` is named in the message ("" for a plain number)."""
+    real = _real(name, value, unit)
+    if not isfinite(real):
+        raise InputError(f"{name} must be finite, not {described(value)}{unit and ' ' + unit}")
+    return real
 
 
-def positive(name: str, value: object, unit: str) -> None:
-    """Refuse what is not a finite number above 0, of this `unit`."""
+def positive(name: str, value: object, unit: str = "") -> float:
+    """Return `value`, a finite number above 0, as a float; see `number`."""
+    real = _real(name, value, unit)
+    if not 0 < real < inf:
+        raise InputError(f"{name} must be positive, not {described(value)}{unit and ' ' + unit}")
+    return real
+
+
+def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = False) -> float:
+    """Return `value`, a number of 0 or more, as a float; infinity only where it is allowed; see `number`."""
+    real = _real(name, value, unit)
+    if not 0 <= real <= inf or (real == inf and not infinite):
+        raise InputError(f"{name} must be 0 or more, not {described(value)}{unit and ' ' + unit}")
+    return real
+
+
+def numbers(name: str, value: object, wanted: str, count: int) -> tuple[float, ...]:
+    """Return `value` as a tuple of finite floats.
+
+    Parameters
+    ----------
+    name : of the argument.
+    value : a sequence or an array.
+    wanted : what it must be, in words, such as "two finite numbers x, y in m".
+    count : how many numbers.
+    """
+    given: Any = value if hasattr(value, "__len__") and not isinstance(value, str | bytes | dict) else ()
+    if len(given) != count or not all(_is_finite(item) for item in given):
+        raise InputError(f"{name} must be {wanted}, not {short(value)}")
+    return tuple(float(item) for item in given)
+
+
+def _real(name: str, value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{name} must be a number in {unit}, not {_described(value)}")
-    if not (isfinite(value) and float(value) > 0):
-        raise InputError(f"{name} must be positive, not {value} {unit}")
+        raise InputError(f"{name} must be a number{unit and ' in ' + unit}, not {described(value)}")
+    return as_float(value)
 
 
 def point(name: str, value: object) -> None:
     """Refuse what is not a pair of finite numbers [m]."""
-    pair: Any = value if hasattr(value, "__len__") and not isinstance(value, str | dict) else ()
-    if len(pair) != 2 or not all(isinstance(one, Real) and isfinite(one) for one in pair):
-        raise InputError(f"{name} must be two finite numbers x, y in m, not {value!r}")
+    numbers(name, value, "two finite numbers x, y in m", 2)
+
+
+def file_path(name: str, value: object) -> Path:
+    """Return `value` as a path; refuse what is neither text nor a path."""
+    if not isinstance(value, str | PathLike):
+        raise InputError(f"{name} must be the path of a file, not {described(value)}")
+    return Path(value)
 
 
 def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
-    """`given` as an array of the `shape`, to which it may be broadcast."""
+    """Return `given` as an array of finite numbers.
+
+    Parameters
+    ----------
+    name : of the argument.
+    given : numbers of the `shape`, or of one that can be broadcast to it.
+    shape : of the result; none for a single number.
+    """
     import numpy as np  # here, so that the command line's help need not wait for it
 
     try:
@@ -95,8 +156,34 @@ def finite(name: str, given: "ArrayLike", *shape: int) -> "Floats":
     return array
 
 
+def array(name: str, given: "ArrayLike", kind: type[_Scalar], *shape: int | None) -> "NDArray[_Scalar]":
+    """Return `given` as an array; whether its numbers are finite is not checked.
+
+    Parameters
+    ----------
+    name : of the argument.
+    given : an array or nested sequences.
+    kind : of the array's elements.
+    shape : length along each axis, None for any.
+    """
+    import numpy as np
+
+    wanted = ", ".join("n" if count is None else str(count) for count in shape)
+    try:
+        result = np.asarray(given)
+        if result.dtype.kind not in "fiu" or (np.issubdtype(kind, np.integer) and result.dtype.kind == "f"):
+            raise TypeError
+        result = result.astype(kind, copy=False)
+    except (TypeError, ValueError):
+        what = "integers" if np.issubdtype(kind, np.integer) else "numbers"
+        raise InputError(f"{name} must be {what} of the shape ({wanted}), not {short(given)}") from None
+    if result.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, result.shape, strict=True)):
+        raise InputError(f"{name} must have the shape ({wanted}), not {result.shape}")
+    return result
+
+
 def vector(name: str, given: "ArrayLike") -> "Floats":
-    """(3,) finite numbers."""
+    """Return `given` as an array (3,) of finite numbers."""
     import numpy as np
 
     if np.shape(given) != (3,):
@@ -105,7 +192,7 @@ def vector(name: str, given: "ArrayLike") -> "Floats":
 
 
 def direction(name: str, given: "ArrayLike") -> "Floats":
-    """(3,) unit vector along `given`."""
+    """Return the unit vector (3,) along `given`."""
     array = vector(name, given)
     length = float((array @ array) ** 0.5)
     if length == 0:
@@ -114,7 +201,15 @@ def direction(name: str, given: "ArrayLike") -> "Floats":
     return unit
 
 
-def _described(value: object) -> str:
-    """A plain value as it is, anything else by its kind."""
-    made = type(value).__name__
-    return shown(value) if isinstance(value, str | int | float) else f"a{'n' * (made[0] in 'AEIOU')} {made}"
+def _is_finite(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and isfinite(as_float(value))
+
+
+def described(value: object) -> str:
+    """A number or text as it is, a class as such, anything else by its class."""
+    if isinstance(value, type):
+        return f"the class {value.__name__} itself"
+    if isinstance(value, str | Real):
+        return shown(value)
+    name = type(value).__name__
+    return "None" if value is None else f"a{'n' * (name[0] in 'AEIOUaeiou')} {name}"

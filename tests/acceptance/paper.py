@@ -15,10 +15,11 @@ import numpy as np
 import rodshell as rs
 from rodshell.errors import StabilityError
 from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.dynamic_pop_up import DynamicPopUpSettings, dynamic_pop_up
 from rodshell.formfinding.methods import Fall
 from rodshell.formfinding.progress import silent
-from rodshell.formfinding.rising import Rise, pop_up_in_time
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
+from rodshell.nets import sphere_net_end
 from rodshell.paper import fig8, genetic
 from tests.acceptance.rows import Row, print_table
 from tests.paper.falls import TARGETS, Particles
@@ -53,9 +54,7 @@ def stretched(factor: float) -> rs.Rod:
 def net_errors(draped: Draped) -> np.ndarray:
     """How far G0's rod ends lie beyond those of the hemisphere's exact net [mm]."""
     rods = rs.trim(draped).mesh.grid.rods
-    return 1e3 * np.array(
-        [end - rs.sphere_net_end(0.2, abs(rod.offset)) for rod in rods for end in (rod.end, -rod.start)]
-    )
+    return 1e3 * np.array([end - sphere_net_end(0.2, abs(rod.offset)) for rod in rods for end in (rod.end, -rod.start)])
 
 
 def rms(errors: np.ndarray) -> float:
@@ -187,7 +186,8 @@ def pop_up_rows() -> Iterator[Row]:
     form = rs.find_form(TARGETS["hemisphere"], coarse, ROD, ends=("pinned",))
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     for coupling in couplings:
-        risen = pop_up_in_time(form.footprint, form.trimmed.boundary, ROD, rise=Rise(coupling=coupling))
+        settings = DynamicPopUpSettings(coupling=coupling)
+        risen = dynamic_pop_up(form.footprint, form.trimmed.boundary, ROD, settings=settings)
         off = float(np.linalg.norm(risen.positions - form.popped["pinned"].positions, axis=1).max()) / 0.2
         gap = risen.rest.joint_gap / 0.2
         note = f"at rest: {risen.rest.at_rest}, after {risen.rest.time:.1f} s; joint gap {gap:.1e} R"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import rodshell as rs
-from rodshell.formfinding.popup import Popped
+from rodshell.formfinding.popup import PopUp
 from rodshell.formfinding.trim import Boundary
 from rodshell.model import Shell
 from rodshell.targets import Freeform
@@ -68,7 +68,7 @@ def meshed(target: rs.HeightField, rng: np.random.Generator) -> Freeform:
         :, 2
     ]
     plan = plan * [a, b]
-    return Freeform.of(np.column_stack([plan, target.height(plan)]), faces[np.abs(area) > 1e-9])
+    return Freeform.of(np.column_stack([plan, target.height_at(plan)]), faces[np.abs(area) > 1e-9])
 
 
 def outcome(seed: int) -> Outcome:
@@ -103,7 +103,7 @@ def _wrong(form: rs.Form) -> str:
     return ""
 
 
-def unbalanced(popped: Popped, boundary: Boundary) -> float:
+def unbalanced(popped: PopUp, boundary: Boundary) -> float:
     """Largest force left on a free degree of freedom, over the largest of any rod on its joint."""
     shell = Shell.of(popped.footprint.mesh, ROD, clamped=popped.ends == "clamped")
     state = shell.state(popped.positions, boundary.tangents)

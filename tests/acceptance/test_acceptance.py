@@ -17,6 +17,8 @@ from tests.acceptance.rows import (
     scale_rows,
 )
 
+pytestmark = pytest.mark.slow
+
 
 def check_reached(rows: Iterator[Row]) -> None:
     table = list(rows)

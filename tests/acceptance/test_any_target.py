@@ -7,6 +7,8 @@ import pytest
 from tests.acceptance.rows import Row
 from tests.acceptance.targets import SURFACES, mesh_rows, nurbs_rows, same_rows
 
+pytestmark = pytest.mark.slow
+
 
 def check_reached(rows: Iterator[Row]) -> None:
     table = list(rows)

@@ -8,6 +8,8 @@ from tests.acceptance.output import TARGETS, circle_rows, file_rows, reaction_ro
 from tests.acceptance.rows import Row
 from tests.acceptance.test_acceptance import check_reached
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", TARGETS)
 @pytest.mark.parametrize("rows", [rebuilt_rows, file_rows, reaction_rows])

@@ -6,6 +6,8 @@ from tests.acceptance.rods import buckling_rows, convergence_rows, derivative_ro
 from tests.acceptance.rods_dynamics import conservation_rows, frequency_rows, order_rows
 from tests.acceptance.test_acceptance import check_reached
 
+pytestmark = pytest.mark.slow
+
 TABLE = (
     derivative_rows, rigid_rows, convergence_rows, buckling_rows, holonomy_rows,
     frequency_rows, order_rows, conservation_rows,

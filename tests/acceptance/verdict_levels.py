@@ -7,7 +7,7 @@ import json
 import re
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import rodshell as rs
 from rodshell.cli import main
 from rodshell.formfinding import pipeline
 from tests.acceptance.rows import Row
+from tests.properties.altered import with_report
 
 CODES = {"good": 0, "check": 0, "unbuildable": 4}
 
@@ -67,9 +68,9 @@ def unstable() -> Iterator[None]:
     """Every pop-up is called unstable, whatever it is."""
     plain = pipeline.pop_up
 
-    def pop_up(*arguments: Any, **options: Any) -> rs.Popped:
+    def pop_up(*arguments: Any, **options: Any) -> rs.PopUp:
         popped = plain(*arguments, **options)
-        return replace(popped, report=replace(popped.report, negative_modes=2))
+        return with_report(popped, negative_modes=2)
 
     pipeline.pop_up = pop_up
     try:

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks import Deployment, OtherShapes, check, deploy, other_shapes, settled_shell
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_stable
-from rodshell.solve.problem import Problem
+from rodshell.checks import Deployment, OtherShapes, check, deploy, other_shapes
+from rodshell.solve.equilibrium import find_stable
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.relax import relax
 from tests.acceptance.cases import AUTO
 from tests.acceptance.rows import Row, form_of
@@ -44,13 +43,13 @@ def walked(form: rs.Form, way: Deployment) -> float:
     Each step ends in what Newton's method finds from the last, or where the energy leads down to.
     """
     shell, state = way.shells[0]
-    elements, stretch, places = shell.elements, shell.stretch, shell.places
+    elements, stretch, places = shell.elements, shell.stretch, shell.flat_coordinates
     forces, final = stretch.stiffness * stretch.strains(state), form.popped["pinned"]
     first, begin, pattern = state[shell.ends].copy(), float(way.share[1]), None
     for share in np.linspace(begin, 1.0, FINE + 1)[1:]:
         goals = first + (share - begin) / (1 - begin) * (final.state[shell.ends] - first)
         supports = Supports(shell.held_ends(), shell.ends, goals)
-        problem = Problem(elements, stretch, supports, 0.2, places=places, pattern=pattern)
+        problem = Problem(elements, stretch, supports, 0.2, flat_coordinates=places, pattern=pattern)
         found = find_stable(problem, state, forces)
         if not found.report.stable:  # a limit point, at which too little energy is released to be called a snap
             start = state.copy()
@@ -58,7 +57,7 @@ def walked(form: rs.Form, way: Deployment) -> float:
             found = relax(problem, start)
         if not found.report.stable:
             return np.inf
-        state, forces, elements, pattern = found.state, found.forces, found.elements, found.pattern
+        state, forces, elements, pattern = found.state, found.forces, found.elements, found.problem.pattern
     return _apart(shell.positions(state), final.positions, form)
 
 
@@ -71,7 +70,7 @@ def deployment_rows() -> Iterator[Row]:
         if form is None:
             continue
         popped = form.popped["pinned"]
-        way = deploy(popped.shell, popped.state, popped.forces, stages=8)
+        way = deploy(popped.shell, popped.equilibrium, stages=8)
         known[way.reached_from_flat] += 1
         guided = any("has to be guided" in word for word in way.warnings)
         assert guided == (way.reached_from_flat is False)
@@ -94,7 +93,7 @@ def deployment_rows() -> Iterator[Row]:
 def shape_rows(name: str, form: rs.Form, most_factorizations: int) -> Iterator[Row]:
     """The nearest other shape, judged by the tests' own energy."""
     popped = form.popped["pinned"]
-    shell, at = settled_shell(popped)
+    shell, at = popped.shell, popped.equilibrium
     searched = other_shapes(shell, at, most_factorizations=most_factorizations)
     yield Row(name, "no other shape found", float(not searched.found), 0, note=searched.searched)
     if not searched.found:

@@ -84,18 +84,18 @@ def contact_rows() -> Iterator[Row]:
         yield Row(case, "bending strain off r over radius", off, 2, "%", note)
         yield Row(case, "strain beyond thin rods said wrongly", float(said != (expected > THIN)), 0)
     checks, form = checked(0.001)
-    wrong = sum(found.pairs for found in (*checks.contact.values(), *checks.contact_on_the_way))
+    wrong = sum(found.pairs for found in (*checks.contact.values(), *checks.deployment_contact))
     yield Row("2 mm rods on the hemisphere", "contacts in all shapes and stages", float(wrong), 0)
 
 
-def _sharpest(popped: rs.Popped) -> float:
+def _sharpest(popped: rs.PopUp) -> float:
     """Largest curvature [1/m] by the circles through three nodes in a row."""
     a, b, c = (popped.positions[popped.footprint.mesh.bends[:, k]] for k in range(3))
     sides = [np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))]
     return float((2 * np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.prod(sides, axis=0)).max())
 
 
-def _nearest_parallel(popped: rs.Popped) -> float:
+def _nearest_parallel(popped: rs.PopUp) -> float:
     """Distance of the axes of the two nearest rods of one family [m], by a search over all pairs near the rim."""
     mesh, x = popped.footprint.mesh, popped.positions
     rods = mesh.grid.rods
@@ -117,9 +117,10 @@ def design_rows() -> Iterator[Row]:
     dome, rod = rs.Hemisphere(R), rs.Rod(rs.Circle(1.5e-3), rs.Material(1e9, 1e3))
     seams = [[(-1.0, 0.0), (1.0, 0.0)], [(-1.0, -1.0), (1.0, 1.0)], [(-1.0, 0.2), (0.0, -0.05), (1.0, 0.1)]]
     for number, seam in enumerate(seams, start=1):
-        sewn = rs.sew(dome, [seam], rs.GridLayout.orthogonal(spacing=0.04, edge=0.01), rod, ends=("clamped",))
-        met = sewn._contact("clamped")
-        yield Row(f"dome with seam {number}", "contacts", float(met.pairs), 0, "", f"{len(sewn.meetings)} meetings")
+        layout = rs.GridLayout.orthogonal(spacing=0.04, edge=0.01)
+        form = rs.find_form(dome, layout, rod, seams=[seam], ends=("clamped",))
+        met = form.checks.contact["clamped"]
+        yield Row(f"dome with seam {number}", "contacts", float(met.pairs), 0, "", f"{len(form.meetings)} meetings")
     for offset in (0.0, 0.006, 0.013):
         layout = rs.GridLayout.orthogonal(spacing=0.04, edge=0.01, offset=(offset, offset), rotate=0.3)
         popped = rs.find_form(dome, layout, rod, ends=("clamped",)).popped["clamped"]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks import Reactions, SelfWeight, reactions, self_weight, settled_shell
+from rodshell.checks import Reactions, SelfWeight, reactions, self_weight
 from tests.acceptance.cases import HEMISPHERE, ROD
 from tests.acceptance.rows import Row
 from tests.acceptance.targets_random import random_case
@@ -32,7 +32,7 @@ def rows() -> Iterator[Row]:
     for name, (target, layout, rod) in FORMS.items():
         form = rs.find_form(target, rs.GridLayout.orthogonal(**layout), rod)
         for ends, popped in form.popped.items():
-            shell, found = settled_shell(popped)
+            shell, found = popped.shell, popped.equilibrium
             twin, held = LoadedTwin(popped, rod), reactions(shell, found)
             yield from _unloaded(f"{name}, {ends}", twin, held, popped.report.negative_modes)
             weighed = self_weight(shell, found, most=HIGH)
@@ -45,7 +45,9 @@ def rows() -> Iterator[Row]:
     for seed, held_by in RANDOM:
         _, target, layout, anchor = random_case(seed)
         popped = rs.find_form(target, layout, ROD, anchor=anchor).popped[held_by]  # type: ignore[index]
-        yield from _loaded(f"random {seed}, {held_by}", LoadedTwin(popped, ROD), self_weight(*settled_shell(popped)))
+        yield from _loaded(
+            f"random {seed}, {held_by}", LoadedTwin(popped, ROD), self_weight(popped.shell, popped.equilibrium)
+        )
 
 
 def _unloaded(case: str, twin: LoadedTwin, held: Reactions, negative_modes: int) -> Iterator[Row]:

@@ -8,9 +8,9 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.csgraph import connected_components
 
 import rodshell as rs
-from rodshell.solve.banded import Banded
 from rodshell.solve.implicit_euler import ImplicitEuler, Refused, Step
-from rodshell.solve.step_limit import step_limit
+from rodshell.solve.linear_stability import step_limit
+from rodshell.solve.newton_matrix import Banded
 from tests.analytic.joint_problems import flat_state, lattice, response
 
 KINDS = {"ball": rs.Ball(), "pin": rs.Pin(), "rigid": rs.Rigid(), "two linkers": rs.Linker()}

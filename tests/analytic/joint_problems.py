@@ -15,10 +15,9 @@ from scipy.spatial.transform import Rotation
 
 import rodshell as rs
 from rodshell.model import Assembly
-from rodshell.solve.constraint import Supports
-from rodshell.solve.linear import Qdldl
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
+from rodshell.solve.sparse_ldl import Qdldl
 from tests.analytic.rod_problems import threshold
 
 X, Y, Z = np.eye(3)
@@ -230,7 +229,7 @@ def michell_twist(edges, rods, joint=None):
                 break
         michell_twist.off = np.abs(state[: mesh.node_count, 2]).max()
         upper = triu(tangent_stiffness(shell, state, free), format="csc")
-        return Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data) > 0
+        return Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data).negative > 0
 
     return threshold(lost)
 

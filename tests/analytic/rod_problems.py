@@ -15,10 +15,9 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipeinc, ellipkinc
 
 import rodshell as rs
-from rodshell.geometry import directors_along
-from rodshell.geometry.frames import parallel_transport, signed_angle
+from rodshell.geometry.frames import directors_along, parallel_transport, signed_angle
 from rodshell.geometry.vectors import unit
-from rodshell.solve.linear import Qdldl
+from rodshell.solve.sparse_ldl import Qdldl
 
 THIN = rs.Rod(rs.Circle(1e-4), rs.Material(1e9, 1e3, 0.5))
 EI, GJ = THIN.bend_stiffness, THIN.twist_stiffness
@@ -39,7 +38,7 @@ def order(sizes, errors):
 def unstable(rod, state, free):
     """Whether the energy's Hessian in the free directions has a negative eigenvalue."""
     upper = triu(rod.hessian(state, free), format="csc")
-    return Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data) > 0
+    return Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data).negative > 0
 
 
 def threshold(lost, low=0.9, high=1.1):
@@ -72,7 +71,7 @@ def elastica_errors(edges, tip, twist=True):
     """Tip position over the length, root moment over itself, and tip angle [rad]."""
     exact = EndLoaded(tip)
     rod = rs.ElasticRod.of(straight(edges), THIN, clamped={"start": X}, twist=twist)
-    shape = rs.solve_rod(rod, forces={-1: (0, 0, -exact.force)}, steps=2)
+    shape = rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0, 0, -exact.force)}), steps=2)
     place = np.linalg.norm(shape.positions[-1] - [exact.reach, 0, -exact.drop])
     moment = shape.support("start")[1][1] / -exact.root_moment - 1
     last = shape.positions[-1] - shape.positions[-2]
@@ -102,7 +101,7 @@ def heavy_error(edges, weight):
     """Tip position over the length."""
     rod = rs.ElasticRod.of(straight(edges), THIN, clamped={"start": X}, twist=False)
     gravity = weight * EI / THIN.mass_per_length
-    shape = rs.solve_rod(rod, gravity=(0, 0, -gravity))
+    shape = rs.solve_rod(rod, loads=rs.RodLoads(gravity=(0, 0, -gravity)))
     return float(np.linalg.norm(shape.positions[-1, ::2] - heavy_tip(weight)))
 
 
@@ -188,7 +187,7 @@ def kirchhoff_errors(edges, exact, force):
     end = exact.frame(1.0)
     start = rod.state(exact.positions(s), exact.twist((s[1:] + s[:-1]) / 2), {"start": X, "end": end[2]})
     start[rod.ghost_angles[1], 0] = exact.twist(np.linspace(0, 1, 200))[-1]
-    shape = rs.solve_rod(rod, start=start, tangents={"end": end[2]}, directors={"end": end[0]})
+    shape = rs.solve_rod(rod, rs.RodSupports(tangents={"end": end[2]}, directors={"end": end[0]}), start=start)
     off = np.linalg.norm(shape.positions - exact.positions(s), axis=1).max()
     pull, moment = shape.support("end")
     size = np.linalg.norm(exact.moment(1.0))
@@ -224,7 +223,7 @@ def lateral_load(edges):
 
     def lost(share):
         load = {-1: (0, 0, -share * 4.0126 * sqrt(gj))}
-        shape = rs.solve_rod(rod, along=plane, angles=upright, forces=load)
+        shape = rs.solve_rod(rod, rs.RodSupports(along=plane, angles=upright), rs.RodLoads(forces=load))
         return unstable(shape.rod, shape.state, shape.rod.freedom())
 
     return threshold(lost)
@@ -314,7 +313,7 @@ def localised_error(edges, exact=None):
     start = rod.state(positions, angles)
     start[rod.ghost_angles[1], 0] = exact.turn
     # the hump may stand anywhere along so long a rod: the sign of that mode is the mesh's
-    shape = rs.solve_rod(rod, start=start, positions={-1: goal}, stable=False)
+    shape = rs.solve_rod(rod, rs.RodSupports(positions={-1: goal}), start=start, stable=False)
     z = np.diff(shape.positions, axis=0)[:, 0] / np.linalg.norm(np.diff(shape.positions, axis=0), axis=1)
     moment = exact.gj * shape.strains.twist.mean()
     s = (np.arange(edges) + 0.5) * exact.length / edges - exact.length / 2

@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import eigh
 
 import rodshell as rs
-from rodshell.solve.step_limit import step_limit
+from rodshell.solve.linear_stability import step_limit
 from tests.analytic.coupling_problems import (
     DECADES,
     KINDS,
@@ -40,6 +40,7 @@ def test_implicit_ties_tend_to_shared_dofs_as_one_over_their_stiffness(kind, err
     assert found[-1] < 2e-6
 
 
+@pytest.mark.slow
 @every_kind
 def test_explicit_ties_tend_to_implicit_ones_as_the_step(kind):
     assert order(1 / STEPS, explicit_errors(KINDS[kind], STEPS)) == pytest.approx(1, abs=0.1)
@@ -64,6 +65,7 @@ def test_each_copy_has_its_share_of_the_mass():
     assert np.allclose(shares[shell.like != joint], 1 / 2)
 
 
+@pytest.mark.slow
 @every_kind
 def test_steps_below_the_limit_are_stable_and_above_it_are_not(kind):
     assert growth(KINDS[kind], 0.95, 10_000) < 3  # 1.7 measured

@@ -14,10 +14,9 @@ import pytest
 import rodshell as rs
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.model import Shell
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_stable
+from rodshell.solve.equilibrium import find_stable
 from rodshell.solve.path import trace
-from rodshell.solve.problem import Problem
+from rodshell.solve.problem import Problem, Supports
 
 ROD = rs.Rod(section=rs.Circle(radius=5e-4), material=rs.Material(youngs_modulus=1e9, density=1e3))
 SHORT, EDGES, SHORTEST = 0.005, 80, 0.005

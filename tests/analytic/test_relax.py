@@ -7,12 +7,11 @@ from scipy.special import ellipk
 import rodshell as rs
 from rodshell.formfinding import popup as popup_module
 from rodshell.model import Freedom
-from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.stretch import Stretch
 from rodshell.solve import relax as relax_module
-from rodshell.solve.constraint import Supports
 from rodshell.solve.implicit_euler import ImplicitEuler
-from rodshell.solve.problem import Problem
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.relax import relax
 
 PINNED, SLIDING, PLANE = ((), ((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
@@ -47,6 +46,7 @@ def elastica(load):
     return 2 * low / np.sqrt(load)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("over", [1.05, 1.5, 2.0])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_buckled_column_slides_down_to_the_elastica(over, side):
@@ -92,6 +92,7 @@ def test_energy_never_grows_and_every_step_is_counted(monkeypatch):
     assert found.report.factorizations > factorizations > 0
 
 
+@pytest.mark.slow
 def test_shell_that_newtons_method_loses_pops_up_by_sliding(monkeypatch):
     """A steep paraboloid: released at once it takes more than the iterations left to it, sliding down it arrives."""
     monkeypatch.setattr(popup_module, "MOST_AT_ONCE", 10)

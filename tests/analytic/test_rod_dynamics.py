@@ -12,12 +12,11 @@ from scipy.linalg import eigh
 import rodshell as rs
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS
-from rodshell.rods.round_bend_twist import RoundBendTwist
-from rodshell.solve.banded import Banded
-from rodshell.solve.constraint import Supports
+from rodshell.rods.isotropic import IsotropicBendTwist
 from rodshell.solve.implicit_euler import ImplicitEuler, Refused
-from rodshell.solve.simulate import _Grid
-from rodshell.solve.time_series import End
+from rodshell.solve.newton_matrix import Banded
+from rodshell.solve.problem import Supports
+from rodshell.solve.simulate import End, _Grid
 from tests.analytic.rod_motions import (
     G,
     angular_losses,
@@ -70,6 +69,7 @@ def test_twisted_rod_swings_back_at_its_torsional_frequency():
 # Order, energy, momenta
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twist", [False, True])
 def test_swing_is_of_first_order_in_the_step(twist):
     assert swing_order(twist) == pytest.approx(1.0, abs=0.1)
@@ -184,6 +184,7 @@ def test_angular_momentum_of_a_curved_strip_is_conserved_to_first_order_in_the_s
     assert order(1 / counts, lost) == pytest.approx(1.0, abs=0.15)  # 0.89: its stiffest waves are not resolved yet
 
 
+@pytest.mark.slow
 def test_spinning_strip_loses_angular_momentum_by_its_rotary_inertia_only():
     """ERRATA E7: the equations leave out the moment that turns the axis of a spinning edge."""
     with_it, without = (
@@ -581,7 +582,7 @@ def test_motion_that_makes_no_sense_is_refused_with_its_reason(options, said):
 def test_step_of_a_smooth_swing_costs_the_same_for_each_node(nodes, monkeypatch):
     """One factorisation of a band of ten, two solutions, one Hessian, one more gradient: whatever the length."""
     counts = {"factor": 0, "solve": 0, "hessian": 0, "gradient": 0}
-    bend_twist, factor, solve = RoundBendTwist.evaluate, Banded.factor, Banded.solve
+    bend_twist, factor, solve = IsotropicBendTwist.evaluate, Banded.factor, Banded.solve
 
     def evaluate(self, state, gradient, hessians=NO_HESSIANS):
         counts["hessian" if len(hessians) else "gradient"] += 1
@@ -596,7 +597,7 @@ def test_step_of_a_smooth_swing_costs_the_same_for_each_node(nodes, monkeypatch)
         counts["solve"] += 1
         return solve(self, field, free)
 
-    monkeypatch.setattr(RoundBendTwist, "evaluate", evaluate)
+    monkeypatch.setattr(IsotropicBendTwist, "evaluate", evaluate)
     monkeypatch.setattr(Banded, "factor", factored)
     monkeypatch.setattr(Banded, "solve", solved)
     rest = np.column_stack([0.01 * np.arange(nodes), np.zeros(nodes), np.zeros(nodes)])

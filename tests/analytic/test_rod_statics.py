@@ -136,6 +136,7 @@ def test_localised_hump_is_van_der_heijden_and_thompsons():
     assert m * exact.ei / exact.gj + 4 * np.arccos(m / (2 * sqrt(t))) == pytest.approx(exact.turn, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_stretched_and_twisted_rod_localises_as_bergou_says():
     exact, edges = Localised(), (400, 800, 1600)
     assert exact.length / exact.width > 20  # so that the ends do not feel the hump
@@ -187,7 +188,7 @@ def test_rod_without_angles_has_the_strains_of_the_one_with_them():
         bow[:, 2] = 0.15 * np.sin(pi * rod.rest[:, 0]) ** 2
         goal = {"positions": {-1: (0.8, 0.1, 0.1)}, "tangents": {"end": (1, 0.3, 0)}}
         spinning = ("start", "end") if twist else ()  # in space, frames that were held would twist the rod
-        shapes.append(rs.solve_rod(rod, start=rod.state(bow), spinning=spinning, **goal))
+        shapes.append(rs.solve_rod(rod, rs.RodSupports(spinning=spinning, **goal), start=rod.state(bow)))
     without, with_them = (np.linalg.norm(shape.strains.curvature, axis=1) for shape in shapes)
     assert without.shape == (21,)
     np.testing.assert_allclose(without, with_them, rtol=1e-6)
@@ -235,7 +236,7 @@ def test_mass_is_that_of_the_rod_half_of_each_edge_at_either_node():
 
 def small_drop(rod):
     """Tip deflection over the force at the tip, force so small that the rod stays linear."""
-    return -rs.solve_rod(rod, forces={-1: (0, 0, -1e-4 * EI)}).positions[-1, 2] / (1e-4 * EI)
+    return -rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0, 0, -1e-4 * EI)})).positions[-1, 2] / (1e-4 * EI)
 
 
 @pytest.mark.parametrize("given", ["each", "callable"])
@@ -271,7 +272,7 @@ def test_strip_bends_towards_each_director_with_its_own_stiffness(load, stiffnes
     kind = rs.Rod(rs.RectangularSection(width=2e-4, height=1e-4), THIN.material)
     rod = rs.ElasticRod.of(straight(80), kind, director=Z, clamped={"start": X})
     force = 1e-4 * kind.bend_stiffnesses[1]
-    tip = rs.solve_rod(rod, forces={-1: force * np.array(load)}).positions[-1]
+    tip = rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: force * np.array(load)})).positions[-1]
     exact = force / (3 * kind.bend_stiffnesses[stiffness])
     assert tip @ load == pytest.approx(exact, rel=1e-3)  # second order: 1/8 h^2
 
@@ -279,7 +280,7 @@ def test_strip_bends_towards_each_director_with_its_own_stiffness(load, stiffnes
 def test_moment_at_a_spinning_clamp_twists_the_rod_evenly():
     """Exact on any mesh, ends included: the clamps act at the ends."""
     rod = rs.ElasticRod.of(straight(7), THIN, clamped={"start": X, "end": X})
-    shape = rs.solve_rod(rod, spinning=("end",), moments={"end": 2.0 * GJ})
+    shape = rs.solve_rod(rod, rs.RodSupports(spinning=("end",)), rs.RodLoads(moments={"end": 2.0 * GJ}))
     np.testing.assert_allclose(shape.strains.twist, 2.0, rtol=1e-9)
     assert shape.state[rod.ghost_angles[1], 0] == pytest.approx(2.0, rel=1e-9)
     assert shape.support("start")[1] == pytest.approx([-2.0 * GJ, 0, 0], rel=1e-9, abs=1e-12 * GJ)
@@ -287,11 +288,13 @@ def test_moment_at_a_spinning_clamp_twists_the_rod_evenly():
 
 def test_clamp_holds_the_director_that_it_is_given():
     rod = rs.ElasticRod.of(straight(30), THIN, director=Z, clamped={"start": X, "end": X})
-    quarter = rs.solve_rod(rod, directors={"end": (5.0, 1.0, 0.0)})  # its part across is y
+    quarter = rs.solve_rod(rod, rs.RodSupports(directors={"end": (5.0, 1.0, 0.0)}))  # its part across is y
     np.testing.assert_allclose(quarter.strains.twist, -pi / 2, rtol=1e-9)  # from z to y about x
     bow = straight(30) * [0.9, 1, 1]
     bow[:, 2] = 0.15 * np.sin(pi * rod.rest[:, 0]) ** 2
-    bent = rs.solve_rod(rod, start=rod.state(bow), tangents={"end": (1, 0.5, 0)}, directors={"end": (-0.5, 1, 1)})
+    bent = rs.solve_rod(
+        rod, rs.RodSupports(tangents={"end": (1, 0.5, 0)}, directors={"end": (-0.5, 1, 1)}), start=rod.state(bow)
+    )
     d1 = bent.rod.reference_directors(bent.state)[-1]
     t = np.array([1, 0.5, 0]) / sqrt(1.25)
     theta = bent.state[rod.ghost_angles[1], 0]
@@ -309,8 +312,8 @@ def test_twist_of_given_directors_goes_on_to_the_clamps():
 
 def test_clamp_turned_three_times_around_stays_turned_so():
     rod = rs.ElasticRod.of(straight(30), THIN, clamped={"start": X, "end": X})
-    taut = rs.solve_rod(rod, positions={-1: (1.001, 0, 0)})
-    shape = rs.solve_rod(taut.rod, start=taut, turns={"end": 6 * pi})
+    taut = rs.solve_rod(rod, rs.RodSupports(positions={-1: (1.001, 0, 0)}))
+    shape = rs.solve_rod(taut.rod, rs.RodSupports(turns={"end": 6 * pi}), start=taut)
     np.testing.assert_allclose(shape.strains.twist, 6 * pi, rtol=1e-9)
     np.testing.assert_allclose(shape.frames[-1][2], X, atol=1e-12)
 
@@ -320,7 +323,10 @@ def test_reactions_are_in_balance_with_the_loads():
     bow = straight(30) * [0.9, 1, 1]
     bow[:, 2] = 0.15 * np.sin(pi * rod.rest[:, 0]) ** 2
     shape = rs.solve_rod(
-        rod, start=rod.state(bow), turns={"end": 2.0}, tangents={"end": (1, 0.5, 0)}, gravity=(0, 0.1, -0.3)
+        rod,
+        rs.RodSupports(turns={"end": 2.0}, tangents={"end": (1, 0.5, 0)}),
+        rs.RodLoads(gravity=(0, 0.1, -0.3)),
+        start=rod.state(bow),
     )
     (pull0, turn0), (pull1, turn1) = shape.support("start"), shape.support("end")
     load = shape.load[rod.nodes]
@@ -335,8 +341,10 @@ def test_reactions_are_in_balance_with_the_loads():
 def test_shape_does_not_depend_on_the_size_of_the_rod(size):
     kind = rs.Rod(rs.Circle(1e-4 * size), THIN.material)
     rod = rs.ElasticRod.of(straight(20) * size, kind, clamped={"start": X})
-    shape = rs.solve_rod(rod, forces={-1: (0, 0, -3 * EI * size**2)})
-    small = rs.solve_rod(rs.ElasticRod.of(straight(20), THIN, clamped={"start": X}), forces={-1: (0, 0, -3 * EI)})
+    shape = rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0, 0, -3 * EI * size**2)}))
+    small = rs.solve_rod(
+        rs.ElasticRod.of(straight(20), THIN, clamped={"start": X}), loads=rs.RodLoads(forces={-1: (0, 0, -3 * EI)})
+    )
     np.testing.assert_allclose(shape.positions / size, small.positions, atol=1e-9)
     assert shape.report.iterations == small.report.iterations
 
@@ -420,19 +428,29 @@ FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
         (lambda: rs.ElasticRod.of(straight(4), ROUND, director=X), "along its edge"),
         (lambda: rs.ElasticRod.of(np.eye(3), ROUND, closed=True, clamped=("start",)), "no ends to clamp"),
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped=("middle",)), "start"),
-        (lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), turns={"end": 1.0}), "not clamped at"),
-        (lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), forces={5: X}), "no node 5"),
+        (
+            lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), rs.RodSupports(turns={"end": 1.0})),
+            "not clamped at",
+        ),
+        (lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), loads=rs.RodLoads(forces={5: X})), "no node 5"),
         (lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), start=np.zeros((3, 3))), "has the shape"),
         (
-            lambda: rs.solve_rod(rs.ElasticRod.of(straight(4), ROUND), moments={0: 1.0}, positions={0: None, -1: None}),
+            lambda: rs.solve_rod(
+                rs.ElasticRod.of(straight(4), ROUND),
+                rs.RodSupports(positions={0: None, -1: None}),
+                rs.RodLoads(moments={0: 1.0}),
+            ),
             "spinning",
         ),
-        (lambda: rs.solve_rod(CLAMPED, spinning=("end",), turns={"end": 1.0}), "both spin and be turned"),
-        (lambda: rs.solve_rod(CLAMPED, tangents={"end": (-1, 0, 0)}), "turns back on itself"),
+        (
+            lambda: rs.solve_rod(CLAMPED, rs.RodSupports(spinning=("end",), turns={"end": 1.0})),
+            "both spin and be turned",
+        ),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(tangents={"end": (-1, 0, 0)})), "turns back on itself"),
         (lambda: rs.ElasticRod.of([["a", "b", "c"]] * 3, ROUND), "must be numbers"),
         (lambda: rs.ElasticRod.of(straight(4) * [np.nan, 1, 1], ROUND), "must be finite"),
         (lambda: rs.ElasticRod.of([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]], ROUND), "folds back on itself after edge 0"),
-        (lambda: rs.ElasticRod.of(straight(4), lambda s: None), "made of Rod"),
+        (lambda: rs.ElasticRod.of(straight(4), lambda s: None), "must be a rodshell Rod"),
         (lambda: rs.ElasticRod.of(straight(4), FLAT, natural="curly"), "curly"),
         (lambda: rs.ElasticRod.of(straight(4), FLAT, natural=np.zeros((2, 2))), r"shape \(3, 2\)"),
         (lambda: rs.ElasticRod.of(straight(4), FLAT, natural=(np.nan, 0.0)), "natural curvatures must be finite"),
@@ -441,21 +459,27 @@ FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (0, 0, 0)}), "tangent .* must not be zero"),
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (1, 0)}), "three numbers"),
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"end": (-1, 0, 0)}), "points against the rod"),
-        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped="start"), "in a row"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped="start"), "must be a sequence of ends"),
         (lambda: CLAMPED.state(np.zeros((3, 3))), r"shape \(5, 3\)"),
         (lambda: CLAMPED.state(angles=np.zeros(3)), r"shape \(4,\)"),
-        (lambda: rs.solve_rod(CLAMPED, forces={0: (0, 0, np.nan)}), "force on node 0 must be finite"),
-        (lambda: rs.solve_rod(CLAMPED, forces=np.full((5, 3), np.inf)), "forces on all nodes must be finite"),
-        (lambda: rs.solve_rod(CLAMPED, forces={1.5: X}), "whole number"),
-        (lambda: rs.solve_rod(CLAMPED, gravity=9.81), "gravity must be three numbers"),
-        (lambda: rs.solve_rod(CLAMPED, positions={0: (1, 0)}), "position of node 0"),
-        (lambda: rs.solve_rod(CLAMPED, along={0: [(2, 0, 0)]}), "unit vectors"),
-        (lambda: rs.solve_rod(CLAMPED, along={0: [X, X]}), "right angles"),
-        (lambda: rs.solve_rod(CLAMPED, tangents={"end": (0, 0, 0)}), "must not be zero"),
-        (lambda: rs.solve_rod(CLAMPED, directors={"end": X}), "the director lies along"),
-        (lambda: rs.solve_rod(CLAMPED, turns={"end": np.nan}), "turn of the .end. must be finite"),
-        (lambda: rs.solve_rod(CLAMPED, angles={0: np.nan}), "angle of edge 0 must be finite"),
-        (lambda: rs.solve_rod(CLAMPED, moments={0: np.nan}), "moment at 0 must be finite"),
+        (
+            lambda: rs.solve_rod(CLAMPED, loads=rs.RodLoads(forces={0: (0, 0, np.nan)})),
+            "force on node 0 must be finite",
+        ),
+        (
+            lambda: rs.solve_rod(CLAMPED, loads=rs.RodLoads(forces=np.full((5, 3), np.inf))),
+            "forces on all nodes must be finite",
+        ),
+        (lambda: rs.solve_rod(CLAMPED, loads=rs.RodLoads(forces={1.5: X})), "whole number"),
+        (lambda: rs.solve_rod(CLAMPED, loads=rs.RodLoads(gravity=9.81)), "gravity must be three numbers"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(positions={0: (1, 0)})), "position of node 0"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(along={0: [(2, 0, 0)]})), "unit vectors"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(along={0: [X, X]})), "right angles"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(tangents={"end": (0, 0, 0)})), "must not be zero"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(directors={"end": X})), "the director lies along"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(turns={"end": np.nan})), "turn of the .end. must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(angles={0: np.nan})), "angle of edge 0 must be finite"),
+        (lambda: rs.solve_rod(CLAMPED, loads=rs.RodLoads(moments={0: np.nan})), "moment at 0 must be finite"),
         (lambda: rs.solve_rod(CLAMPED, start=CLAMPED.state() * np.nan), "to start from must be finite"),
         (lambda: rs.solve_rod(CLAMPED, steps=1.5), "1, 2, ... steps"),
         (lambda: rs.Rod(rs.GivenSection(1, 1, 1, 1), rs.Material(1.0, 1.0)), "leave the material out"),
@@ -474,7 +498,7 @@ def test_wrong_input_is_refused_with_its_reason(wrong, says):
 
 def test_a_shape_is_continued_with_its_own_rod_only():
     rod = rs.ElasticRod.of(straight(8), THIN, clamped={"start": X})
-    shape = rs.solve_rod(rod, gravity=(0, 0, -1e-6))
+    shape = rs.solve_rod(rod, loads=rs.RodLoads(gravity=(0, 0, -1e-6)))
     with pytest.raises(rs.InputError, match=r"shape\.rod"):
         rs.solve_rod(rod, start=shape)
 
@@ -482,14 +506,14 @@ def test_a_shape_is_continued_with_its_own_rod_only():
 def test_rod_that_nothing_holds_is_refused():
     rod = rs.ElasticRod.of(straight(8), THIN)
     with pytest.raises(rs.ConvergenceError, match="hold what is free"):
-        rs.solve_rod(rod, forces={3: (0, 0, EI)})
+        rs.solve_rod(rod, loads=rs.RodLoads(forces={3: (0, 0, EI)}))
 
 
 def squeezed(line=X, **options):
     """A clamped rod, straight, whose ends come nearer by a tenth: at once to 25 times its buckling load."""
     kind = rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=1.0))
     rod = rs.ElasticRod.of(straight(40)[:, :1] * line, kind, clamped={"start": line, "end": line})
-    return rs.solve_rod(rod, positions={-1: 0.9 * np.array(line)}, steps=10, **options)
+    return rs.solve_rod(rod, rs.RodSupports(positions={-1: 0.9 * np.array(line)}), steps=10, **options)
 
 
 def test_bow_that_turns_freely_about_its_line_is_stable():
@@ -497,7 +521,7 @@ def test_bow_that_turns_freely_about_its_line_is_stable():
     for line in np.random.default_rng(0).normal(size=(10, 3)):
         line /= np.linalg.norm(line)
         bow = squeezed(line)
-        more = rs.solve_rod(bow.rod, start=bow, positions={-1: 0.89 * line}, stable=False)
+        more = rs.solve_rod(bow.rod, rs.RodSupports(positions={-1: 0.89 * line}), start=bow, stable=False)
         assert more.report.negative_modes == 0
 
 
@@ -507,7 +531,9 @@ def test_single_mode_of_a_true_saddle_is_counted():
     rod = rs.ElasticRod.of(straight(40), kind, clamped={"start": X, "end": X}, twist=False)
     plane = dict.fromkeys(range(1, 40), (X, Z))
     for share, modes in ((3.8, 0), (4.2, 1), (7.8, 1), (8.6, 2)):
-        shape = rs.solve_rod(rod, positions={-1: (1 - share * pi**2 / 1e5, 0, 0)}, along=plane, stable=False)
+        shape = rs.solve_rod(
+            rod, rs.RodSupports(positions={-1: (1 - share * pi**2 / 1e5, 0, 0)}, along=plane), stable=False
+        )
         assert shape.report.negative_modes == modes
 
 

@@ -15,12 +15,11 @@ from scipy.special import ellipe, ellipk
 import rodshell as rs
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.model import Shell
-from rodshell.solve import mixed_newton
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium, find_stable
+from rodshell.solve import equilibrium
+from rodshell.solve.equilibrium import find_equilibrium, find_stable
 from rodshell.solve.newton_step import NewtonStep
 from rodshell.solve.path import follow
-from rodshell.solve.problem import Problem
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import Status
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e9, density=1e3))
@@ -353,7 +352,7 @@ def test_near_a_saddle_newton_finds_it_unless_told_to_descend(descend):
     ([0.1 * 0.99**k for k in range(20)], False),
 ])  # fmt: skip
 def test_steps_that_repeat_themselves_are_told_from_slow_ones(steps, circles):
-    assert mixed_newton._in_circles(steps) == circles
+    assert equilibrium._repeats(steps) == circles
 
 
 def test_a_solve_that_goes_in_circles_is_given_up(monkeypatch):
@@ -368,7 +367,7 @@ def test_a_solve_that_goes_in_circles_is_given_up(monkeypatch):
     monkeypatch.setattr(NewtonStep, "take", take)
     _, found = squeezed_column(8, 0.5)
     assert found.report.status is Status.STALLED
-    assert len(taken) == mixed_newton.CIRCLES + 2
+    assert len(taken) == equilibrium.REPEATED + 2
 
 
 @pytest.mark.parametrize("push", [20, 20.5, 23])
@@ -386,7 +385,7 @@ def test_a_bow_pushed_past_its_limit_point_snaps_through(push):
     stretch = replace(shell.stretch, stiffness=np.full(40, stiffness))
     supports = Supports(in_plane(shell).with_directions(shell.ends))
     problem = Problem(shell.elements, stretch, supports, 1.0, load=load)
-    found = find_stable(problem, state, bow.forces, cut=True)
+    found = find_stable(problem, state, bow.forces, limit_steps=True)
     assert found.report.stable
     assert found.report.factorizations < 60
 

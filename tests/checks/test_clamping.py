@@ -1,14 +1,13 @@
 """From pinned to clamped by turning the ends."""
 
-from dataclasses import replace
-
 import numpy as np
 from shells import ROD, dome
 
 import rodshell as rs
 from rodshell.checks import check
-from rodshell.checks.clamping import reached_by_turning
+from rodshell.checks.deployment import reached_by_turning
 from rodshell.formfinding.popup import end_directions, turned
+from tests.properties.altered import at_positions
 
 
 def test_the_ends_of_the_dome_turn_into_their_clamps() -> None:
@@ -32,7 +31,7 @@ def test_another_shape_is_not_what_the_ends_turn_to() -> None:
     """The clamped shell moved aside by 1 % of its size stands for a shape that turning does not lead to."""
     form = dome()
     clamped = form.popped["clamped"]
-    aside = replace(clamped, positions=clamped.positions + [0.002, 0.0, 0.0])
+    aside = at_positions(clamped, clamped.positions + [0.002, 0.0, 0.0])
     assert reached_by_turning(form.popped["pinned"], aside) is False
 
 

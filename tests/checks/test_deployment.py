@@ -8,21 +8,20 @@ import pytest
 from shells import ROD, dome, wave
 
 import rodshell as rs
-from rodshell.checks import Deployment, check, curvatures, deploy, settled_shell
+from rodshell.checks import Deployment, check, curvatures, deploy
 from rodshell.checks import deployment as module
-from rodshell.checks.deployment import laid_out
+from rodshell.formfinding.popup import laid_below
 from rodshell.formfinding.trim import Boundary
 from rodshell.model import Shell
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.relax import relax
 from tests.acceptance.targets_random import random_case
 
 
 def deployed(form: rs.Form, stages: int = 4) -> Deployment:
-    shell = form.popped["pinned"]
-    return deploy(shell.shell, shell.state, shell.forces, stages=stages)
+    popped = form.popped["pinned"]
+    return deploy(popped.shell, popped.equilibrium, stages=stages)
 
 
 def test_it_begins_flat_and_ends_in_the_popped_shell() -> None:
@@ -82,8 +81,9 @@ def test_a_pattern_serves_only_the_shell_that_it_is_of() -> None:
     shell, other = dome().popped["pinned"], wave().popped["pinned"]
     alone = deployed(dome())
     for popped in (shell, other):
-        pattern = settled_shell(popped)[1].pattern
-        way = deploy(shell.shell, shell.state, shell.forces, stages=4, pattern=pattern)
+        pattern = popped.equilibrium.problem.pattern
+        start = replace(shell.equilibrium, problem=replace(shell.equilibrium.problem, pattern=pattern))
+        way = deploy(shell.shell, start, stages=4)
         np.testing.assert_array_equal(way.positions, alone.positions)
 
 
@@ -106,6 +106,7 @@ def energy_of(shell: Shell, state: np.ndarray) -> float:
     return sum(one.evaluate(state, unused) for one in (*shell.elements, shell.stretch))
 
 
+@pytest.mark.slow
 def test_a_shell_that_rises_by_itself_is_not_said_to_need_a_push() -> None:
     """The path backwards has gaps; another path forwards, from arches and with other steps, ends in this very shell."""
     form, way = wave(), deployed(wave(), 8)
@@ -123,6 +124,7 @@ def snapping() -> tuple[rs.Form, Deployment]:
     return form, deployed(form, 8)
 
 
+@pytest.mark.slow
 def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
     """From the stage before it, in steps of 1/200 down the steepest descent: it snaps there."""
     form, way = snapping()
@@ -135,7 +137,9 @@ def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
         goals = first + (share - begin) / (1 - begin) * (last - first)
         moved = state.copy()
         moved[shell.ends] = goals
-        problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, places=shell.places)
+        problem = Problem(
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.flat_coordinates
+        )
         there = relax(problem, moved)
         assert there.report.stable
         nodes = shell.positions(there.state - state)
@@ -161,7 +165,9 @@ def test_every_stage_of_a_path_forwards_is_a_stable_equilibrium_with_its_ends_on
     assert way.share.tolist() == [(k / 8) ** 2 for k in range(9)]
     for share, places, (shell, state) in zip(way.share[1:], ends[1:], way.shells, strict=True):
         np.testing.assert_allclose(places, (1 - share) * ends[0] + share * ends[-1], atol=1e-12)
-        problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, places=shell.places)
+        problem = Problem(
+            shell.elements, shell.stretch, Supports(shell.held_ends()), 0.2, flat_coordinates=shell.flat_coordinates
+        )
         found = find_equilibrium(problem, state, shell.stretch.stiffness * shell.stretch.strains(state))
         assert found.report.stable
         np.testing.assert_allclose(found.state, state, atol=1e-8)
@@ -188,18 +194,19 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
     )
 
 
+@pytest.mark.slow
 def test_the_worst_bend_may_be_on_the_way() -> None:
     """The wave ends flatter than it is on its way: the final state alone would hide it."""
     form = wave()
     checks = check(form.popped, ROD, stages=8)
     final = checks.bending["pinned"].curvature.max()
-    assert max(bent.curvature.max() for bent in checks.on_the_way) > 1.5 * final
+    assert max(bent.curvature.max() for bent in checks.deployment_bending) > 1.5 * final
 
 
 def test_the_bending_of_a_stage_is_that_of_its_shape() -> None:
     checks, mesh = check(dome().popped, ROD, stages=4), dome().footprint.mesh
     assert checks.deployment is not None
-    for bent, shape in zip(checks.on_the_way, checks.deployment.positions, strict=True):
+    for bent, shape in zip(checks.deployment_bending, checks.deployment.positions, strict=True):
         np.testing.assert_allclose(bent.curvature, curvatures(mesh, shape), atol=1e-9)
 
 
@@ -215,6 +222,7 @@ def test_the_flat_grid_is_laid_under_the_shell_whichever_way_that_is_turned() ->
     mesh, angle = dome().footprint.mesh, 0.7
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     there = mesh.flat @ turn.T + np.array([3.0, -2.0, 0.5])
-    np.testing.assert_allclose(laid_out(mesh.flat, mesh.ends.ravel(), there), there, atol=1e-12)
-    there[mesh.ends.ravel()[::2], 2] += 0.1  # starts higher than ends: the ground is at the lowest
-    np.testing.assert_allclose(laid_out(mesh.flat, mesh.ends.ravel(), there)[:, 2], 0.5, atol=1e-12)
+    ends = there[mesh.ends.ravel()]
+    np.testing.assert_allclose(laid_below(mesh, ends, 0.5), there, atol=1e-12)
+    ends[::2, 2] += 0.1  # starts higher than ends: the ways in the plane stay the same
+    np.testing.assert_allclose(laid_below(mesh, ends, 0.5), there, atol=1e-12)

@@ -17,8 +17,8 @@ from rodshell.checks.contact import (
     _Outline,
     contact,
     contact_of_patches,
-    joined_contact,
     nearest_points,
+    worst_contact,
 )
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.side_by_side import side_by_side as side_by_side_meshes
@@ -183,6 +183,7 @@ def test_a_sharp_bend_does_not_touch_itself() -> None:
     assert contact(mesh, places, round_rod(8e-3)).pairs == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_nearest_rods_of_a_shell_are_those_of_a_search_over_all_pairs(ends: str) -> None:
     popped, mesh = dome().popped[ends], dome().footprint.mesh  # type: ignore[index]
@@ -241,13 +242,16 @@ def test_every_shape_is_checked_and_the_nearest_rods_are_named() -> None:
     """44 mm rods touch at the rim of the popped dome; 70 mm ones at 60 mm in the flat grid, too."""
     checks = check(dome().popped, round_rod(0.022), stages=2)
     assert set(checks.contact) == {"pinned", "clamped"}
-    assert len(checks.contact_on_the_way) == 3
-    assert checks.contact_on_the_way[0].pairs == 0
-    assert checks.contact_on_the_way[0].clearance == pytest.approx(0.06 - 0.044)
-    assert checks.contact_on_the_way[-1] == checks.contact["pinned"]
+    assert len(checks.deployment_contact) == 3
+    assert checks.deployment_contact[0].pairs == 0
+    assert checks.deployment_contact[0].clearance == pytest.approx(0.06 - 0.044)
+    last, popped = checks.deployment_contact[-1], checks.contact["pinned"]
+    assert (last.pairs, last.rods) == (popped.pairs, popped.rods)
+    assert last.clearance == pytest.approx(popped.clearance, abs=1e-12)  # the deployment begins with a solve
+    assert last.where == pytest.approx(popped.where, abs=1e-12)
     wider = check(dome().popped, round_rod(0.035), stages=2)
-    assert wider.contact_on_the_way[0].pairs == 12
-    assert wider.contact_on_the_way[0].clearance == pytest.approx(0.06 - 0.07)
+    assert wider.deployment_contact[0].pairs == 12
+    assert wider.deployment_contact[0].clearance == pytest.approx(0.06 - 0.07)
 
 
 def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:
@@ -261,9 +265,9 @@ def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:
 
 def test_rods_of_patches_are_named_with_their_patch() -> None:
     near, far = Contact(0.01, 0, ("U1", "U2"), (0.0, 0.0, 0.0)), Contact(-0.01, 2, ("V3", "V4"), (1.0, 0.0, 0.0))
-    joined = joined_contact({"A": near, "B": far, "C": Contact()})
+    joined = worst_contact({"A": near, "B": far, "C": Contact()})
     assert joined == replace(far, rods=("B-V3", "B-V4"))
-    assert joined_contact({"A": Contact()}) == Contact()
+    assert worst_contact({"A": Contact()}) == Contact()
 
 
 def test_a_section_without_an_outline_is_not_judged() -> None:

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import SelfWeight, self_weight, settled_shell
+from rodshell.checks import SelfWeight, self_weight
 from rodshell.checks.self_weight import weakest
 from rodshell.model import Shell
 from tests.checks.shells import ROD, dome
 
 
 def found(form: rs.Form) -> SelfWeight:
-    return self_weight(*settled_shell(form.popped["pinned"]))
+    popped = form.popped["pinned"]
+    return self_weight(popped.shell, popped.equilibrium)
 
 
 def with_rod(rod: rs.Rod) -> rs.Form:
@@ -86,7 +87,8 @@ def test_summary_and_result_say_both_kinds_of_ends():
 
 
 def test_a_rubber_hemisphere_sinks_evenly_under_its_weight():
-    shell, settled = settled_shell(dome().popped["clamped"])
+    popped = dome().popped["clamped"]
+    shell, settled = popped.shell, popped.equilibrium
     lighter = self_weight(shell, settled, gravity=9.81 / 100)
     half = self_weight(shell, settled, gravity=9.81 / 200)
     assert lighter.load_factor == pytest.approx(half.load_factor / 2, rel=1e-6)

@@ -14,7 +14,7 @@ from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.results.summary import summary_text
 from rodshell.results.wording import percent
-from rodshell.rods.stock import STOCK, depth
+from rodshell.rods.section import TRADE_SIZES
 
 
 def roof(**keys: Any) -> Any:
@@ -61,18 +61,19 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
         return strain * material.youngs_modulus / (material.bending_strength or np.nan)
 
     assert used(section) <= 0.5
-    if section in STOCK[material.name]:  # type: ignore[index]
-        at = STOCK[material.name].index(section)  # type: ignore[index, arg-type]
-        for thicker in STOCK[material.name][at + 1 : at + 2]:  # type: ignore[index]
+    if section in TRADE_SIZES[material.name]:  # type: ignore[index]
+        at = TRADE_SIZES[material.name].index(section)  # type: ignore[index, arg-type]
+        for thicker in TRADE_SIZES[material.name][at + 1 : at + 2]:  # type: ignore[index]
             room = min(target.size / 100, min(layout.spacing) / 6)
-            assert used(thicker) > 1 / 2 or depth(thicker) > room
+            assert used(thicker) > 1 / 2 or thicker.depth > room
 
 
+@pytest.mark.slow
 def test_a_lath_whose_joints_let_it_roll_is_thicker_for_it_bends_towards_its_thin_side_alone() -> None:
     target, layout = half_sphere(5.0)
     larch = rs.Material.preset("larch")
     held, free = (Fit.on(target, layout, joint=joint).section(larch) for joint in (rs.Pin(), rs.Ball()))
-    assert depth(free) > depth(held)
+    assert free.depth > held.depth
     form = rs.find_form(target, layout, rs.Rod(free, larch), ends=("clamped",))
     bending = form.archive(options=rs.OutputOptions(stages=0)).results.plain()["bending"]["clamped"]
     assert 0.2 < bending["utilisation"] <= 0.5
@@ -101,7 +102,7 @@ def test_the_built_in_cases_of_the_paper_keep_its_rod() -> None:
 def test_what_is_given_is_kept_and_only_the_rest_is_chosen() -> None:
     timber = roof(**{"rod.material.preset": "spruce"})
     assert timber.rod.left_open == ("section",)
-    assert timber.build().rod.section in STOCK["spruce"]
+    assert timber.build().rod.section in TRADE_SIZES["spruce"]
     rod = roof(**{"rod.section.radius": "20 mm"})
     assert rod.rod.left_open == ("material",)
     assert rod.build().rod == rs.Rod(rs.Circle(0.02), rs.Material.preset("gfrp"))
@@ -116,14 +117,15 @@ def test_what_is_given_is_kept_and_only_the_rest_is_chosen() -> None:
 
 def test_a_given_strength_decides_in_place_of_the_presets() -> None:
     strong, weak = (roof(**{"checks.strength": s, "rod.material.preset": "larch"}).build().rod for s in (60e6, 10e6))
-    assert depth(strong.section) > depth(weak.section)
+    assert strong.section.depth > weak.section.depth
 
 
+@pytest.mark.slow
 def test_rods_leave_room_between_them_and_are_no_thicker_than_the_papers() -> None:
     flat = {"target.formula": "0.1*x*y/36", "target.radius": "6 m"}
-    assert depth(load_case("heightfield", flat).build().rod.section) <= 6.0 / 100
+    assert load_case("heightfield", flat).build().rod.section.depth <= 6.0 / 100
     dense = load_case("heightfield", {**flat, "layout.spacing": "100 mm"}).build()
-    assert depth(dense.rod.section) <= 0.1 / 6
+    assert dense.rod.section.depth <= 0.1 / 6
 
 
 def test_a_target_that_no_net_covers_is_sized_by_its_own_curvature() -> None:
@@ -178,6 +180,7 @@ def table_of_rods(path: Path, rods: int, share: float) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rods", "share"), [(4, 0.92), (8, 0.92), (8, 0.98)])
 def test_rods_of_a_table_use_what_they_are_chosen_for_and_the_summary_says_so(
     rods: int, share: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -204,6 +207,7 @@ def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path)
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("keys", "limit"),
     [
@@ -221,7 +225,7 @@ def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path)
 )
 def test_what_keeps_a_chosen_section_from_being_thicker_is_named(keys: dict[str, str], limit: str) -> None:
     case = roof(**{"rod.material.preset": "larch", **keys})
-    target, layout, rod, _ = case.build()
+    target, layout, rod, *_ = case.build()
     fit = case.fit_on(target, layout)
     assert isinstance(rod.section, rs.Circle | rs.Tube | rs.RectangularSection)
     assert rod.material
@@ -231,7 +235,7 @@ def test_what_keeps_a_chosen_section_from_being_thicker_is_named(keys: dict[str,
 
 def test_the_thickest_lath_that_is_sold_is_taken_before_thinner_ones_that_are_not() -> None:
     """Bends by which the thinnest of the sizes uses 0.45 of the strength: more than a third, less than half."""
-    larch, thin = rs.Material.preset("larch"), STOCK["larch"][0]
+    larch, thin = rs.Material.preset("larch"), TRADE_SIZES["larch"][0]
     assert larch.bending_strength
     curvature = 0.45 * larch.bending_strength / larch.youngs_modulus / 1.5e-3
     bends = Bends(np.array([curvature]), np.zeros(1))
@@ -260,7 +264,7 @@ def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
 
 def test_a_table_whose_rods_bend_to_rings_still_has_a_size() -> None:
     fit = Fit.between(np.array([2.0]), np.zeros((1, 2, 3)), [0])
-    assert 0 < depth(fit.section(rs.Material.preset("petg"))) < 0.01
+    assert 0 < fit.section(rs.Material.preset("petg")).depth < 0.01
 
 
 def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
@@ -271,10 +275,10 @@ def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
     out = tmp_path / "barrel"
     assert main(["form", "heightfield", *options, "--only", "csv", "--quiet", "--out", str(out)]) == 0
     case = load_case(out / "case.toml")
-    target, layout, rod, _ = case.build()
+    target, layout, rod, *_ = case.build()
     assert layout.rotate == pytest.approx(np.pi / 4)
     assert rod.section == Fit.on(target, layout, anchor=case.drape.anchor).section(
         rs.Material.preset("larch"), strength=20e6
     )
     across = rs.GridLayout.orthogonal(spacing=1.5)
-    assert depth(rod.section) > depth(Fit.on(target, across).section(rs.Material.preset("larch"), strength=20e6))
+    assert rod.section.depth > Fit.on(target, across).section(rs.Material.preset("larch"), strength=20e6).depth

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rodshell.case.rod_ends import COLUMNS
 from rodshell.cli import main, warmup
-from rodshell.cli.rodends import COLUMNS
+
+pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 QUICK = {"form": ["--only", "csv", "--checks.stages", "0", "--pop_up.ends", "clamped"]}

@@ -20,7 +20,7 @@ JOB = Job("few", ("form", "hemisphere", *FEW))
 HELD = """
 import sys, time
 from rodshell.formfinding import progress
-from rodshell.cli import progress as shown, entry
+from rodshell.cli import reporting as shown, entry
 {patch}
 entry()
 """
@@ -48,7 +48,7 @@ IN_AN_IMPORT = """
 import builtins
 wanted = builtins.__import__
 def slowly(name, *rest):
-    if name == "rodshell.form":
+    if name == "rodshell.job":
         print("here", flush=True)
         try:
             time.sleep(30)
@@ -96,6 +96,7 @@ def interrupted(patch: str, how: signal.Signals, *arguments: str, times: int = 1
     return process.returncode, said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("patch", "how", "times"),
     [
@@ -116,6 +117,7 @@ def test_an_interrupt_ends_in_one_line_and_leaves_the_folder_as_it_was(
     assert contents(dome) == before
 
 
+@pytest.mark.slow
 def test_a_fall_that_is_interrupted_is_no_result(tmp_path: Path) -> None:
     """Its last state was once written as a drape that had not come to rest."""
     arguments = ("form", "hemisphere", *FEW, "--method", "paper", "--out", str(tmp_path / "dome"), "-q")
@@ -124,6 +126,7 @@ def test_a_fall_that_is_interrupted_is_no_result(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.slow
 def test_what_a_kill_leaves_is_removed_by_the_next_run(dome: Path) -> None:
     before = contents(dome)
     interrupted(IN_A_STAGE.format(stage="files"), signal.SIGKILL, *JOB.arguments, *JOB.new, "--out", str(dome), "-q")

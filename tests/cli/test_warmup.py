@@ -33,6 +33,7 @@ def warm_up(folder: Path) -> tuple[str, list[str]]:
     return done.stdout, done.stderr.splitlines()
 
 
+@pytest.mark.slow
 def test_the_first_warm_up_compiles_and_the_second_has_nothing_to_do(tmp_path: Path) -> None:
     said, told = warm_up(tmp_path)
     assert re.fullmatch(r"compiled 1 kernels in \d+ s\n", said)
@@ -43,6 +44,7 @@ def test_the_first_warm_up_compiles_and_the_second_has_nothing_to_do(tmp_path: P
     assert sorted(tmp_path.rglob("*.nbc")) == kept
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(os.environ.get("NUMBA_DISABLE_JIT")), reason="no kernels: unset NUMBA_DISABLE_JIT")
 def test_every_kernel_is_called_by_some_job() -> None:
     """By a job itself or by a kernel that is; numba asks a function that is called from a kernel for its types."""
@@ -57,7 +59,7 @@ def test_every_kernel_is_called_by_some_job() -> None:
         for value in vars(module).values()
         if isinstance(value, Dispatcher)
     }
-    from rodshell.cli.progress import Progress
+    from rodshell.cli.reporting import Progress
     from rodshell.cli.warmup import warm_up as run_all
 
     run_all(Progress(quiet=True))

@@ -16,10 +16,9 @@ import pytest
 from numpy.linalg import norm
 
 from rodshell.errors import InputError
-from rodshell.geometry import directors_along, parallel_transport
+from rodshell.geometry.frames import directors_along, parallel_transport
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.isotropic_bend import IsotropicBend
-from rodshell.rods.round_bend_twist import RoundBendTwist
+from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.rods.stretch import Stretch
 
 NODES = 7
@@ -100,9 +99,9 @@ def bend_twist(rng, state, natural=1.0):
     )
 
 
-def round_bend_twist(rng, state):
+def isotropic_bend_twist(rng, state):
     """Isotropic and naturally straight, with natural twist; sources at `state`."""
-    return RoundBendTwist.starting_at(
+    return IsotropicBendTwist.starting_at(
         windows(5, 1),
         state,
         rng.normal(size=state.shape),
@@ -136,10 +135,10 @@ def _cases():
     yield "bend and twist at zero strain, bent", (bend_twist(r, gentle).relaxed(gentle), gentle)
     for name, state in states.items():
         r = next(rng)
-        elements = round_bend_twist(r, state)
-        yield f"round bend and twist, {name}", (elements, state)
-        yield f"round bend and twist, {name}, away from the source", (elements, moved(r, state, 0.1))
-    yield "round bend and twist at zero strain, straight", (round_bend_twist(r, line).relaxed(line), line)
+        elements = isotropic_bend_twist(r, state)
+        yield f"isotropic bend and twist, {name}", (elements, state)
+        yield f"isotropic bend and twist, {name}, away from the source", (elements, moved(r, state, 0.1))
+    yield "isotropic bend and twist at zero strain, straight", (isotropic_bend_twist(r, line).relaxed(line), line)
 
 
 CASES = dict(_cases())
@@ -229,7 +228,7 @@ def bend_twist_twin(elements, x):
     return bend + np.sum(elements.twist_stiffness * twisted_by**2) / 2
 
 
-def round_bend_twist_twin(elements, x):
+def isotropic_bend_twist_twin(elements, x):
     """HQK Eq 1b and 1c of a round rod: the bending of the centre line, and the twist of the material frames."""
     bends = IsotropicBend(elements.blocks[:, ::2], elements.bend_stiffness[:, 0])
     twisted_by = twin_strains(elements, x)[:, 2] - elements.natural_twist
@@ -240,7 +239,7 @@ TWINS = {
     Stretch: stretch_twin,
     IsotropicBend: isotropic_bend_twin,
     BendTwist: bend_twist_twin,
-    RoundBendTwist: round_bend_twist_twin,
+    IsotropicBendTwist: isotropic_bend_twist_twin,
 }
 
 
@@ -378,7 +377,7 @@ def test_refreshing_changes_the_source_and_nothing_else(name):
     assert norm(t - elements.source_tangents) > 0.1
 
 
-@pytest.mark.parametrize("make", [bend_twist, round_bend_twist])
+@pytest.mark.parametrize("make", [bend_twist, isotropic_bend_twist])
 def test_energy_is_the_same_from_the_new_source_however_far_the_state(make):
     """Also where the frames of a node have turned against each other by more than half a revolution."""
     rng = np.random.default_rng(9)
@@ -462,7 +461,7 @@ def test_director_along_its_edge_is_refused():
 
 
 def test_corner_of_a_flat_grid_has_the_curvature_of_its_linker():
-    """numerics.md 3: from x to y with all directors along z, curvature (0, -2) and no twist."""
+    """From x to y with all directors along z: curvature (0, -2 tan 45 degrees) and no twist [HQK Eq 1]."""
     corner = chain([[1.0, 0, 0], [0, 1.0, 0]], [0.0, 0.0])
     elements = BendTwist.starting_at(np.arange(5)[None], corner, Z, bend_stiffness=1.0, twist_stiffness=1.0)
     np.testing.assert_allclose(elements.strains(corner), [[0, -2, 0]], atol=1e-15)

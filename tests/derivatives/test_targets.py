@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 from rodshell.targets import (
     Cap,
     Disc,
-    EllipseDomain,
     Ellipsoid,
     HeightField,
     Hemisphere,
@@ -16,6 +15,7 @@ from rodshell.targets import (
     Rectangle,
     Target,
 )
+from rodshell.targets.domain import EllipseDomain
 
 Floats = NDArray[np.float64]
 
@@ -131,6 +131,7 @@ def dense_surface(target: Target, past: float) -> Floats:
     return target.lift(plan)
 
 
+@pytest.mark.slow
 @every_target
 def test_closest_point_is_really_closest(name):
     target, rng = TARGETS[name], np.random.default_rng(3)
@@ -184,10 +185,11 @@ def rim_points(target: Target, rng: np.random.Generator, count: int) -> Floats:
     plan = np.column_stack([a * np.cos(angle), b * np.sin(angle)])
     if isinstance(target.plan, Rectangle):
         plan /= np.abs(plan / (a, b)).max(axis=1)[:, None]
-    z = np.full(count, target.base) if target.base is not None else target.height(plan)
+    z = np.full(count, target.base) if target.base is not None else target.height_at(plan)
     return np.column_stack([plan, z])
 
 
+@pytest.mark.slow
 @every_target
 def test_contact_distance_never_changes_faster_than_the_point_moves(name):
     """Straight paths around the rim: over the surface, down the wall, inside; a jump is a force out of nothing.
@@ -274,7 +276,7 @@ def test_above_a_field_nothing_touches(name):
     """Above a rim that rises outwards the closest point of the continued surface lies past the edge."""
     target, rng = TARGETS[name], np.random.default_rng(12)
     for x in (surface_points(target, rng, 500, reach=0.999), rim_points(target, rng, 200) * [0.99, 0.99, 1]):
-        x[:, 2] = target.height(x[:, :2]) + rng.uniform(1e-6, 0.04, len(x))
+        x[:, 2] = target.height_at(x[:, :2]) + rng.uniform(1e-6, 0.04, len(x))
         assert (target.contact(x).distance > 0).all()
 
 
@@ -336,7 +338,7 @@ def test_margin_changes_sign_at_the_rim(name):
     rim = rim_points(target, rng, 100)
     np.testing.assert_allclose(target.margin(rim), 0.0, atol=1e-14)
     inner = rim * [0.99, 0.99, 1]
-    inner[:, 2] = target.height(inner[:, :2]) if target.base is None else inner[:, 2] + 1e-3
+    inner[:, 2] = target.height_at(inner[:, :2]) if target.base is None else inner[:, 2] + 1e-3
     assert (target.margin(inner) > 0).all()
 
 
@@ -344,7 +346,7 @@ def test_margin_changes_sign_at_the_rim(name):
 def test_height_and_summit_lie_on_the_surface(name):
     target, rng = TARGETS[name], np.random.default_rng(16)
     plan = plan_points(target, rng, 200)
-    assert np.abs(target.implicit(np.column_stack([plan, target.height(plan)])).value).max() < 1e-15
+    assert np.abs(target.implicit(np.column_stack([plan, target.height_at(plan)])).value).max() < 1e-15
     top = target.lift(np.array([target.summit]))
     assert target.margin(top)[0] > 0
     if name != "hypar":
@@ -352,4 +354,4 @@ def test_height_and_summit_lie_on_the_surface(name):
         flat = np.abs(target.on_surface(top).normal[0, :2]).max()
         assert flat < 1e-9
         if name != "two bumps":
-            assert (target.height(nearby) <= top[0, 2] + 1e-15).all()
+            assert (target.height_at(nearby) <= top[0, 2] + 1e-15).all()

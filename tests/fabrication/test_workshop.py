@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import rodshell as rs
 from rodshell.fabrication import Fabrication, diagonals, fabricate, nest, splices
 from rodshell.layout import FlatGrid, mesh_grid, straight_rods
+from rodshell.layout.flatgrid import layers
 from rodshell.layout.gridlayout import GridLayout
-from rodshell.layout.layers import layers
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
 

@@ -72,6 +72,6 @@ def formed(name: str) -> Archive:
         return archive(name)
     if name == "sewn":
         layout = rs.GridLayout.orthogonal(spacing=0.03, edge=0.01)
-        return rs.sew(rs.Hemisphere(0.2), [[(-1.0, 0.0), (1.0, 0.0)]], layout, ROD).archive()
+        return rs.find_form(rs.Hemisphere(0.2), layout, ROD, seams=[[(-1.0, 0.0), (1.0, 0.0)]]).archive()
     target, spacing = (ROOF, 0.8) if name == "roof" else (mesh_with_an_opening(), 0.6)
     return rs.find_form(target, rs.GridLayout.orthogonal(spacing=spacing, edge=0.2), LATH).archive()

@@ -13,6 +13,8 @@ from rodshell.output.drawings.shell import supports_drawing
 from rodshell.output.labels import Room, boxes_meet, callouts, lines_meet, outward
 from rodshell.results import Archive
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -55,6 +57,7 @@ def supports_of(made: Archive) -> dict[str, Floats]:
     return {name: place for name, place in zip(names, places, strict=True) if name not in sewn}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [1.0, 0.6], ids=["usual size", "small"])
 @pytest.mark.parametrize("name", NAMES)
 def test_every_support_is_read_by_its_own_name(name: str, share: float) -> None:
@@ -74,6 +77,7 @@ def test_every_support_is_read_by_its_own_name(name: str, share: float) -> None:
     assert misread == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_no_line_to_a_name_crosses_another_or_runs_through_a_name(name: str) -> None:
     made = formed(name)
@@ -91,6 +95,7 @@ def test_no_line_to_a_name_crosses_another_or_runs_through_a_name(name: str) -> 
         assert min(float(off(box, along).min()) for box in boxes) > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["roof", "opening"])
 def test_names_stand_outside_the_shell(name: str) -> None:
     """Beyond the sides of the roof, or in the opening: on no rod."""

@@ -26,6 +26,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wished", "sample", "table"])
 def test_files_made_again_from_the_folder_are_the_same_bytes(name: str, tmp_path: Path) -> None:
     made = {"wished": wished, "sample": sample_archive, "table": table_archive}[name]()
@@ -37,6 +38,7 @@ def test_files_made_again_from_the_folder_are_the_same_bytes(name: str, tmp_path
     assert again == {name: data for name, data in contents(first).items() if name not in kept}
 
 
+@pytest.mark.slow
 def test_an_archive_in_memory_is_what_a_reader_gets(tmp_path: Path) -> None:
     made = wished()
     again = read(save(made, tmp_path / "dome"))
@@ -74,6 +76,7 @@ def test_command_writes_what_is_asked_for(tmp_path: Path, capsys: pytest.Capture
     assert set(contents(tmp_path / "tables")) == {f"schedule/{name}.csv" for name in ("rods", "joints", "supports")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [(["--only", "dxf,cvs"], 'unknown kind of file "cvs": use dxf, svg'), (["--only", ","], "unknown kind of file"),
@@ -142,6 +145,7 @@ MILLIMETRES = {"radius": '"200 mm"', "spacing": '"50 mm"', "edge": '"12.5 mm"', 
                "density": '"1 g/cm3"', "allowance": '"12 mm"', "stock": '"40 cm"'}  # fmt: skip
 
 
+@pytest.mark.slow
 def test_millimetres_and_metres_give_the_same_drawings_to_the_byte(tmp_path: Path) -> None:
     made = []
     for k, values in enumerate((METRES, MILLIMETRES)):
@@ -153,6 +157,7 @@ def test_millimetres_and_metres_give_the_same_drawings_to_the_byte(tmp_path: Pat
     assert made[0] == made[1]
 
 
+@pytest.mark.slow
 def test_drawings_are_the_same_whatever_the_hash_seed(tmp_path: Path) -> None:
     """Another process with another order of sets writes the same bytes."""
     first = save(wished(), tmp_path / "first")
@@ -167,13 +172,14 @@ def test_drawings_are_the_same_whatever_the_hash_seed(tmp_path: Path) -> None:
         str(tmp_path / "again"),
         "-q",
         "--only",
-        "dxf,csv",
+        "dxf,pdf,png,csv",
     ]
     subprocess.run(command, check=True, env={**os.environ, "PYTHONHASHSEED": "7"})
     again = contents(tmp_path / "again")
     assert again == {name: data for name, data in contents(first).items() if name in again}
 
 
+@pytest.mark.slow
 def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Path) -> None:
     """Nothing was checked, nothing popped up: drawings of the flat grid and the drape are all there is."""
     stopped = replace(form("dome"), popped={}, agreement={})
@@ -189,6 +195,7 @@ def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Pa
     assert "Not buildable: there is no pop-up in this result" in (out / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_without_stages_there_is_no_way_up(tmp_path: Path) -> None:
     made = form("dome").archive(options=rs.OutputOptions(stages=0))
     assert "deployment" not in made.results.plain()

@@ -384,6 +384,7 @@ def test_the_ring_is_where_the_agreement_found_the_largest_gap(archive: Archive)
     assert "\N{MINUS SIGN}1.35 mm" in texts
 
 
+@pytest.mark.slow
 def test_fine_meshes_do_not_swell_a_picture() -> None:
     coarse, fine = (len(picture_svg(sample_archive(30, edges), "popped_pinned")) for edges in (8, 80))
     assert fine < 1.3 * coarse
@@ -397,6 +398,7 @@ def test_table_is_coloured_by_height_in_the_unit_of_the_axes(larger: float) -> N
     assert "height in mm" in picture_svg(replace(made, states=high), "popped_pinned")
 
 
+@pytest.mark.slow
 def test_report_of_60_by_60_rods_stays_below_5_megabytes(tmp_path: Path) -> None:
     export(sample_archive(60, 6), tmp_path, ["report"])
     assert (tmp_path / "report.html").stat().st_size < 5e6

@@ -121,6 +121,7 @@ def test_data_of_the_view_cannot_end_its_script() -> None:
     assert "</" not in viewer_json({**(data or {}), "names": {"gap": "</script>"}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["good", "check", "unbuildable"])
 def test_the_verdict_comes_first_with_its_colour_and_all_reasons(level: str, tmp_path: Path) -> None:
     made = archive("dome")
@@ -159,7 +160,8 @@ def test_checks_are_in_words_and_numbers(tmp_path: Path) -> None:
     assert "cut = &#34;LASER&#34;" in page
 
 
-def test_report_of_60_by_60_rods_with_its_deployment_stays_below_15_megabytes(large: Path, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_report_of_60_by_60_rods_with_its_way_up_stays_below_15_megabytes(large: Path, tmp_path: Path) -> None:
     assert large.stat().st_size < 15e6
     assert page_of(archive("dome"), tmp_path).stat().st_size < 5e6
 
@@ -179,6 +181,7 @@ def with_stages(strength_used: float | None, lost: float | None, snaps: list[lis
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "snaps", "words", "note", "head"),
     [(None, [], "deployment included.", "Every stage is an equilibrium", "deployment"),
@@ -204,6 +207,7 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
     assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)  # as the warning has it
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "snaps", "guided", "note"),
     [(None, [], None, "Every stage is an equilibrium of the elastic grid with pinned ends."),

@@ -29,6 +29,7 @@ def styled(made: Archive, **style: object) -> Archive:
     return replace(made, results=Results.of({**made.results.plain(), "drawings": style}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("paper", ["A4", "A3", "A1"])
 def test_capitals_are_never_lower_than_iso_3098_has_them(paper: str) -> None:
     """1.8 mm is the smallest height of letters in ISO 3098, 2.5 mm the usual one."""
@@ -37,6 +38,7 @@ def test_capitals_are_never_lower_than_iso_3098_has_them(paper: str) -> None:
     assert pytest.approx(2.5, abs=0.02) == CAPITAL * TEXT
 
 
+@pytest.mark.slow
 def test_what_finds_no_room_is_counted_and_said() -> None:
     """The whole plan of the dome on A3 has no room for ids of joints: those written and those left out are all."""
     made = archive("dome")
@@ -70,6 +72,7 @@ def test_a_sheet_that_shows_all_needs_no_parts() -> None:
     assert list(parts(lambda text: flat_drawing(plan, text), paper, whole)) == []
 
 
+@pytest.mark.slow
 def test_the_title_block_names_rods_joints_author_and_date() -> None:
     made = styled(wished(), name="Pavilion roof", author="A. Nyone", date="2026-11-22", project="Park", tolerance=5e-4)
     entries = dict(title_block(made, "").entries)
@@ -120,6 +123,7 @@ def test_dates_that_are_no_days_are_refused() -> None:
         DrawingStyle(tolerance=-1e-3)
 
 
+@pytest.mark.slow
 def test_long_names_are_shortened_to_their_place() -> None:
     made = hostile_archive()
     made = styled(made, **{**made.results.plain()["drawings"], "project": "W" * 500, "name": "W" * 500, "paper": "A4"})

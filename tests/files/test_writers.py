@@ -141,6 +141,7 @@ def covered_of_rods(archive: Archive, state: str) -> float:
     return float(np.mean(pixels[row, column].min(axis=1) > 225))
 
 
+@pytest.mark.slow
 def test_rods_are_set_off_only_against_what_they_pass_over() -> None:
     """On the flat grid no rod is broken at a joint; the back of a dome is, where the front passes over it."""
     archive = sample_archive(25, 4)

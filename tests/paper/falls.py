@@ -7,11 +7,10 @@ import rodshell as rs
 from rodshell.contact.modified_mass import ModifiedMass, Stopped
 from rodshell.model import Freedom
 from rodshell.rods.elements import Elements
-from rodshell.solve.constraint import Supports
-from rodshell.solve.contact_euler import ContactEuler
 from rodshell.solve.forces import GravityForce
-from rodshell.solve.implicit_euler import MakeMatrix, Motion, Step
-from rodshell.solve.summed import narrow_or_sparse
+from rodshell.solve.implicit_euler import ContactEuler, MakeMatrix, Motion, Step
+from rodshell.solve.newton_matrix import narrow_or_sparse
+from rodshell.solve.problem import Supports
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +40,7 @@ class Particles:
         *,
         elements: tuple[Elements, ...] = (),
         free: Freedom | None = None,
-        stopped: Stopped = "wholly",
+        stopped: Stopped = "all",
         friction: float = 0.0,
         matrix: MakeMatrix = narrow_or_sparse,
     ) -> None:

@@ -9,7 +9,7 @@ from rodshell.contact.modified_mass import ModifiedMass
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.summed import SparseSum
+from rodshell.solve.newton_matrix import SparseSum
 from rodshell.targets.domain import Domain, EllipseDomain
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, RADIUS, STEP, TARGETS, G, Particles, slope
 
@@ -103,11 +103,11 @@ def test_a_node_slides_down_a_slope_as_in_the_textbook() -> None:
     sine, down = tangent / np.hypot(1, tangent), np.array([1.0, 0.0, -tangent]) / np.hypot(1, tangent)
     start = np.array([[-0.1, 0.0, 0.3 + 0.1 * tangent]])
     n = 20
-    slides = Particles(slope(tangent), start, stopped="along the normal")
+    slides = Particles(slope(tangent), start, stopped="normal")
     slides.step(n)
     np.testing.assert_allclose(slides.velocity[0], n * STEP * G * sine * down, atol=1e-9)
-    # stopped wholly, it creeps by g sin h^2 a step, as with a drag m/h
-    creeps = Particles(slope(tangent), start, stopped="wholly")
+    # stopped in all directions, it creeps by g sin h^2 a step, as with a drag m/h
+    creeps = Particles(slope(tangent), start, stopped="all")
     creeps.step(n)
     np.testing.assert_allclose(creeps.state[0], start[0] + n * STEP**2 * G * sine * down, atol=1e-9)
 
@@ -161,7 +161,7 @@ def test_a_node_that_touches_is_not_looked_at_again_in_its_step() -> None:
     hollow = TARGETS["hollow"]
     x = np.array([[0.1, 0.0, 0.11], [0.15, 0.0, 0.14]])
     pulled = Stretch.elastic(np.array([[0, 1]]), np.array([0.05]), np.array([5e-3]))
-    particles = Particles(hollow, x, elements=(pulled,), stopped="along the normal")
+    particles = Particles(hollow, x, elements=(pulled,), stopped="normal")
     particles.step()
     touching = particles.stepper.last
     assert touching is not None
@@ -204,5 +204,5 @@ def test_the_reduced_system_has_the_solution_of_the_papers_filtered_one(matrix: 
 
 
 def test_a_negative_friction_is_refused() -> None:
-    with pytest.raises(InputError, match=r"friction coefficient must be 0 or positive, not -0\.1"):
+    with pytest.raises(InputError, match=r"friction coefficient must be 0 or more, not -0\.1"):
         ModifiedMass(HEMISPHERE, np.arange(1), friction=-0.1)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.paper.two_rods import LENGTH, RATE, run
+from rodshell.paper.two_rods import LENGTH, RATE, run_in_time
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
@@ -51,24 +51,24 @@ def test_targets_are_those_of_equation_13() -> None:
     xy = np.array([[0.0, 0.0], [0.1, 0.05], [-0.03, 0.12], [0.02, -0.14]])
     x, y = xy.T
     found = [
-        rs.Hemisphere(0.2).height(xy), rs.Paraboloid(0.2, 0.12).height(xy), rs.Ellipsoid(0.2, 0.15, 0.12).height(xy),
-    ]  # fmt: skip
+        target.height_at(xy) for target in (rs.Hemisphere(0.2), rs.Paraboloid(0.2, 0.12), rs.Ellipsoid(0.2, 0.15, 0.12))
+    ]
     wanted = [
         np.sqrt(0.2**2 - x**2 - y**2),
         0.12 * (1 - (x**2 + y**2) / 0.2**2),
         0.12 * np.sqrt(1 - x**2 / 0.2**2 - y**2 / 0.15**2),
     ]
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
-    assert np.isnan(rs.Hemisphere(0.2).height(np.array([[0.2, 0.01]]))).all()
+    assert np.isnan(rs.Hemisphere(0.2).height_at(np.array([[0.2, 0.01]]))).all()
 
 
 def test_rod_1_is_led_as_equation_7_says() -> None:
     """x_11 = L/2 (cos wt, sin wt, 0) at 10 rpm, and the joint stays; twisted, the first angle is w t."""
-    turned = run("bending", rs.Linker(), rs.SharedDofs(), until=0.5)
+    turned = run_in_time("bending", rs.Linker(), rs.SharedDofs(), until=0.5)
     rate = 10 * 2 * np.pi / 60
     way = 0.5 * LENGTH * np.column_stack([np.cos(rate * turned.times), np.sin(rate * turned.times), 0 * turned.times])
     np.testing.assert_allclose(turned.nodes[:, 0, 0], way, atol=1e-12)
     np.testing.assert_allclose(turned.nodes[:, 0, 2], 0.0, atol=1e-12)
     assert pytest.approx(rate) == RATE
-    twisted = run("twisting", rs.Linker(), rs.SharedDofs(), until=0.5)
+    twisted = run_in_time("twisting", rs.Linker(), rs.SharedDofs(), until=0.5)
     np.testing.assert_allclose(twisted.twists[:, 0], rate * twisted.times, atol=1e-12)

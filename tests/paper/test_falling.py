@@ -12,20 +12,20 @@ import rodshell as rs
 from rodshell.case import load_case
 from rodshell.cli import main
 from rodshell.errors import InputError, OutputError, StabilityError
-from rodshell.formfinding.calming import calming, decay
 from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.methods import Fall
+from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.results.folder import read_manifest
 from rodshell.solve.report import Status
-from rodshell.solve.time_series import TimeSeries
+from rodshell.solve.simulate import TimeSeries
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
 
 TENTH = 0.1e-3  # [m]
 DRAG = 5.0  # 1/s: the hanging tails, pendulums of 0.3 m, stop swinging within two seconds
 FALLS = {
     "shared": Fall(coupling=SharedDofs(), drag=DRAG),
-    "along the normal": Fall(coupling=SharedDofs(), drag=DRAG, stopped="along the normal"),
+    "along the normal": Fall(coupling=SharedDofs(), drag=DRAG, stopped="normal"),
     "implicit": Fall(coupling=ImplicitPenalty(), drag=DRAG),
 }
 
@@ -46,6 +46,7 @@ def apart(one: Draped, other: Draped) -> float:
     return float(np.linalg.norm(one.positions - other.positions, axis=1)[on].max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(FALLS))
 def test_the_fall_comes_to_rest_where_statics_does(name: str) -> None:
     draped = fallen(name)
@@ -56,6 +57,7 @@ def test_the_fall_comes_to_rest_where_statics_does(name: str) -> None:
     assert draped.figures.max_gap < 1e-9  # nodes are on the planes of their closest points, which lie outside a sphere
 
 
+@pytest.mark.slow
 def test_stiff_springs_part_by_little_and_shared_unknowns_by_nothing() -> None:
     shared, implicit = fallen("shared").rest, fallen("implicit").rest
     assert shared is not None
@@ -64,6 +66,7 @@ def test_stiff_springs_part_by_little_and_shared_unknowns_by_nothing() -> None:
     assert 0.0 < implicit.joint_gap < 1e-6
 
 
+@pytest.mark.slow
 def test_explicit_springs_part_by_the_force_over_their_stiffness() -> None:
     """Half as stiff, twice the gap: the forces at the joints are the same to first order."""
     gaps = []
@@ -93,6 +96,7 @@ def test_a_fall_that_is_cut_short_says_that_it_is_not_at_rest() -> None:
     assert "NOT AT REST after 0.3 s" in draped.warnings[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["drag", "duration"])
 def test_what_a_fall_that_is_not_at_rest_asks_for_brings_it_to_rest(key: str) -> None:
     short = rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=Fall(drag=1.0, duration=2.5))
@@ -108,10 +112,10 @@ def test_decay_is_that_of_a_damped_swing(rate: float) -> None:
     """Energy of x = exp(-c t / 2) cos(w t), whose peaks fall as exp(-c t)."""
     times = np.linspace(0.0, 8.0, 801)
     seen = list(zip(times, np.exp(-rate * times) * np.sin(12 * times) ** 2, strict=True))
-    found, peak = decay(seen)
+    found, peak = energy_decay(seen)
     assert abs(found / rate - 1) < 0.05  # windows begin anywhere in a swing of 0.26 s, of 2 s
     assert abs(peak / np.exp(-6 * rate) - 1) < 0.25 * rate
-    assert decay([]) == (0.0, 0.0)
+    assert energy_decay([]) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +131,7 @@ def test_a_remedy_that_would_not_help_is_not_named(drag: float, rate: float, say
     energies = np.exp(-rate * times)
     still = float(energies[times > 4.5].max()) * np.exp(-5.0)
     seen = [(0.0, still * np.exp(15.0)), *zip(times, energies, strict=True)]
-    assert calming(seen, still, 1.0, 6.0, drag) == says
+    assert rest_advice(seen, still, 1.0, 6.0, drag) == says
 
 
 def test_beyond_the_step_limit_of_explicit_springs_a_fall_is_refused() -> None:
@@ -195,6 +199,7 @@ def test_a_case_writes_frames_nowhere_else(frames: str) -> None:
         load_case("hemisphere", {"drape.method": "paper", "drape.frames": frames})
 
 
+@pytest.mark.slow
 def test_friction_holds_what_else_slides_off() -> None:
     """Started 1 mm off the middle: with friction it stays, without it the offset grows."""
     offsets = {}

@@ -9,8 +9,8 @@ import pytest
 
 from rodshell.joints import ExplicitPenalty
 from rodshell.paper import fig8
-from rodshell.paper.bare_solves import BareSolves
-from rodshell.paper.drapes import Case
+from rodshell.paper.cases import Case
+from rodshell.paper.fig8 import BareSolves
 from tests.paper.falls import HEMISPHERE
 
 CASE = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)
@@ -21,6 +21,7 @@ def figure() -> fig8.Fig8:
     return fig8.make(lambda *told: None, cases=(CASE,), falling=0.3)
 
 
+@pytest.mark.slow
 def test_every_scheme_is_timed_and_costs_more_than_its_bare_solves() -> None:
     timings = figure().timings
     assert {one.method for one in timings} == {"explicit", "shared", "implicit", "ours"}
@@ -34,6 +35,7 @@ def test_every_scheme_is_timed_and_costs_more_than_its_bare_solves() -> None:
     assert {one.step for one in timings if one.method == "shared"} == set(fig8.STEPS["shared"])
 
 
+@pytest.mark.slow
 def test_bare_solves_take_as_long_as_there_are_rods() -> None:
     """Twice the rods, twice the time, by LAPACK and by our own band: the fixed cost of a call is small."""
     cases = (Case("a", HEMISPHERE, (n, n), spacing=0.01, edge=0.005) for n in (16, 32))
@@ -46,6 +48,7 @@ def test_bare_solves_take_as_long_as_there_are_rods() -> None:
         assert few.spent > 40 * less
 
 
+@pytest.mark.slow
 def test_the_ratio_is_that_of_the_two_times_in_the_table(tmp_path: Path) -> None:
     figure().save(tmp_path / "fig8")
     result = json.loads((tmp_path / "fig8" / "result.json").read_text())

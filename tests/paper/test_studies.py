@@ -12,6 +12,8 @@ from rodshell.paper import studies
 from rodshell.paper.studies import Line, Studies
 from tests.paper.falls import coarse_layout
 
+pytestmark = pytest.mark.slow
+
 
 def silent(*told: object) -> None:
     pass
@@ -22,12 +24,14 @@ def statics() -> dict[tuple[str, float], Line]:
     return {(one.changed, round(one.factor, 9)): one for one in studies.of_statics(silent, layout=coarse_layout())}
 
 
+@pytest.mark.slow
 def test_the_base_case_changes_nothing() -> None:
     for changed in ("E", "r", "g", "EA alone", "EI alone"):
         assert statics()[changed, 1.0].change_max < 1e-9
         assert statics()[changed, 1.0].on == "7x7, statics"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.1, 10.0, 100.0])
 def test_modulus_and_gravity_count_by_their_ratio_alone(factor: float) -> None:
     """Weight over stiffness is all that statics knows: E times f is g over f."""
@@ -57,6 +61,7 @@ def test_stretch_is_what_keeps_g0_from_the_net() -> None:
     assert statics()["EI alone", 0.01].change_rms < 0.1 * statics()["EA alone", 100.0].change_rms
 
 
+@pytest.mark.slow
 def test_the_height_of_the_fall_does_not_matter() -> None:
     for one in studies.of_height(silent, factors=(10.0,)):
         assert one.rests == "converged"

@@ -8,7 +8,7 @@ import pytest
 from numpy.linalg import eigvalsh, norm
 
 from rodshell.model import Assembly, Freedom
-from rodshell.solve.linear import Qdldl, SingularError
+from rodshell.solve.sparse_ldl import Qdldl, SingularError
 
 BLOCKS = 14
 WIDTHS = (1, 2, 3, 5)  # blocks of a surface curvature, an edge, a bend, a bend with twist
@@ -192,14 +192,16 @@ def compressed(dense):
     return np.array(indptr), np.array(indices), np.array(data)
 
 
-def assert_inertia_and_solution(solver, dense, data):
+def assert_inertia_and_solution(solver, dense, data, reuse=None):
     eigenvalues = eigvalsh(dense)
-    assert solver.factor(data) == np.count_nonzero(eigenvalues < 0)
+    factors = solver.factor(data, reuse=reuse)
+    assert factors.negative == np.count_nonzero(eigenvalues < 0)
     x = np.random.default_rng(0).normal(size=len(dense))
-    found = solver.solve(dense @ x)
+    found = factors.solve(dense @ x)
     condition = np.abs(eigenvalues).max() / np.abs(eigenvalues).min()
     # 0.26 measured: factors without pivoting may grow, the refinement makes up for it
     assert norm(found - x) <= 2.0 * np.finfo(float).eps * condition * norm(x)
+    return factors
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -210,8 +212,7 @@ def test_solver_counts_negative_eigenvalues_and_solves(seed, negative):
     dense -= 0.5 * (eigenvalues[negative] + eigenvalues[negative + 1]) * np.eye(len(dense))
     indptr, indices, data = compressed(dense)
     solver = Qdldl(indptr, indices)
-    assert_inertia_and_solution(solver, dense, data)
-    assert solver.factor(data) == negative
+    assert assert_inertia_and_solution(solver, dense, data).negative == negative
 
 
 @pytest.mark.parametrize("side", [1e-9, -1e-9])
@@ -241,10 +242,10 @@ def test_solver_keeps_its_pattern_for_new_values():
     dense = chain_matrix(rng)
     indptr, indices, data = compressed(dense)
     solver = Qdldl(indptr, indices)
-    solver.factor(data)
+    factors = solver.factor(data)
     for shift in (20.0, 0.3, -20.0, 5.0):
         shifted = dense + shift * np.eye(len(dense))
-        assert_inertia_and_solution(solver, shifted, compressed(shifted)[2])
+        factors = assert_inertia_and_solution(solver, shifted, compressed(shifted)[2], reuse=factors)
 
 
 @pytest.mark.parametrize(
@@ -265,9 +266,8 @@ def test_values_that_are_not_finite_are_an_error():
         with pytest.raises(SingularError):
             Qdldl(indptr, indices).factor(np.array([1.0, bad, 3.0]))
     solver = Qdldl(indptr, indices)
-    solver.factor(data)
     with pytest.raises(SingularError):
-        solver.factor(np.array([1.0, np.nan, 3.0]))
+        solver.factor(np.array([1.0, np.nan, 3.0]), reuse=solver.factor(data))
 
 
 def test_solver_recovers_after_a_singular_system():
@@ -277,7 +277,7 @@ def test_solver_recovers_after_a_singular_system():
     solver = Qdldl(indptr, indices)
     with pytest.raises(SingularError):
         solver.factor(np.zeros_like(data))
-    assert_inertia_and_solution(solver, dense, data)
+    factors = assert_inertia_and_solution(solver, dense, data)
     with pytest.raises(SingularError):
-        solver.factor(np.zeros_like(data))
-    assert_inertia_and_solution(solver, dense, data)
+        solver.factor(np.zeros_like(data), reuse=factors)
+    assert_inertia_and_solution(solver, dense, data, reuse=factors)

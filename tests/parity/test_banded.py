@@ -5,10 +5,9 @@ import pytest
 from scipy.linalg import solveh_banded
 
 from rodshell.model import Freedom
-from rodshell.solve.banded import Banded
-from rodshell.solve.constraint import NO_CURVATURE
-from rodshell.solve.linear import SingularError
-from rodshell.solve.summed import WIDEST, SparseSum, narrow_or_sparse
+from rodshell.solve.newton_matrix import WIDEST, Banded, SparseSum, narrow_or_sparse
+from rodshell.solve.problem import NO_CURVATURE
+from rodshell.solve.sparse_ldl import SingularError
 
 BLOCKS = 40
 

@@ -9,7 +9,7 @@ import pytest
 from numba import config, njit
 
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
-from rodshell.solve.tiles import LANES, adding, multiplying
+from rodshell.solve.simd_kernels import LANES, adding, multiplying
 
 OWN = (1, 3, 4, 5, 8, 11, 33, 70, 140)
 MORE = (0, 1, 7, 8, 23, 24, 25, 60, 130)
@@ -130,6 +130,7 @@ def test_three_rows_times_a_vector():
     assert y[3] == 0.0
 
 
+@pytest.mark.slow
 def test_the_same_without_the_compiler():
     """The twins in NumPy do what the kernels do."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}

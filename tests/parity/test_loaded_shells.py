@@ -1,4 +1,4 @@
-"""Popped-up shells, unloaded and under their weight, against `LoadedTwin`, which shares none of our mechanics."""
+"""PopUp-up shells, unloaded and under their weight, against `LoadedTwin`, which shares none of our mechanics."""
 
 from functools import cache
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import reactions, self_weight, settled_shell
+from rodshell.checks import reactions, self_weight
 from rodshell.solve.critical import CLOSE
 from tests.checks.shells import ROD, dome
 from tests.parity.loaded_twin import LoadedTwin
@@ -50,11 +50,12 @@ def twin(name: str, ends: str) -> LoadedTwin:
     return LoadedTwin(form.popped[ends], form.rod)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ENDS)
 @pytest.mark.parametrize("name", SHELLS)
 def test_equilibrium_inertia_and_reactions_agree(name, ends):
     popped, other = shell(name).popped[ends], twin(name, ends)
-    held = reactions(*settled_shell(popped))
+    held = reactions(popped.shell, popped.equilibrium)
     largest = np.abs(held.forces).max()
     forces, moments = other.reactions(other.state)
     residual = other.residual(other.state)[: len(other.free) - len(other.angles)]
@@ -64,9 +65,11 @@ def test_equilibrium_inertia_and_reactions_agree(name, ends):
     assert other.factored(other.state)[1] == popped.report.negative_modes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHELLS)
 def test_the_share_of_its_own_weight_that_a_shell_bears_agrees(name):
-    found = self_weight(*settled_shell(shell(name).popped["pinned"]), most=2e3)
+    popped = shell(name).popped["pinned"]
+    found = self_weight(popped.shell, popped.equilibrium, most=2e3)
     other = twin(name, "pinned")
     factor, at_one = other.load_factor(COARSE)
     assert (1 - COARSE) * factor < found.load_factor / (1 - CLOSE)  # never less than stable,

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sparse
 
-from rodshell.solve import dense, multifrontal
-from rodshell.solve.linear import Qdldl, SingularError
-from rodshell.solve.multifrontal import Multifrontal
+from rodshell.solve import dense, sparse_ldl
 from rodshell.solve.ordering import dissect
+from rodshell.solve.sparse_ldl import Multifrontal, Qdldl, SingularError
 
 RANDOM = np.random.default_rng(20211)
 
@@ -40,13 +39,13 @@ def test_solution_and_inertia_are_those_of_the_dense_matrix(size, shift, placed)
     matrix = random_matrix(size, min(1.0, 4 / size), shift)
     triangle = upper(matrix)
     places = RANDOM.random((size, 2)) if placed else None
-    solver = Multifrontal(triangle.indptr, triangle.indices, places)
-    assert solver.factor(triangle.data) == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
+    factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
     right = RANDOM.standard_normal(size)
     scale = np.linalg.cond(matrix.toarray())
     exact = np.linalg.solve(matrix.toarray(), right)
     # unpivoted elimination may lose some digits, one step of refinement wins them back: 1e-14 cond measured
-    assert np.abs(solver.solve(right) - exact).max() <= 1e-11 * scale * np.abs(exact).max()
+    assert np.abs(factors.solve(right) - exact).max() <= 1e-11 * scale * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("directions", [1, 2, 3])
@@ -57,11 +56,11 @@ def test_grid_agrees_with_qdldl_and_dissection_saves_fill(directions):
     unplaced = Multifrontal(triangle.indptr, triangle.indices)
     reference = Qdldl(triangle.indptr, triangle.indices)
     right = RANDOM.standard_normal(matrix.shape[0])
-    inertia = {solver.factor(triangle.data) for solver in (placed, unplaced, reference)}
-    assert len(inertia) == 1
-    exact = reference.solve(right)
-    for solver in (placed, unplaced):
-        assert np.abs(solver.solve(right) - exact).max() < 1e-10 * np.abs(exact).max()
+    *ours, theirs = (solver.factor(triangle.data) for solver in (placed, unplaced, reference))
+    exact = theirs.solve(right)
+    for factors in ours:
+        assert factors.negative == theirs.negative
+        assert np.abs(factors.solve(right) - exact).max() < 1e-10 * np.abs(exact).max()
     assert placed.fill < 1.3 * unplaced.fill
 
 
@@ -71,10 +70,10 @@ def test_large_fronts_go_through_blas_and_still_agree():
     part = RANDOM.standard_normal((size, size))
     matrix = part + part.T + np.diag(np.where(np.arange(size) % 3, 60.0, -60.0))
     triangle = upper(matrix)
-    solver = Multifrontal(triangle.indptr, triangle.indices)
-    assert solver.factor(triangle.data) == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
+    factors = Multifrontal(triangle.indptr, triangle.indices).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
     right = RANDOM.standard_normal(size)
-    assert np.abs(matrix @ solver.solve(right) - right).max() < 1e-9
+    assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-9
 
 
 @pytest.mark.parametrize("bad", [False, True])
@@ -85,19 +84,20 @@ def test_threads_share_the_work_and_change_no_bit(monkeypatch, bad):
     if bad:
         triangle.data[triangle.indptr[1000] - 1] = np.nan
     for count in (1, 2, 5):
-        monkeypatch.setattr(multifrontal, "threads", lambda count=count: count)
+        monkeypatch.setattr(sparse_ldl, "threads", lambda count=count: count)
         solver = Multifrontal(triangle.indptr, triangle.indices, places)
-        assert len(solver._plan.part_start) > 6  # one thread alone would be no test
-        assert sorted(solver._plan.parts) == list(range(len(solver._plan.first) - 1))
+        assert len(solver.plan.part_start) > 6  # one thread alone would be no test
+        assert sorted(solver.plan.parts) == list(range(len(solver.plan.first) - 1))
         if bad:
             with pytest.raises(SingularError):
                 solver.factor(triangle.data)
             continue
-        found.append((solver.factor(triangle.data), solver.solve(right).tobytes()))
+        factors = solver.factor(triangle.data)
+        found.append((factors.negative, factors.solve(right).tobytes()))
     assert all(one == found[0] for one in found)
     if not bad:
-        reference = Qdldl(triangle.indptr, triangle.indices)
-        assert reference.factor(triangle.data) == found[0][0] > 0
+        reference = Qdldl(triangle.indptr, triangle.indices).factor(triangle.data)
+        assert reference.negative == found[0][0] > 0
         exact = reference.solve(right)
         assert np.abs(np.frombuffer(found[0][1]) - exact).max() < 1e-9 * np.abs(exact).max()
 
@@ -107,20 +107,38 @@ def test_blocks_whose_unknowns_are_coupled_differently():
     size, places = 60, np.repeat(RANDOM.random((20, 2)), 3, axis=0)
     matrix = random_matrix(size, 0.08, 9.0)
     triangle = upper(matrix)
-    solver = Multifrontal(triangle.indptr, triangle.indices, places)
-    assert solver.factor(triangle.data) == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
+    factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
     right = RANDOM.standard_normal(size)
-    assert np.abs(matrix @ solver.solve(right) - right).max() < 1e-12
+    assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-12
 
 
 def test_refactoring_the_same_pattern_forgets_the_old_values():
     matrix, places = grid_matrix(12)
     triangle = upper(matrix)
     solver = Multifrontal(triangle.indptr, triangle.indices, places)
-    solver.factor(-triangle.data)
-    assert solver.factor(triangle.data) == 0
+    factors = solver.factor(triangle.data, reuse=solver.factor(-triangle.data))
+    assert factors.negative == 0
     right = np.ones(matrix.shape[0])
-    assert np.abs(matrix @ solver.solve(right) - right).max() < 1e-9
+    assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", [Multifrontal, Qdldl])
+def test_factors_stay_as_they_are_whatever_else_is_factorised(kind):
+    """Nor can factors be used whose memory was given away."""
+    matrix, _ = grid_matrix(12)
+    triangle, right = upper(matrix), RANDOM.standard_normal(matrix.shape[0])
+    solver = kind(triangle.indptr, triangle.indices)
+    first = solver.factor(triangle.data)
+    before, other = first.solve(right), None
+    for scale in (-1.0, 3.0, 0.1):
+        other = solver.factor(scale * triangle.data, reuse=other)
+        np.testing.assert_allclose(other.solve(right), before / scale, rtol=1e-9)
+    np.testing.assert_array_equal(first.solve(right), before)
+    again = solver.factor(triangle.data, reuse=first)
+    np.testing.assert_array_equal(again.solve(right), before)
+    with pytest.raises(AssertionError, match="given to another"):
+        first.solve(right)
 
 
 def test_nearly_singular_system_is_solved_to_a_small_residual():
@@ -128,10 +146,10 @@ def test_nearly_singular_system_is_solved_to_a_small_residual():
     lowest = np.linalg.eigvalsh(matrix.toarray())[0]
     matrix = (matrix - (lowest - 1e-9) * sparse.eye(matrix.shape[0])).tocsc()
     triangle = upper(matrix)
-    solver = Multifrontal(triangle.indptr, triangle.indices, places)
-    assert solver.factor(triangle.data) == 0
+    factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+    assert factors.negative == 0
     right = RANDOM.standard_normal(matrix.shape[0])
-    x = solver.solve(right)
+    x = factors.solve(right)
     assert np.abs(matrix @ x - right).max() < 1e-12 * np.abs(x).max() * np.abs(triangle.data).max()
 
 
@@ -139,10 +157,10 @@ def test_digits_lost_to_a_small_pivot_are_won_back():
     """Elimination without pivoting loses eight digits here: 1e-8 beside entries of order 1."""
     matrix = np.array([[1e-8, 1.0, 0.3], [1.0, 1e-8, 0.7], [0.3, 0.7, 2.0]])
     triangle = upper(matrix)
-    solver = Multifrontal(triangle.indptr, triangle.indices, np.arange(3.0)[:, None])
-    assert solver.factor(triangle.data) == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
+    factors = Multifrontal(triangle.indptr, triangle.indices, np.arange(3.0)[:, None]).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
     exact = np.array([1.0, -2.0, 3.0]) / 7
-    assert np.abs(solver.solve(matrix @ exact) - exact).max() < 1e-14
+    assert np.abs(factors.solve(matrix @ exact) - exact).max() < 1e-14
 
 
 @pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
@@ -169,7 +187,7 @@ def test_what_memory_held_before_does_not_matter(monkeypatch):
     triangle, right = upper(matrix), RANDOM.standard_normal(matrix.shape[0])
     found = []
     for rubbish in (0.0, np.nan, 1e300):
-        make = multifrontal.room
+        make = sparse_ldl.room
 
         def filled(numbers, make=make, rubbish=rubbish):
             memory = make(numbers)
@@ -177,10 +195,9 @@ def test_what_memory_held_before_does_not_matter(monkeypatch):
             return memory
 
         with monkeypatch.context() as patched:
-            patched.setattr(multifrontal, "room", filled)
+            patched.setattr(sparse_ldl, "room", filled)
             patched.setattr(dense, "room", filled)
-            solver = Multifrontal(triangle.indptr, triangle.indices, places)
-            solver.factor(triangle.data)
-            found.append(solver.solve(right))
+            factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+            found.append(factors.solve(right))
     np.testing.assert_array_equal(found[1], found[0])
     np.testing.assert_array_equal(found[2], found[0])

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 import rodshell as rs
-from rodshell.contact.bound import BoundToTarget
+from rodshell.contact.static import BoundToTarget
 from rodshell.model import Assembly, Shell
 from rodshell.rods.stretch import Stretch
 
@@ -237,6 +237,7 @@ class Lagrangian:
         return dense_directions(self.constraint.freedom(x)).T @ self.twin.gradient(x, forces).ravel()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hemisphere", "ellipsoid, turned", "hill"])
 def test_hessian_with_the_surfaces_curvature_is_the_derivative_of_the_gradient_along_the_surface(name):
     lagrangian = Lagrangian(drape_case(name, edge=0.017), 0.0)
@@ -362,6 +363,7 @@ def test_end_directions_point_outwards_and_down_along_the_rods():
             np.testing.assert_allclose(boundary.tangents[2 * k : 2 * k + 2], [[0, 0, -1]] * 2, rtol=0, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_many_short_edges_take_no_more_factorisations_than_few_long_ones():
     """Bending outweighs a penalty that does not follow the edge length: forces then settle slowly."""
     few, many = (

@@ -5,7 +5,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.cli import main
-from rodshell.formfinding.flatness import is_flat, least_rise, rise
+from rodshell.formfinding.section_limits import is_flat, least_rise, rise
 from tests.acceptance.targets_broken import as_obj
 from tests.targets.meshes import sheet
 
@@ -68,13 +68,14 @@ def test_a_plane_is_called_one(name: str) -> None:
 
 
 def test_a_flat_target_in_patches_is_flat_too() -> None:
-    sewn = rs.sew(dome(0.001), [[(-1.0, 0.0), (1.0, 0.0)]], GRID, ROD)
+    sewn = rs.find_form(dome(0.001), GRID, ROD, seams=[[(-1.0, 0.0), (1.0, 0.0)]])
     result = sewn.archive().results.plain()
     assert result["target"]["flat"] is True
     assert sewn.warnings[0].startswith("the target is flat, nothing pops up: it rises by 1 mm only")
     assert sum("flat" in words for words in sewn.warnings) == 1
 
 
+@pytest.mark.slow
 def test_the_command_line_ends_with_4_on_a_flat_mesh(tmp_path, capsys) -> None:
     (tmp_path / "floor.obj").write_bytes(as_obj(*sheet(lambda x, y: 0.3 * x, 2.0, 12)))
     out = tmp_path / "out"

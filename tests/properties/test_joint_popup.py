@@ -8,12 +8,10 @@ import pytest
 from numpy.linalg import norm
 
 import rodshell as rs
-from rodshell.checks.joint_loads import joint_loads
-from rodshell.checks.reactions import reactions
-from rodshell.joints.crossings import Places
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.checks.support_and_joint_loads import joint_loads, reactions
+from rodshell.joints.crossings import RodNodes
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 SPACING = 0.05
@@ -48,7 +46,9 @@ def popped(name, ends="clamped", start="draped"):
 def settled(shell, state, forces):
     """One Newton step further, for forces to round-off."""
     supports = Supports(shell.held_ends())
-    return find_equilibrium(Problem(shell.elements, shell.stretch, supports, 0.2, places=shell.places), state, forces)
+    return find_equilibrium(
+        Problem(shell.elements, shell.stretch, supports, 0.2, flat_coordinates=shell.flat_coordinates), state, forces
+    )
 
 
 @every_joint
@@ -58,6 +58,7 @@ def test_every_joint_pops_up_to_a_stable_shell(name):
     assert report.stable
 
 
+@pytest.mark.slow
 @every_joint
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_each_rod_is_in_balance_under_its_supports_and_its_joints(name, ends):
@@ -67,7 +68,7 @@ def test_each_rod_is_in_balance_under_its_supports_and_its_joints(name, ends):
     shell = shell.with_elements(found.elements)
     loads, held = joint_loads(shell, found.state), reactions(shell, found)
     crossings, positions = shell.mesh.grid.crossings, found.state[shell.node_blocks]
-    places = Places(shell.mesh, shell.node_blocks, shell.first_angle).of_crossings
+    places = RodNodes(shell.mesh, shell.node_blocks, shell.first_angle).at_crossings
     for rod in range(len(shell.mesh.grid.rods)):
         force, moment = np.zeros(3), np.zeros(3)
         for end in (2 * rod, 2 * rod + 1):
@@ -132,12 +133,12 @@ def test_joints_may_differ_from_place_to_place():
     assert between.report.stable
     apart = [norm(between.positions - popped(name).positions) for name in ("ball", "rigid")]
     assert min(apart) > 0.1 * norm(popped("ball").positions - popped("rigid").positions)
-    with pytest.raises(rs.InputError, match=f"{count} crossings: give one for all, or as many, not 3"):
+    with pytest.raises(rs.InputError, match=f"{count} crossings: give one value for all, or one for each, not 3"):
         rs.pop_up(rs.map_back(cut), cut.boundary, ROD, joint=mixed[:3])
 
 
 def test_a_gravity_drape_with_pins_ends_where_one_with_balls_does():
-    """Pins cost nothing (numerics.md, section 2): they scissor freely, and the rods hardly twist."""
+    """Pins turn freely about the normal, and the rods hardly twist (docs/theory.md, The gravity drape)."""
     layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=SPACING, length=0.9, edge=0.0126)
     lengths = []
     for joint in (rs.Ball(), rs.Pin()):
@@ -151,7 +152,7 @@ def test_three_rods_at_one_node_have_one_kind_of_joint():
     grid = rs.straight_rods([[[-1, 0], [1, 0]], [[0, -1], [0, 1]], [[-1, -1], [1, 1]]])
     mesh = rs.mesh_grid(grid, 0.25)
     for other in (rs.Linker(), rs.Ball(), rs.Rigid()):
-        with pytest.raises(rs.InputError, match="give all of them one kind"):
+        with pytest.raises(rs.InputError, match="give all of them the same kind"):
             rs.Shell.of(mesh, ROD, joint=[rs.Pin(), rs.Pin(), other])
 
 

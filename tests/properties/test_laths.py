@@ -34,6 +34,7 @@ def test_nearly_round_rods_pop_up_as_round_ones():
     np.testing.assert_allclose(nearly.positions, round_rods.positions, atol=1e-9 * TARGET.radius)  # 3e-12 measured
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])
 def test_flat_and_upright_laths_pop_up(ends):
     """A dome of flat laths comes nearer to its target than one of laths on edge: these do not like to be curved."""

@@ -7,16 +7,15 @@ import pytest
 from numpy.linalg import norm
 
 import rodshell as rs
+from rodshell.case.rod_ends import read_result
 from rodshell.checks.bending import bending_of
-from rodshell.cli.rodends import read_result
-from rodshell.formfinding.thickness import strong_bending
+from rodshell.formfinding.section_limits import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.vectors import unit
 from rodshell.nets.sphere import crossing_angle
 from rodshell.output.grid import joint_places
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import Status
 
 R, APART = 0.2, 4e-3
@@ -97,6 +96,7 @@ def test_stresses_of_two_layers_are_those_of_rods_along_their_own_lines():
     assert stress[1] == pytest.approx(stress[0], rel=0.1)
 
 
+@pytest.mark.slow
 def test_two_layers_rise_from_flat_to_the_state_that_the_drape_releases_to():
     found = form("hemisphere")
     for ends in ("pinned", "clamped"):
@@ -129,6 +129,7 @@ def test_an_eccentric_spring_that_lets_rods_roll_is_refused():
         assert rs.Spring(0.1, *stiffness, eccentricity=1e-3).holds_normals
 
 
+@pytest.mark.slow
 def test_the_archive_shows_both_layers_and_joints_between_them():
     archive = form("ellipsoid").archive()
     mesh = form("ellipsoid").footprint.mesh
@@ -143,7 +144,7 @@ def test_the_archive_shows_both_layers_and_joints_between_them():
 def test_seams_join_points_between_the_layers():
     seam = np.array([[0.02, -0.5], [0.05, 0.5]])
     target = rs.Ellipsoid(a=0.3, b=0.2, c=0.12)
-    sewn = rs.sew(target, [seam], layout(0.06), ROD, joint=PIN, ends=("clamped",))
+    sewn = rs.find_form(target, layout(0.06), ROD, seams=[seam], joint=PIN, ends=("clamped",))
     assert sewn.status == "converged"
     assert max(sewn.moved.values()) < 1e-3 * R  # nets of one surface would miss each other by h/R
     for meeting in sewn.meetings:
@@ -202,7 +203,9 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
     cut = rs.trim(draped)
     released = rs.Shell.of(cut.mesh, rod, joint=rs.Pin())
     state = released.state(cut.positions, normals=target.on_surface(cut.positions).normal)
-    problem = Problem(released.elements, released.stretch, Supports(released.held_ends()), 2.0, places=released.places)
+    problem = Problem(
+        released.elements, released.stretch, Supports(released.held_ends()), 2.0, flat_coordinates=released.places
+    )
     counted = find_equilibrium(problem, state, np.zeros(len(cut.mesh.edges)), most_modes=0)
     assert (counted.report.status is Status.BUCKLED) == buckles
 
@@ -229,6 +232,7 @@ def test_laths_that_buckle_everywhere_are_given_up_at_once_with_the_cause():
     assert "dips" not in words
 
 
+@pytest.mark.slow
 def test_popup_of_a_result_in_two_layers_is_refused(tmp_path):
     folder = form("ellipsoid").archive().save(tmp_path / "oval", kinds=())
     with pytest.raises(rs.InputError, match="two layers 4 mm apart, and popup joins its rods at one point"):

@@ -15,12 +15,12 @@ from threadpoolctl import threadpool_limits
 
 import rodshell as rs
 from rodshell.errors import InputError
-from rodshell.formfinding.draped import node_normals
+from rodshell.formfinding.layers import node_normals
 from rodshell.model import Shell
 from rodshell.solve import newton_step
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import find_equilibrium, find_stable
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium, find_stable
+from rodshell.solve.problem import Problem, Supports
+from tests.properties.altered import at_positions
 
 SIZE = 0.2  # of all targets [m]
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -174,6 +174,7 @@ def test_from_flat_and_from_draped_one_arrives_at_the_same_shell(name, ends):
     np.testing.assert_allclose(flat.positions, popped_on(name, ends).positions, rtol=0, atol=1e-9 * SIZE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["draped", "flat"])
 @both_ends
 def test_a_bowl_pops_down_as_its_mirror_image_pops_up(ends, start):
@@ -283,7 +284,7 @@ def test_clamps_bring_a_convex_shell_much_closer_to_its_target_than_pins():
 def sphere_shell():
     """A popped-up shell put exactly on the sphere: its nodes are those of the drape."""
     trimmed = trimmed_on("hemisphere")
-    return replace(popped_on("hemisphere", "clamped"), positions=trimmed.positions.copy())
+    return at_positions(popped_on("hemisphere", "clamped"), trimmed.positions.copy())
 
 
 def test_a_shell_on_its_target_has_no_gap_but_that_of_its_edge_middles():
@@ -296,7 +297,7 @@ def test_a_shell_on_its_target_has_no_gap_but_that_of_its_edge_middles():
 @pytest.mark.parametrize("share", [0.01, -0.02])
 def test_a_shell_offset_by_a_known_amount_has_that_gap_everywhere(share):
     shell = sphere_shell()
-    offset = rs.agreement(replace(shell, positions=(1 + share) * shell.positions), TARGETS["hemisphere"])
+    offset = rs.agreement(at_positions(shell, (1 + share) * shell.positions), TARGETS["hemisphere"])
     np.testing.assert_allclose(offset.gaps, share * SIZE, rtol=0, atol=1e-14)  # positive outside
     assert offset.max == pytest.approx(abs(share) * SIZE, abs=5e-6 * SIZE)  # see above
     assert offset.rms == pytest.approx(abs(share) * SIZE, abs=1e-6 * SIZE)
@@ -322,7 +323,7 @@ def test_a_gap_between_two_nodes_is_seen():
     """Nodes on the sphere, edges of 50 mm: rods that are curved between them, not chords, which lie 1.6 mm inside."""
     trimmed = trimmed_on("hemisphere", 0.05)
     shell = rs.pop_up(rs.map_back(trimmed), trimmed.boundary, ROD, ends="clamped")
-    on_nodes = rs.agreement(replace(shell, positions=trimmed.positions), TARGETS["hemisphere"])
+    on_nodes = rs.agreement(at_positions(shell, trimmed.positions), TARGETS["hemisphere"])
     assert np.abs(on_nodes.gaps).max() < 1e-15
     assert 1e-5 < on_nodes.max < 0.1 * 0.05**2 / (8 * SIZE)  # 4.7e-5 m
 
@@ -353,7 +354,9 @@ def test_long_steps_are_cut_and_lead_to_the_same_shell_in_a_fraction_of_the_fact
     assert cut.report.stable
     assert cut.report.factorizations < 20
     shell = Shell.of(trimmed.mesh, lath, clamped=False, joint=joint)
-    problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), 5.0, places=shell.places)
+    problem = Problem(
+        shell.elements, shell.stretch, Supports(shell.held_ends()), 5.0, flat_coordinates=shell.flat_coordinates
+    )
     draped = trimmed.boundary.draped
     normals = node_normals(trimmed.mesh, draped) if shell.angles else None
     whole = find_stable(problem, shell.state(draped, None, normals), np.zeros(len(trimmed.mesh.edges)))

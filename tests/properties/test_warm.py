@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.formfinding.carried import carried_edges, carried_nodes, corresponding
-from rodshell.nets import nearby
+from rodshell.formfinding.warm_start import corresponding_rods, transferred_edges, transferred_nodes
+from rodshell.nets import net_refinement
 from rodshell.nets.chebyshev import chebyshev_net
 from rodshell.nets.compass import march
-from rodshell.nets.nearby import march_near
+from rodshell.nets.net_refinement import march_near
+from tests.properties.altered import at_positions
 
 SIZE = 0.2
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -78,7 +79,7 @@ def test_a_bad_guess_of_the_net_does_no_harm(worse):
 
 def test_what_has_not_settled_is_marched(monkeypatch):
     """After one round from a rough net no node has."""
-    monkeypatch.setattr(nearby, "ROUNDS", 1)
+    monkeypatch.setattr(net_refinement, "ROUNDS", 1)
     anchor, heading = np.array([0.0, 0.0, SIZE]), np.array([1.0, 0.0, 0.0])
     u, rough = lines(0.3, 0.01), lines(0.32, 0.04)
     found = march_near(HEMISPHERE, u, u, anchor, heading, march(HEMISPHERE, rough, rough, anchor, heading)).points
@@ -93,7 +94,7 @@ def test_a_net_found_near_another_asks_the_target_less_often(monkeypatch):
         monkeypatch.setattr(rs.HeightField, name, lambda self, x, say=answer: asked.append(len(x)) or say(self, x))
     chebyshev_net(BUMPS, layout)
     cold, asked[:] = len(asked), []
-    chebyshev_net(BUMPS, layout, near=last)
+    chebyshev_net(BUMPS, layout, warm_start=last)
     assert len(asked) < 0.1 * cold  # 16 against 467
 
 
@@ -117,12 +118,13 @@ def last():
     return rs.find_form(OVAL, layout_of(), ROD, anchor=(0.02, 0.01))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_form_found_from_the_last_one_is_the_form_found_from_nothing(change, last):
     target, layout, options = CHANGES[change]
     options = {"anchor": (0.02, 0.01)} | options
     cold = rs.find_form(target, layout_of(**layout), ROD, **options)
-    warm = rs.find_form(target, layout_of(**layout), ROD, start=last, **options)
+    warm = rs.find_form(target, layout_of(**layout), ROD, warm_start=last, **options)
     assert cold.status == warm.status == "converged"
     assert [rod.name for rod in warm.footprint.rods] == [rod.name for rod in cold.footprint.rods]
     assert largest(warm.footprint.points - cold.footprint.points) < EXACT
@@ -135,7 +137,7 @@ def test_a_form_found_from_the_last_one_is_the_form_found_from_nothing(change, l
 def test_stiffer_rods_start_with_the_forces_that_they_need(last):
     """The shape does not change: from the last form there is nothing left to do but to see it."""
     stiff = rs.Rod(section=ROD.section, material=rs.Material(youngs_modulus=1e9, density=1e3))
-    warm = rs.find_form(OVAL, layout_of(), stiff, anchor=(0.02, 0.01), start=last)
+    warm = rs.find_form(OVAL, layout_of(), stiff, anchor=(0.02, 0.01), warm_start=last)
     for popped in warm.popped.values():
         assert popped.report.iterations == 1
         assert popped.report.stable
@@ -144,7 +146,7 @@ def test_stiffer_rods_start_with_the_forces_that_they_need(last):
 def test_a_shell_that_springs_off_takes_fewer_steps_from_the_last_one():
     last = rs.find_form(BUMPS, layout_of(), ROD)
     again = layout_of(spacing=0.0505)
-    cold, warm = (rs.find_form(BUMPS, again, ROD, start=start) for start in (None, last))
+    cold, warm = (rs.find_form(BUMPS, again, ROD, warm_start=start) for start in (None, last))
     for ends in cold.popped:
         assert warm.popped[ends].report.factorizations <= 0.75 * cold.popped[ends].report.factorizations
         assert largest(warm.popped[ends].positions - cold.popped[ends].positions) < SETTLED
@@ -154,10 +156,19 @@ def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last)
     """Half inside out: from there Newton's method finds the shell that is popped down, stable too, or nothing."""
     for form in (last, rs.find_form(HEMISPHERE, layout_of(), ROD, ends=("pinned",))):
         popped, trimmed = form.popped["pinned"], form.trimmed
-        down = replace(popped, positions=popped.positions * [1.0, 1.0, -0.85])
-        again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", start=down)
+        down = at_positions(popped, popped.positions * [1.0, 1.0, -0.85])
+        again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", warm_start=down)
         assert again.report.stable
         assert largest(again.positions - popped.positions) < SETTLED
+
+
+def test_a_warm_start_that_would_be_ignored_is_refused(last):
+    """An earlier pop-up serves the same ends, and no start from flat."""
+    popped, boundary = last.popped["pinned"], last.trimmed.boundary
+    with pytest.raises(rs.InputError, match="has pinned ends, not clamped"):
+        rs.pop_up(last.footprint, boundary, ROD, ends="clamped", warm_start=popped)
+    with pytest.raises(rs.InputError, match='first guess for start="draped" alone'):
+        rs.pop_up(last.footprint, boundary, ROD, ends="pinned", start="flat", warm_start=popped)
 
 
 # What is carried
@@ -166,23 +177,23 @@ def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last)
 def test_fields_are_carried_unchanged_to_the_same_mesh_and_linear_ones_to_any(last):
     mesh = last.footprint.mesh
     field = np.column_stack([mesh.flat[:, 0], np.sin(30 * mesh.flat[:, 1])])
-    np.testing.assert_allclose(carried_nodes(field, mesh, mesh), field, atol=1e-12)
+    np.testing.assert_allclose(transferred_nodes(field, mesh, mesh), field, atol=1e-12)
     forces = np.cos(np.arange(len(mesh.edges)))
-    np.testing.assert_allclose(carried_edges(forces, mesh, mesh), forces, atol=1e-12)
+    np.testing.assert_allclose(transferred_edges(forces, mesh, mesh), forces, atol=1e-12)
     fine = rs.find_form(OVAL, layout_of(edge=0.005), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
     straight = mesh.flat[:, :1]
-    carried = carried_nodes(straight, mesh, fine)
+    carried = transferred_nodes(straight, mesh, fine)
     np.testing.assert_allclose(carried, fine.flat[:, :1], atol=1e-6)  # rods differ by 3e-7 m in length
 
 
 def test_rods_without_a_counterpart_get_nothing(last):
     mesh = last.footprint.mesh
     few = rs.find_form(OVAL, layout_of(rods=(5, 4)), ROD, anchor=(0.02, 0.01), ends=()).footprint.mesh
-    pairs = dict(corresponding(few, mesh))
+    pairs = dict(corresponding_rods(few, mesh))
     offsets = {mesh.grid.rods[new].offset: few.grid.rods[old].offset for new, old in pairs.items()}
     assert all(abs(new - old) < 1e-12 for new, old in offsets.items())
     assert 0 < len(pairs) < len(mesh.grid.rods)
-    carried = carried_nodes(np.ones((few.node_count, 1)), few, mesh)
+    carried = transferred_nodes(np.ones((few.node_count, 1)), few, mesh)
     only = np.setdiff1d(np.arange(len(mesh.grid.rods)), list(pairs))
     alone = np.setdiff1d(
         np.concatenate([mesh.nodes_of(k) for k in only]), np.concatenate([mesh.nodes_of(k) for k in pairs])

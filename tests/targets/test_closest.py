@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.targets.closest import newton_to_closest, shape_operators
+from rodshell.targets.target import newton_to_closest, shape_operators
 from tests.targets.meshes import PARTS, Floats
 
 COUNT = 200

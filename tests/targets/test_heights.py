@@ -9,9 +9,7 @@ import pytest
 from PIL import Image
 
 import rodshell as rs
-from rodshell.targets.greyimage import read_image, smoothed
-from rodshell.targets.heightgrid import read_heights
-from rodshell.targets.heighttable import read_table
+from rodshell.targets.height_files import read_heights, read_image, read_table, smoothed
 
 SIZE = (12.0, 8.0)
 X, Y = np.meshgrid(np.linspace(-6, 6, 13), np.linspace(4, -4, 9))
@@ -62,17 +60,17 @@ def test_points_lie_where_they_say_in_unequal_steps_scaled_and_centred(tmp_path)
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (points(np.arange(X.size - 1)), "seems to hold points x, y, z: 116 with 13 different x and 9 different y"),
-        (points([*range(X.size - 1), 0]), "no whole lattice: sample heights on a lattice"),
-        (rows([(0, 0, 1), (1, 0, 1), (np.nan, 1, 1), (1, 1, 1)]), "some have no x or y"),
+        (points(np.arange(X.size - 1)), "seems to have points x, y, z: 116 with 13 different x and 9 different y"),
+        (points([*range(X.size - 1), 0]), "not a complete lattice: sample one height"),
+        (rows([(0, 0, 1), (1, 0, 1), (np.nan, 1, 1), (1, 1, 1)]), "some lack x or y"),
         (rows(np.vstack([X[0], Z])), r"its first row seems to hold coordinates \(-5 to 6 in equal steps\) and not"),
         (rows(np.column_stack([Y[:, 0], Z])), r"its first column seems to hold coordinates \(3 to -4 in"),
         ("\n".join([rows([np.r_[-6.0, X[0]]]).replace("-6.0000", "", 1), rows(np.column_stack([Y[:, 0], Z]))]),
          r"its first row seems to hold coordinates \(-6 to 6 in"),
         (",".join("abcdefghijklm") + "\n" + rows(Z), r"its first row is a header \(a, b, c, .*\): delete it"),
         ("1,2,3\n1,2\n", "its rows have 2 to 3 heights"),
-        (rows(Z).replace("2", "x", 1), "is no table of numbers"),
-        (rows(Z, ";", ",").replace(",", ".,", 1), "is no table of numbers"),
+        (rows(Z).replace("2", "x", 1), "is not a table of numbers"),
+        (rows(Z, ";", ",").replace(",", ".,", 1), "is not a table of numbers"),
     ],
 )  # fmt: skip
 def test_what_is_no_lattice_of_heights_is_refused_in_one_sentence(text, message, tmp_path):

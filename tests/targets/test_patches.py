@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from rodshell.targets import Freeform
-from rodshell.targets.fitting import Samples, _ring, fit_field
-from rodshell.targets.patches import PatchField
+from rodshell.targets.field_fitting import Samples, _ring, fit_field
+from rodshell.targets.smooth_field import SmoothField
 from tests.targets.meshes import PARTS, Floats, capped_sphere, sheet, strewn
 
 
 @cache
-def field(name: str) -> PatchField:
+def field(name: str) -> SmoothField:
     return Freeform.of(*PARTS[name]()).field
 
 
-def around(patches: PatchField, off: float, count: int = 300) -> Floats:
+def around(patches: SmoothField, off: float, count: int = 300) -> Floats:
     """Points up to `off` spacings off the patches, on both sides and past the rim too."""
     rng = np.random.default_rng(3)
     chosen = rng.integers(0, len(patches.centres), count)
@@ -69,6 +69,7 @@ def test_far_from_every_patch_there_is_no_field():
     assert np.isnan(patches.implicit(far).value).tolist() == [True, False, True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "order"), [("value", 4), ("normal", 3), ("curvature", 2)])
 def test_fit_to_a_sphere_converges(kind, order):
     """Cubics miss a sphere by the fourth power of their size, its normals by the third, its curvature by the second.
@@ -180,7 +181,7 @@ def test_points_may_come_in_any_order_and_number(off):
 def test_a_new_patch_lies_in_the_mean_of_what_its_neighbours_say():
     """Three level patches in a row, the outer two higher by 0.2 spacings: between two of them it is half way up."""
     centres = np.array([[-1.0, 0.0, 0.2], [0.0, 0.0, 0.0], [1.0, 0.0, 0.2]])
-    patches = PatchField(centres, np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 10)), 1.0, 5.0)
+    patches = SmoothField(centres, np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 10)), 1.0, 5.0)
     added = _ring(patches, np.array([[0.5, 0.0, 0.7], [0.0, 0.3, 0.0]]))
     near, far = np.exp(-np.array([0.5**2 + 0.5**2, 1.5**2 + 0.5**2]) / 1.44)
     above = np.exp(-(0.5**2 + 0.7**2) / 1.44)

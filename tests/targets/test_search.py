@@ -66,6 +66,7 @@ def test_gap_is_that_of_the_clamped_pop_up():
     assert found.best.value == pytest.approx(form.agreement["clamped"].rms_relative, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_command_line_searches_shows_the_table_and_keeps_numbers(tmp_path: Path, capsys) -> None:
     out = tmp_path / "out"
     arguments = ["form", "ellipsoid", "--rotate", "auto", "--spacing", "50mm", "--rods", "auto", "--length", "auto"]

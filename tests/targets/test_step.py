@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.targets import step
+from rodshell.targets import nurbs_files
 from tests.targets.meshes import Floats
 from tests.targets.stepfile import StepFile
 
@@ -33,7 +33,7 @@ def test_a_face_is_its_surface(tmp_path):
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     target = rs.surface_from(written(tmp_path / "saddle.step", saddle()))
     xy = plan(0.18)
-    assert target.height(xy) == pytest.approx((xy[:, 0] ** 2 - xy[:, 1] ** 2) / 0.8, abs=2e-7)
+    assert target.height_at(xy) == pytest.approx((xy[:, 0] ** 2 - xy[:, 1] ** 2) / 0.8, abs=2e-7)
     assert target.size == pytest.approx(0.2, rel=1e-5)
     edge = np.array([[0.19, 0.0, 0.19**2 / 0.8], [0.0, -0.15, -(0.15**2) / 0.8]])
     # to x = 0.2 and y = -0.2 along the surface, whose slope there is a half
@@ -41,6 +41,7 @@ def test_a_face_is_its_surface(tmp_path):
     assert target.margin(edge) == pytest.approx(exact, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_splines_with_inner_knots_are_met(tmp_path):
     """A plane as a cubic of two spans each way, raised at the control point in the middle."""
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
@@ -51,9 +52,10 @@ def test_splines_with_inner_knots_are_met(tmp_path):
     file = StepFile("m")
     file.patch(controls, 3, knots)
     target = rs.surface_from(written(tmp_path / "bent.stp", file))
-    assert target.height(np.zeros((1, 2))) == pytest.approx(0.8 * 0.5**2, abs=1e-4)  # the middle spline is 1/2 there
+    assert target.height_at(np.zeros((1, 2))) == pytest.approx(0.8 * 0.5**2, abs=1e-4)  # the middle spline is 1/2 there
 
 
+@pytest.mark.slow
 def test_a_face_ends_where_its_edge_is(tmp_path):
     """On a sphere at the circle that bounds it, on a plane at the trim; the file is in millimetres."""
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
@@ -73,29 +75,30 @@ def test_a_face_ends_where_its_edge_is(tmp_path):
         assert disc.margin(radius * ring) == pytest.approx(0.15 - radius, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_of_several_faces_one_is_chosen_by_name_or_number(tmp_path):
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     file = saddle(name="roof")
     file.cap(0.2, 0.05, "cap")
     path = written(tmp_path / "house.step", file)
-    there = r'\(there: 1, "roof"; 2, "cap"\)'
+    there = r'\(available: 1, "roof"; 2, "cap"\)'
     with pytest.raises(rs.InputError, match=f"has 2 faces: choose one by its name or number {there}"):
         rs.surface_from(path)
     with pytest.raises(rs.InputError, match=f'has 0 faces named "wall": .* {there}'):
         rs.surface_from(path, name="wall")
     for name, top in (("cap", 0.2), ("1", 0.0)):
         target = rs.surface_from(path, name=name)
-        assert target.height(np.zeros((1, 2))) == pytest.approx(top, abs=1e-6)
+        assert target.height_at(np.zeros((1, 2))) == pytest.approx(top, abs=1e-6)
         assert target.parameters() == {"kind": "nurbs", "object": name, "file": str(path)}  # as in a case file
 
 
 def test_a_unit_beside_that_of_the_file_is_refused(tmp_path):
-    with pytest.raises(rs.InputError, match="say their unit: leave it out, or scale the target"):
+    with pytest.raises(rs.InputError, match="state their unit: leave it out, or scale the target"):
         rs.surface_from(written(tmp_path / "saddle.step", saddle()), unit=1e-3)
 
 
 def test_without_opencascade_the_sentence_says_how_to_get_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(step, "find_spec", lambda name: None)
+    monkeypatch.setattr(nurbs_files, "find_spec", lambda name: None)
     with pytest.raises(rs.InputError, match=r'pip install "rodshell\[step\]"'):
         rs.surface_from(written(tmp_path / "saddle.step", saddle()))
 
@@ -110,8 +113,8 @@ def test_without_opencascade_the_sentence_says_how_to_get_it(tmp_path, monkeypat
 )
 def test_a_reader_that_falls_or_hangs_is_told_of_in_one_sentence(does, said, tmp_path, monkeypatch):
     (tmp_path / "reader.py").write_text(does)
-    monkeypatch.setattr(step, "READER", tmp_path / "reader.py")
-    monkeypatch.setattr(step, "LONGEST", 1.0)
-    monkeypatch.setattr(step, "find_spec", lambda name: True)
+    monkeypatch.setattr(nurbs_files, "READER", tmp_path / "reader.py")
+    monkeypatch.setattr(nurbs_files, "LONGEST", 1.0)
+    monkeypatch.setattr(nurbs_files, "find_spec", lambda name: True)
     with pytest.raises(rs.InputError, match=said):
         rs.surface_from(written(tmp_path / "saddle.step", saddle()))

@@ -35,7 +35,7 @@ from rodshell.units import rounded_down, shown
 
 if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
-    from rodshell.formfinding.sewn import PatchLayout
+    from rodshell.formfinding.patches import PatchLayout
     from rodshell.layout import GridLayout
     from rodshell.targets import Target
 
@@ -146,7 +146,7 @@ class PatchTable(Table):
     spacing: Lengths | None = Field(default=None, description="between neighbouring rods: one length, or u,v")
 
     def build(self) -> "PatchLayout":
-        from rodshell.formfinding.sewn import PatchLayout
+        from rodshell.formfinding.patches import PatchLayout
 
         return PatchLayout(self.anchor, self.rotate, self.spacing)
 
@@ -163,7 +163,7 @@ class SeamsTable(Table):
         """The lines of the file become lines of the case, which then needs the file no longer."""
         if given.get("file") is None:
             return given
-        from rodshell.targets.curvefile import read_lines
+        from rodshell.targets.mesh_files import read_lines
 
         rest = {key: value for key, value in given.items() if key not in ("file", "unit")}
         try:

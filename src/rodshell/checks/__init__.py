@@ -1,13 +1,12 @@
-"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat, its own weight."""
+"""Is it safe to build: bending and stress, contact, reactions, deployment, own weight, other shapes."""
 
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures
-from rodshell.checks.check import Checks, check, settled_shell
+from rodshell.checks.check import Checks, check
 from rodshell.checks.contact import Contact, contact_of
 from rodshell.checks.deployment import Deployment, Elsewhere, deploy
-from rodshell.checks.joint_loads import JointLoads, joint_loads
 from rodshell.checks.other_shapes import OtherShape, OtherShapes, other_shapes
-from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight
+from rodshell.checks.support_and_joint_loads import JointLoads, Reactions, joint_loads, reactions
 
 __all__ = [
     "Bending",
@@ -30,5 +29,4 @@ __all__ = [
     "other_shapes",
     "reactions",
     "self_weight",
-    "settled_shell",
 ]

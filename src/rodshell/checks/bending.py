@@ -12,22 +12,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.formfinding.draped import node_normals
+from rodshell.formfinding.layers import node_normals
 from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.fibres import (
+from rodshell.rods.section import Circle, Rod, Tube
+from rodshell.rods.section_stress import (
     VON_MISES,
     fibre_distance,
     fibre_modulus,
     fibre_strain,
-    knows_stress,
     largest_stress,
+    stress_is_known,
     torsion_stress,
 )
-from rodshell.rods.section import Circle, Rod, Tube
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Bending:
     ----------
     curvature : [1/m].
     axial_strain : [-], mean of the edges on both sides.
-    stress : the largest over the section of bending, stretch and torsion together [Pa], see `rods.fibres`; None where
-        the section's fibres are not known.
+    stress : the largest over the section of bending, stretch and torsion together [Pa], see
+        `rods.section_stress`; None where the section's fibres are not known.
     strain : of the outermost fibre, bending and axial; None as the stress.
     normal_curvature, geodesic_curvature : parts of the curvature out of the shell and within it [1/m]; None where
         no rods cross.
@@ -97,7 +97,7 @@ def bending(
         upper bound, as if it bent towards its farthest point.
     twist_rate : (k,) twist per length [rad/m]; without, none.
     normals : (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without `components`.
-    shear_weight : of the shear stress against the normal stress, see `rods.fibres`.
+    shear_weight : of the shear stress against the normal stress, see `rods.section_stress`.
     """
     turns, tangents = _turns(mesh, positions, clamps)
     curvature, axial = np.linalg.norm(turns, axis=1), axial_strains(mesh, positions)
@@ -107,7 +107,7 @@ def bending(
         normal, geodesic = components.T
     elif normals is not None:
         normal, geodesic = _parts(turns, tangents, normals)
-    fibre, known = fibre_distance(rod), knows_stress(rod, twisted=bool(twist.any()))
+    fibre, known = fibre_distance(rod), stress_is_known(rod, twisted=bool(twist.any()))
     if fibre is not None:
         bent = fibre * curvature if components is None else fibre_strain(rod, components[:, 0], components[:, 1])
         strain = bent + np.abs(axial)
@@ -122,7 +122,7 @@ def bending(
 
 def rod_frames(shell: Shell) -> BendTwist | None:
     """The elements that carry the rods' material frames; None where no twist angles are carried."""
-    return next((one for one in shell.within if isinstance(one, BendTwist)), None)
+    return next((element for element in shell.within if isinstance(element, BendTwist)), None)
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
@@ -143,7 +143,7 @@ def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
 
 def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
     """(k,) curvature [1/m] at each entry of `rod_nodes`."""
-    return np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1)
+    return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
 
 
 def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:

@@ -1,34 +1,48 @@
 """All checks of a popped-up shell in one call."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
+from typing import Any
 
 import numpy as np
 
 from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
-from rodshell.checks.clamping import reached_by_turning
 from rodshell.checks.contact import Contact, contact, contact_of
-from rodshell.checks.deployment import Deployment, deploy
-from rodshell.checks.joint_loads import JointLoads, joint_loads
+from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
-from rodshell.checks.reactions import Reactions, reactions
 from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
+from rodshell.checks.support_and_joint_loads import JointLoads, Reactions, joint_loads, reactions
 from rodshell.errors import OutOfTimeError
-from rodshell.formfinding import Popped
-from rodshell.formfinding.popup import UP, Ends
+from rodshell.formfinding import PopUp
+from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.model import Shell
-from rodshell.rods.fibres import VON_MISES
+from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
-from rodshell.solve.constraint import Supports
+from rodshell.rods.section_stress import VON_MISES
 from rodshell.solve.critical import MOST_FACTORIZATIONS
-from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.units import length_text, stress_text
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
+
+
+@dataclass(frozen=True)
+class ShellChecks:
+    """The checks of the shell with one kind of ends.
+
+    Parameters
+    ----------
+    self_weight, other_shapes : None where a time limit came before them, or the shell is not stable.
+    """
+
+    bending: Bending
+    reactions: Reactions
+    joints: JointLoads
+    contact: Contact
+    self_weight: SelfWeight | None
+    other_shapes: OtherShapes | None
 
 
 @dataclass(frozen=True)
@@ -38,9 +52,10 @@ class Checks:
     Parameters
     ----------
     bending, reactions, joints : by end condition.
-    deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
-    self_weight : by end condition, what share of its own weight the shell bears.
-    contact : by end condition; `contact_on_the_way` of the deployment's stages.
+    deployment : from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
+        first.
+    self_weight : by end condition, what share of its own weight the shell carries.
+    contact : by end condition; `deployment_contact` of the deployment's stages.
     other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
     clamped_from_flat : whether the pinned shell, reached from flat, comes to the clamped shape when its ends are
         turned into their clamps; None where that is not known.
@@ -50,15 +65,31 @@ class Checks:
     bending: dict[Ends, Bending]
     reactions: dict[Ends, Reactions]
     joints: dict[Ends, JointLoads]
-    deployment: Deployment | None
-    on_the_way: tuple[Bending, ...]
+    deployment: Deployment | None = None
+    deployment_bending: tuple[Bending, ...] = ()
     self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
-    contact_on_the_way: tuple[Contact, ...] = ()
+    deployment_contact: tuple[Contact, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
     clamped_from_flat: bool | None = None
     stopped: str = ""
     missing: tuple[str, ...] = ()
+
+    def __getitem__(self, ends: Ends) -> ShellChecks:
+        """The checks of the shell with these ends.
+
+        Raises
+        ------
+        KeyError : there is no such shell, or it did not converge.
+        """
+        return ShellChecks(
+            self.bending[ends],
+            self.reactions[ends],
+            self.joints[ends],
+            self.contact[ends],
+            self.self_weight.get(ends),
+            self.other_shapes.get(ends),
+        )
 
     @property
     def out_of_time(self) -> str:
@@ -76,24 +107,24 @@ class Checks:
         return (*late, *way, *turned, *unknown_weights(self.self_weight), *self.tight)
 
     @property
-    def before_the_end(self) -> tuple[tuple[float, Bending], ...]:
+    def stages_below_final(self) -> tuple[tuple[float, Bending], ...]:
         """Stages of the deployment below the final shape, with their shares."""
         shares = () if self.deployment is None else self.deployment.share.tolist()
-        return tuple((share, bent) for share, bent in zip(shares, self.on_the_way, strict=True) if share < 1)
+        return tuple((share, bent) for share, bent in zip(shares, self.deployment_bending, strict=True) if share < 1)
 
     @property
-    def nearest_on_the_way(self) -> tuple[float, Contact] | None:
+    def closest_stage(self) -> tuple[float, Contact] | None:
         """The stage below the final shape in which rods are nearest, by its share; None where nothing was checked."""
-        if self.deployment is None or not self.contact_on_the_way:
+        if self.deployment is None or not self.deployment_contact:
             return None
-        pairs = zip(self.deployment.share.tolist()[:-1], self.contact_on_the_way[:-1], strict=True)
+        pairs = zip(self.deployment.share.tolist()[:-1], self.deployment_contact[:-1], strict=True)
         return min(pairs, key=lambda pair: inf if pair[1].clearance is None else pair[1].clearance)
 
     @property
     def tight(self) -> tuple[str, ...]:
         """A sentence where rods that do not touch come so near to each other that there is no room for joints."""
         shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
-        if (nearest := self.nearest_on_the_way) is not None:
+        if (nearest := self.closest_stage) is not None:
             share, found = nearest
             shapes.append((found, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid"))
         near = [(found, where) for found, where in shapes if found.clearance is not None]
@@ -112,7 +143,7 @@ class Checks:
 
     def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
         """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
-        parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.on_the_way)]
+        parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.deployment_bending)]
         sheared = max((float(part.max()) for part in parts if part is not None), default=0.0)
         if strength is None or sheared <= WORTH * strength:
             return ()
@@ -123,74 +154,114 @@ class Checks:
 
 
 def check(
-    popped: Mapping[Ends, Popped], rod: Rod, *, stages: int = 8, shear_weight: float = VON_MISES,
+    popped: Mapping[Ends, PopUp], rod: Rod, *, stages: int = 8, shear_weight: float = VON_MISES,
     progress: Progress = silent,
 ) -> Checks:  # fmt: skip
     """Check every shell that converged.
 
     Parameters
     ----------
+    popped : the shells of one footprint by their end condition.
+    rod : of which they are made.
     stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.fibres`.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.section_stress`.
+    progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
+        was found until then is returned.
     """
-    done = {ends: shell for ends, shell in popped.items() if shell.report.converged}
-    settled = {ends: settled_shell(shell) for ends, shell in done.items()}
-    bent = {
-        ends: bending_of(shell, found.state, rod, shear_weight=shear_weight) for ends, (shell, found) in settled.items()
-    }
-    met = {ends: contact_of(shell, found.state, rod) for ends, (shell, found) in settled.items()}
-    held = {ends: reactions(*pair) for ends, pair in settled.items()}
-    carried = {ends: joint_loads(shell, found.state) for ends, (shell, found) in settled.items()}
-    weighed = dict[Ends, SelfWeight]()
+    done = {ends: _settled(shape) for ends, shape in popped.items() if shape.report.converged}
+    checks = Checks(
+        bending={
+            ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()
+        },
+        reactions={ends: reactions(shape.shell, shape.equilibrium) for ends, shape in done.items()},
+        joints={ends: joint_loads(shape.shell, shape.state) for ends, shape in done.items()},
+        contact={ends: contact_of(shape.shell, shape.state, rod) for ends, shape in done.items()},
+        **_long_checks(popped, done, stages, progress),
+    )
+    if checks.deployment is None:
+        return checks
+    mesh, flat, shells = done["pinned"].footprint.mesh, checks.deployment.positions[0], checks.deployment.shells
+    directors = np.tile(UP, (len(mesh.edges), 1))
+    return replace(
+        checks,
+        deployment_bending=(
+            bending(mesh, flat, rod, normals=shell_normals(mesh, flat)),
+            *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in shells),
+        ),
+        deployment_contact=(
+            contact(mesh, flat[mesh.rod_nodes], rod, directors=directors),
+            *(contact_of(*stage, rod) for stage in shells),
+        ),
+    )
+
+
+def _settled(shape: PopUp) -> PopUp:
+    """Settled once more from where the pop-up has ended: the order of equal figures depends on the last bits."""
+    last = shape.equilibrium
+    found = find_equilibrium(last.problem, last.state, last.forces)
+    return replace(shape, shell=shape.shell.with_elements(found.elements), equilibrium=found)
+
+
+def _long_checks(
+    popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, progress: Progress
+) -> dict[str, Any]:
+    """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     follow = "pinned" in done and stages > 0
-    deployment, turned, others, stopped = None, None, dict[Ends, OtherShapes](), ""
-    missing = [f"self-weight with {ends} ends" for ends in settled]
+    deployment, turned, stopped = None, None, ""
+    weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
+    missing = [f"self-weight with {ends} ends" for ends in done]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:
-        for ends, pair in settled.items():
-            weighed[ends] = self_weight(*pair, progress=_weighing(ends, progress))
+        for ends, shape in done.items():
+            weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
             missing.pop(0)
         if follow:
-            deployment = _deployed(done["pinned"], settled["pinned"][1], stages, progress)
+            deployment = _deployed(popped["pinned"], stages, progress)
             missing[0] = "whether the clamped shell is reached from flat"
             if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
-                turned = reached_by_turning(done["pinned"], done["clamped"])
+                turned = reached_by_turning(popped["pinned"], popped["clamped"])
             missing.pop(0)
-        done_before = sum(one.factorizations for one in weighed.values())
-        for ends, one in _other_shapes(popped, settled, deployment, done_before, progress):
-            others[ends] = one
+        weighing = sum(weight.factorizations for weight in weighed.values())
+        for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
+            others[ends] = search
         missing.pop(0)
     except OutOfTimeError as error:
         stopped = str(error)
-    late = stopped, tuple(missing)
-    if deployment is None:
-        return Checks(bent, held, carried, None, (), weighed, met, (), others, None, *late)
-    mesh, laid = done["pinned"].footprint.mesh, deployment.positions[0]
-    flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
-    on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
-    met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
-    met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, carried, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, *late)
+    return {
+        "self_weight": weighed,
+        "deployment": deployment,
+        "clamped_from_flat": turned,
+        "other_shapes": others,
+        "stopped": stopped,
+        "missing": tuple(missing),
+    }
 
 
 def _other_shapes(
-    popped: Mapping[Ends, Popped], settled: Mapping[Ends, tuple[Shell, Equilibrium]], deployment: Deployment | None,
-    weighing: int, progress: Progress,
+    popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], deployment: Deployment | None, weighing: int,
+    progress: Progress,
 ) -> Iterator[tuple[Ends, OtherShapes]]:  # fmt: skip
     """Other stable shapes, with half of the factorisations that the shells, their deployment and their `weighing` took.
 
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
-    done = weighing + sum(one.report.factorizations for one in popped.values())
-    left = (done + (0 if deployment is None else deployment.factorizations)) // 2
-    stable = [ends for ends, (_, at) in settled.items() if at.report.stable]
-    for ends in stable:
-        most = 2 * left // 3 if ends == stable[0] else left
+    work = weighing + sum(shape.report.factorizations for shape in popped.values())
+    left = (work + (0 if deployment is None else deployment.factorizations)) // 2
+    stable = {ends: shape for ends, shape in done.items() if shape.report.stable}
+    for number, (ends, shape) in enumerate(stable.items()):
+        most = 2 * left // 3 if number == 0 else left
         left -= most
-        own = deployment if ends == "pinned" else None
-        told = partial(_starting, ends, progress)
-        yield ends, other_shapes(*settled[ends], most_factorizations=most, deployment=own, told=told)
+        yield (
+            ends,
+            other_shapes(
+                shape.shell,
+                shape.equilibrium,
+                most_factorizations=most,
+                deployment=deployment if ends == "pinned" else None,
+                progress=partial(_starting, ends, progress),
+            ),
+        )
 
 
 def _starting(ends: Ends, progress: Progress, start: int) -> None:
@@ -198,24 +269,17 @@ def _starting(ends: Ends, progress: Progress, start: int) -> None:
 
 
 def _weighing(ends: Ends, progress: Progress) -> Callable[[int, float], None]:
-    def told(count: int, factor: float) -> None:
+    def report(count: int, factor: float) -> None:
         done = f"{count} of at most {MOST_FACTORIZATIONS} factorisations"
         progress("self-weight", f"{ends} ends, {100 * factor:.3g} % of the weight, {done}", 0.0)
 
-    return told
+    return report
 
 
-def _deployed(last: Popped, found: Equilibrium, stages: int, progress: Progress) -> Deployment:
+def _deployed(last: PopUp, stages: int, progress: Progress) -> Deployment:
     return deploy(
-        last.shell, last.state, last.forces, stages=stages, pattern=found.pattern,
-        told=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
-    )  # fmt: skip
-
-
-def settled_shell(popped: Popped) -> tuple[Shell, Equilibrium]:
-    """A popped-up shell and its equilibrium, with what the pop-up does not keep of it: the gradient and the pattern."""
-    shell = popped.shell
-    length = 0.5 * float(np.ptp(popped.positions, axis=0).max())
-    problem = Problem(shell.elements, shell.stretch, Supports(shell.held_ends()), length, places=shell.places)
-    found = find_equilibrium(problem, popped.state, popped.forces)
-    return shell.with_elements(found.elements), found
+        last.shell,
+        last.equilibrium,
+        stages=stages,
+        progress=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+    )

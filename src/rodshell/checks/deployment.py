@@ -6,7 +6,8 @@ stage of it is an equilibrium of the elastic grid: nothing is interpolated betwe
 same in both directions. Where it has a gap, because a branch of stable equilibria ends, the directions differ, and
 the forward one happens on site: the grid is lifted a little towards its final shape, its ends are driven, and where a
 branch ends the shell snaps to the next one down its energy. Whether that leads to the final shape is the answer to
-whether it is reached from flat.
+whether it is reached from flat. A clamped shape is reached from the pinned one: on site the ends are turned into their
+clamps after the deployment.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,17 +17,18 @@ from math import prod
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
-from rodshell.geometry.vectors import cross
+from rodshell.arrays import Floats
+from rodshell.formfinding import PopUp
+from rodshell.formfinding.popup import end_directions, laid_below, turned
 from rodshell.model import Shell
+from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium, find_stable
-from rodshell.solve.path import EASY, Snap, Trace, follow, potential, trace, unaccounted
-from rodshell.solve.problem import Pattern, Problem
-from rodshell.units import length_text
+from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
+from rodshell.solve.path import EASY, Snap, Trace, follow, trace, unaccounted
+from rodshell.solve.problem import Problem, half_width
+from rodshell.units import length_text, percent_text
 
-Told = Callable[[float], None]
+Progress = Callable[[float], None]
 Stage = tuple[float, Equilibrium]  # share of the way that the ends have gone, and the shell there
 
 DEGREE = 3  # at most, of the polynomials by which the next shape is guessed
@@ -34,6 +36,8 @@ SAME = 1e-3  # of the shell's size: shapes further apart are different ones
 LOWEST = 1 / 64  # share of the way at which the grid has left its plane: by about an eighth of its final height
 SHORTEST = 0.01  # share of the way: a snap is located to this
 MOST = 1000  # factorisations of a path forwards; those that arrive take 30 to 750
+SHORTEST_TURN = 0.02  # share of the clamps' angles: a snap is located to this
+MOST_TURNING = 400  # factorisations of turning the clamps; the paths that arrive take 3 to 33
 AT_ONCE = 40  # iterations from the lifted grid to an equilibrium, before the energy is followed down
 
 
@@ -54,7 +58,7 @@ class Elsewhere:
 
     @property
     def words(self) -> str:
-        return f"{_percent(self.distance)} of half its width away, at {self.energy:.3g} times the energy"
+        return f"{percent_text(self.distance)} of half its width away, at {self.energy:.3g} times the energy"
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class Deployment:
         """Sentences that a user should read."""
         words = list[str]()
         if self.snaps:
-            places = ", ".join(_percent(snap.start) for snap in self.snaps)
+            places = ", ".join(percent_text(snap.start) for snap in self.snaps)
             goes_on = ", and goes on to its final shape" if self.reached_from_flat else ""
             words.append(
                 f"on its way from flat the shell snaps forward by itself, at {places} of the way, by up to "
@@ -105,7 +109,9 @@ class Deployment:
             )
         if self.lost_at is not None:
             below = (
-                "at all" if len(self.shells) <= 1 else f"below {_percent(self.lost_at)} of the way: stages are missing"
+                "at all"
+                if len(self.shells) <= 1
+                else f"below {percent_text(self.lost_at)} of the way: stages are missing"
             )
             words.append(
                 f"the deployment from flat could not be followed {below}, and whether the shell reaches its final "
@@ -114,31 +120,25 @@ class Deployment:
         return tuple(words)
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= 0.095 else f"{100 * share:.2g} %"
-
-
-def deploy(
-    shell: Shell, state: Floats, forces: Floats, *, stages: int, pattern: Pattern | None = None,
-    told: Told = lambda share: None,
-) -> Deployment:  # fmt: skip
+def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress = lambda share: None) -> Deployment:
     """Follow a popped-up shell back to the flat grid, and forwards from there where that path has a gap.
 
     Parameters
     ----------
-    state, forces : (N, 3) an equilibrium with pinned ends [m], and the axial forces (e,) of its edges [N].
+    shell : with pinned ends, its source frames being at the equilibrium.
+    found : its equilibrium without loads.
     stages : number of equilibria above the flat grid. They crowd near it, where the rise goes with the root of the
         way.
-    pattern : of an earlier solve of this shell.
+    progress : called with each share of the way that is looked for.
 
     Returns
     -------
     The stages reached. Those below the last one that was reached are missing.
     """
-    path = _Path(shell, state, pattern, told)
+    path = _Path(shell, found, progress)
     shares = ((np.arange(stages, 0, -1) / stages) ** 2).tolist()
     every = shares if shares[-1] <= LOWEST else [*shares, LOWEST]
-    upper = path.backwards(state, forces, every)
+    upper = path.backwards(found, every)
     lower, lost, elsewhere, guided = _Forwards([], (), True), None, None, None
     down_to, final = upper[-1][0], upper[0][1]
     if len(upper) < len(every):
@@ -152,15 +152,14 @@ def deploy(
         down_to = lower.stages[-1][0]  # where it meets the path backwards
     elif not lower.arrived:
         end = lower.stages[-1][1]
-        ratio = path.energy(end) / path.energy(final)
-        elsewhere = Elsewhere(path.apart(end, final), ratio, shell.positions(end.state))
+        elsewhere = Elsewhere(path.apart(end, final), end.energy / final.energy, shell.positions(end.state))
         guided = max((share for share, _ in lower.stages if share < down_to), default=0.0), down_to
-    whole = [*(one for one in lower.stages if one[0] < down_to), *(one for one in upper[::-1] if one[0] >= down_to)]
-    found = [one for share, one in whole if share in shares]
+    whole = [*(stage for stage in lower.stages if stage[0] < down_to), *(s for s in upper[::-1] if s[0] >= down_to)]
+    wanted = [(share, there) for share, there in whole if share in shares]
     return Deployment(
-        np.array([0.0, *(share for share, _ in whole if share in shares)]),
-        np.array([path.flat, *(shell.positions(one.state) for one in found)]),
-        tuple((shell.with_elements(one.elements), one.state) for one in found),
+        np.array([0.0, *(share for share, _ in wanted)]),
+        np.array([path.flat, *(shell.positions(there.state) for _, there in wanted)]),
+        tuple((shell.with_elements(there.elements), there.state) for _, there in wanted),
         tuple(snap for snap in lower.snaps if guided is None or snap.stop <= guided[0]),
         lost, lower.arrived, elsewhere, guided, path.factorizations,
     )  # fmt: skip
@@ -178,27 +177,29 @@ class _Forwards:
 class _Path:
     """A pinned shell whose ends lie somewhere between the flat grid (share 0) and the final places (share 1)."""
 
-    def __init__(self, shell: Shell, last: Floats, pattern: Pattern | None, told: Told) -> None:
-        self.shell, self._pattern, self._told, self._smooth = shell, pattern, told, True
-        positions = shell.positions(last)
-        self.flat = laid_out(shell.mesh.flat, shell.mesh.ends.ravel(), positions)
+    def __init__(self, shell: Shell, final: Equilibrium, progress: Progress) -> None:
+        self.shell, self._pattern, self._progress, self._smooth = shell, final.problem.pattern, progress, True
+        last, self._positions = final.state, shell.positions(final.state)
+        ends = self._positions[shell.mesh.ends.ravel()]
+        self.flat = laid_below(shell.mesh, ends, float(ends[:, 2].min()))
         self._nodes = np.flatnonzero(shell.like < shell.mesh.node_count)  # blocks that are nodes, not angles
         self._flat_nodes = self.flat[shell.like[self._nodes]]
         lying = last.copy()
         lying[self._nodes] = self._flat_nodes
         self._first, self._last = lying[shell.ends], last[shell.ends]
-        self._length = 0.5 * float(np.ptp(positions, axis=0).max())
+        self._length = half_width(self._positions)
         self.factorizations = 0
 
-    def backwards(self, state: Floats, forces: Floats, shares: Sequence[float]) -> list[Stage]:
+    def backwards(self, start: Equilibrium, shares: Sequence[float]) -> list[Stage]:
         """Stages at descending shares, from the final shape at the first of them down to where the path has a gap."""
-        self._told(shares[0])
-        final = self._counted(find_equilibrium(self._problem(shares[0], self.shell.elements), state, forces))
-        self._pattern, found = final.pattern, [(shares[0], final)]
+        self._progress(shares[0])
+        problem = self._problem(shares[0], self.shell.elements)
+        final = self._counted(find_equilibrium(problem, start.state, start.forces))
+        self._pattern, found = final.problem.pattern, [(shares[0], final)]
         if not final.report.stable:
             return found
         for before, share in pairwise(shares):
-            self._told(share)
+            self._progress(share)
             there = self._ahead(found, share) or self._down(found[-1][1], before, share)
             if there is None:
                 break
@@ -211,7 +212,7 @@ class _Path:
         if not here.report.stable:
             return _Forwards([], (), None)
         for before, share in pairwise(shares):
-            self._told(share)
+            self._progress(share)
             way = self._trace(here, before, share, snap=True, most=left)
             here, left = way.found, left - way.factorizations
             snaps.extend(way.snaps)
@@ -233,13 +234,9 @@ class _Path:
         self._counted(found)
         return found if found.report.stable else None
 
-    def energy(self, at: Equilibrium) -> float:
-        """Elastic energy [J]."""
-        return potential(self._problem(1.0, at.elements), at)
-
-    def apart(self, one: Equilibrium, two: Equilibrium) -> float:
+    def apart(self, here: Equilibrium, there: Equilibrium) -> float:
         """Distance of two shapes over half the shell's width."""
-        return float(np.linalg.norm(self.shell.positions(one.state - two.state), axis=1).max()) / self._length
+        return float(np.linalg.norm(self.shell.positions(here.state - there.state), axis=1).max()) / self._length
 
     def lifted(self, like: Stage, share: float) -> Equilibrium:
         """The equilibrium at a small share that is next to the flat grid lifted towards the shape of a stage, whose
@@ -247,8 +244,10 @@ class _Path:
         part, state = share / like[0], like[1].state.copy()
         way = state[self._nodes] - self._flat_nodes
         state[self._nodes] = self._flat_nodes + way * np.array([part, part, np.sqrt(part)])
-        problem = self._problem(share, tuple(one.refreshed(state) for one in like[1].elements))
-        found = self._counted(find_stable(problem, state, part * like[1].forces, cut=True, most_iterations=AT_ONCE))
+        problem = self._problem(share, tuple(element.refreshed(state) for element in like[1].elements))
+        found = self._counted(
+            find_stable(problem, state, part * like[1].forces, limit_steps=True, most_iterations=AT_ONCE)
+        )
         if found.report.stable:
             return found
         from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
@@ -265,7 +264,14 @@ class _Path:
             return self._problem(share, self.shell.elements)
 
         way = trace(
-            problem_at, here, start, stop, shortest=SHORTEST, snap=snap, most_factorizations=most, told=self._told
+            problem_at,
+            here,
+            start,
+            stop,
+            shortest=SHORTEST,
+            snap=snap,
+            most_factorizations=most,
+            progress=self._progress,
         )
         self.factorizations += way.factorizations
         return way
@@ -283,32 +289,49 @@ class _Path:
         last = list(takewhile(lambda one: one[1].report.iterations <= EASY, reversed(found[-DEGREE - 1 :])))
         if len(last) < 2 or not self._smooth:
             return None
-        roots, root = [np.sqrt(one[0]) for one in last], np.sqrt(share)
+        roots, root = [np.sqrt(stage[0]) for stage in last], np.sqrt(share)
         weights = [prod((root - b) / (a - b) for b in roots if b != a) for a in roots]  # Lagrange's
-        state = np.sum([weight * one.state for weight, (_, one) in zip(weights, last, strict=True)], axis=0)
-        forces = np.sum([weight * one.forces for weight, (_, one) in zip(weights, last, strict=True)], axis=0)
+        state = np.sum([weight * there.state for weight, (_, there) in zip(weights, last, strict=True)], axis=0)
+        forces = np.sum([weight * there.forces for weight, (_, there) in zip(weights, last, strict=True)], axis=0)
         before, problem = last[0][1], self._problem(share, last[0][1].elements)
         there = self._counted(find_equilibrium(problem, state, forces, most_iterations=EASY))
         self._smooth = there.report.stable  # where one guess leads astray, the next ones do, too
-        return there if self._smooth and not unaccounted(problem, before, there) else None
+        return there if self._smooth and not unaccounted(before, there) else None
 
     def _problem(self, share: float, elements: tuple[Elements, ...]) -> Problem:
-        supports = Supports(self.shell.held_ends(), self.shell.ends, (1 - share) * self._first + share * self._last)
-        stretch, places = self.shell.stretch, self.shell.places
-        return Problem(elements, stretch, supports, self._length, places=places, pattern=self._pattern)
+        goals = (1 - share) * self._first + share * self._last
+        return Problem.of_shell(self.shell, self._positions, goals=goals, elements=elements, pattern=self._pattern)
 
 
-def laid_out(flat: Floats, ends: Ints, popped: Floats) -> Floats:
-    """The flat grid (n, 3) turned and moved in its plane to lie under the popped-up shell, at its lowest end [m].
+def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
+    """Whether the pinned shell comes to the clamped shape when its ends, held in place, are turned into their clamps.
 
-    The rods' ends then have the shortest ways to go, in the least-squares sense (Procrustes in the plane).
+    Parameters
+    ----------
+    pinned, clamped : stable shells of one footprint and boundary.
+
+    Returns
+    -------
+    None where that could not be followed. The path goes on after a snap.
     """
-    here, there = flat[ends], popped[ends]
-    a, b = here - here.mean(axis=0), there - there.mean(axis=0)
-    a[:, 2] = b[:, 2] = 0.0
-    angle = np.arctan2(cross(a, b)[:, 2].sum(), np.sum(a * b))
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    result = np.empty_like(flat)
-    result[:, :2] = (flat - here.mean(axis=0))[:, :2] @ turn + there.mean(axis=0)[:2]
-    result[:, 2] = there[:, 2].min() + flat[:, 2]
-    return result
+    shell, mesh = clamped.shell, clamped.footprint.mesh
+    now, outward = end_directions(mesh, pinned.positions), clamped.boundary.tangents
+    start = clamped.state.copy()
+    start[: shell.node_count] = pinned.state[: shell.node_count]
+    ends, reach = start[shell.ends], last_edges(mesh)[:, None]
+    start[shell.ghosts] = ends + reach * now
+    elements = tuple(element.refreshed(start) for element in shell.elements)
+    pattern = clamped.equilibrium.problem.pattern
+
+    def problem_at(t: float) -> Problem:
+        goals = np.vstack([ends, ends + reach * turned(now, outward, t)])
+        return Problem.of_shell(shell, pinned.positions, goals=goals, elements=elements, pattern=pattern)
+
+    first = find_equilibrium(problem_at(0.0), start, pinned.forces)
+    if not first.report.stable:
+        return None
+    path = trace(problem_at, first, 0.0, 1.0, shortest=SHORTEST_TURN, snap=True, most_factorizations=MOST_TURNING)
+    if path.t < 1.0:
+        return None
+    apart = np.linalg.norm(shell.positions(path.found.state) - clamped.positions, axis=1).max()
+    return bool(apart <= SAME * half_width(pinned.positions))

@@ -12,17 +12,16 @@ from rodshell.errors import InputError, NetLimitError
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.rods.fibres import fibre_strain
 from rodshell.rods.materials import Material, PresetName
-from rodshell.rods.section import Circle, Rod, Section, Tube
-from rodshell.rods.stock import STOCK, depth, scaled, size_text
+from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, Tube, scaled, size_text
+from rodshell.rods.section_stress import fibre_strain
 from rodshell.targets import Target
 from rodshell.units import length_text, rounded_down
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
 SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
 # Of the strength, by the bends of the net: an estimate, since the free shell bends up to 1.2 times as sharply (measured
-# on the gallery). On the way up from flat roofs bend 3 times as sharply, those with several waves more.
+# on the gallery). During deployment flat roofs bend 3 times as sharply, those with several waves more.
 AIM = 1 / 2
 # Rods of a table bend the more sharply the more others they are joined to, which lie low near their own ends: 1.3 to
 # 1.4 times the root of the joints along one, measured on square tables of 4, 8 and 12 rods each way.
@@ -126,12 +125,12 @@ class Fit:
             return Tube(self.slender, shape.thickness) if isinstance(shape, Tube) else Circle(self.slender)
         bends, allowed = self.bends(), AIM * strength / material.youngs_modulus
         stock = _sold(material, shape)
-        fitting = [one for one in stock if depth(one) <= self.thickest and largest_strain(one, bends) <= allowed]
+        fitting = [one for one in stock if one.depth <= self.thickest and largest_strain(one, bends) <= allowed]
         if fitting:
             return fitting[-1]
         like = shape or (stock[0] if stock else Circle(self.slender))
         strain = largest_strain(like, bends)
-        most = self.thickest if strain == 0 else min(self.thickest, depth(like) * allowed / strain)
+        most = self.thickest if strain == 0 else min(self.thickest, like.depth * allowed / strain)
         return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
 
     def reason(
@@ -168,7 +167,7 @@ class Fit:
             return f"{said}the next size that is sold, {kept_out(stock[stock.index(section) + 1])}"
         if stock:
             return f"{said}no size that is sold fits: the thinnest, {kept_out(stock[0])}"
-        if largest_strain(scaled(section, self.thickest / depth(section)), bends) > AIM * bears:
+        if largest_strain(scaled(section, self.thickest / section.depth), bends) > AIM * bears:
             return said + "a thicker one would use more than half at the sharpest bend"
         return f"{said}the next step would be wider than {self.thickest_of}, {length_text(self.thickest)}"
 
@@ -204,7 +203,7 @@ def largest_strain(section: Section, bends: Bends) -> float:
 
 def _sold(material: Material, shape: Circle | Tube | None) -> tuple[Section, ...]:
     """The sizes to choose from; none where only a radius is looked for, or for a material without a name."""
-    return () if shape is not None or material.name is None else STOCK[material.name]
+    return () if shape is not None or material.name is None else TRADE_SIZES[material.name]
 
 
 def _share(used: float) -> str:
@@ -214,7 +213,7 @@ def _share(used: float) -> str:
 def _of_depth(section: Section, deep: float, *, wall_stays: bool) -> Section:
     """A section like this one of another depth [m]; the wall of a tube may have to stay as it is."""
     if not (wall_stays and isinstance(section, Tube)):
-        return scaled(section, deep / depth(section))
+        return scaled(section, deep / section.depth)
     if deep < 2 * section.thickness:
         raise InputError(
             f"a wall of {length_text(section.thickness)}: tubes that bear the bends of this target are at most "
@@ -229,7 +228,7 @@ def _sharpest_of(target: Target) -> float:
     x, y = (target.summit[k] + plane.ravel() for k, plane in enumerate(np.meshgrid(side, side)))
     plan = np.column_stack([x, y])
     with np.errstate(all="ignore"):
-        points = np.column_stack([plan, target.height(plan)])
+        points = np.column_stack([plan, target.height_at(plan)])
     points = points[np.isfinite(points[:, 2])]
     points = points[target.margin(points) > 0]
     return float(np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(initial=0.0))

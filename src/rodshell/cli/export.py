@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
-from rodshell.cli.outcome import force_option, wanted_kinds
-from rodshell.cli.progress import Progress
+from rodshell.cli.options import FORCE, QUIET, wanted_kinds
+from rodshell.cli.reporting import Progress
 
 
 def print_schema(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
@@ -26,8 +26,8 @@ SCHEMA = "Print the JSON Schema of result.json and exit."
 @click.option("--only", metavar="KINDS", help="Such as dxf,csv; default: all but 3dm.")
 @click.option("--out", "-o", metavar="DIR", help="Where to write; default: into the result itself.")
 @click.option("--schema", is_flag=True, is_eager=True, expose_value=False, callback=print_schema, help=SCHEMA)
-@force_option
-@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+@FORCE
+@QUIET
 def command(folder: str, only: str | None, out: str | None, force: bool, quiet: bool) -> int:
     """Write drawings, schedules, models or the report of the result in DIR again.
 

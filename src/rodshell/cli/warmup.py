@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rodshell.cli.progress import UNKEPT, Progress
+from rodshell.cli.options import QUIET
+from rodshell.cli.reporting import UNKEPT, Progress
 from rodshell.errors import InputError
 from rodshell.uncached import kernels_are_kept
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+@QUIET
 def command(quiet: bool) -> int:
     """Compile all kernels now, once, instead of in the first job of each kind.
 
@@ -75,7 +76,7 @@ def _forms() -> None:
     target = rs.Hemisphere(radius=0.2)
     layout = rs.GridLayout.orthogonal(spacing=0.06, edge=0.02)
     form = rs.find_form(target, layout, _rod())
-    rs.find_form(target, layout, _rod(), start=form)
+    rs.find_form(target, layout, _rod(), warm_start=form)
     rs.find_form(rs.HeightField(formula="0.1 - x**2 - y**2", domain=rs.Rectangle((0.4, 0.3))), layout, _rod())
 
 
@@ -138,7 +139,7 @@ def _single_rods() -> None:
     for section, twist in ((round_section, False), (round_section, True), (oval, True)):
         one = rs.Rod(section, rs.Material(youngs_modulus=1e7, density=1e3))
         rod = rs.ElasticRod.of(straight, one, clamped=("start",), twist=twist)
-        rs.solve_rod(rod, forces={-1: (0.0, 0.0, -1e-4)})
+        rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0.0, 0.0, -1e-4)}))
         motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
         rs.simulate(motion, rod.state(), until=4e-3, step=1e-3)
 

@@ -1,1 +1,1 @@
-"""Gaps to a target turned into node constraints or contact energy."""
+"""A target as a constraint on nodes or as a contact energy, in statics (`static`) and in time (`modified_mass`)."""

@@ -2,48 +2,51 @@
 
 A node that a step would leave below the surface is moved to it along its normal and has, in that step, no other
 motion along it: the paper's S_i = I - n n', an infinite mass in one direction. Here the direction is taken out of the
-system, which stays symmetric; where S_i also filters the rows of the forces, the paper's system is not (ERRATA to
-Eq 11). Both have the same solution: along the free directions the same balance, along the normal the prescribed way.
+system, which stays symmetric; the paper's S_i filters only the rows of the forces, and its system is not symmetric
+(ERRATA to Eq 11). Both have the same solution: the same balance along the free directions, the prescribed displacement
+along the normal.
 
-Two more ERRATA. Eqs 8 to 10 measure along z, which is undefined beside the target, and singular at a rim with an
-upright tangent, where they throw hanging nodes sideways by the square root of their depth. Here n and the way along
-it are those of the closest point of the body, the target closed by a wall under its rim: no node moves further than
-it is deep. And the way is counted from the start of the step: dv_pre = ((c - x_k)/h - v_k).n n, c the closest point.
+Two more ERRATA. Eqs 8 to 10 measure along z, which is undefined outside the target's plan and singular at a rim with
+a vertical tangent, where they throw hanging nodes sideways by the square root of their depth. Here n and the
+displacement along it are those of the closest point of the body, the target closed by a wall below its rim: no node
+moves further than its depth. And the displacement is counted from the start of the step:
+dv_pre = ((c - x_k)/h - v_k).n n, c the closest point.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isfinite
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.errors import InputError
 from rodshell.geometry.vectors import dot
 from rodshell.model import Freedom
+from rodshell.records import brief
 from rodshell.targets import Target
+from rodshell.validation import choice, instance, not_negative
 
 ROUND_OFF = 1e-10  # of the target's size: a node is below the surface only from this depth on
 SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal
 
-Stopped = Literal["wholly", "along the normal"]
+Stopped = Literal["all", "normal"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Touching:
     """Planes that nodes may slide on, added to their supports: a flat constraint of one step.
 
-    The blocked directions keep their places among the unknowns (see `Freedom`), so that nodes may come and go from
-    step to step in one and the same plan of the matrix.
+    The blocked directions stay among the unknowns (see `Freedom`), so that nodes may come and go from step to step
+    while the pattern of the matrix stays the same.
 
     Parameters
     ----------
-    supports : what holds the shell anyway.
-    free : its free directions.
-    nodes : (k,); points, normals : (k, 3) the planes [m].
-    stuck : (k,) bool; nodes that friction holds in their place in the plane.
+    supports : the shell's supports, a constraint.
+    free : the free directions that they leave.
+    nodes : (k,) nodes that touch.
+    points, normals : (k, 3) a point of each node's plane [m], and its unit normal.
+    stuck : (k,) bool; nodes that friction holds at their position in the plane.
     """
 
     supports: Any  # a solver's `Constraint`, which is defined above this floor
@@ -53,28 +56,39 @@ class Touching:
     normals: Floats
     stuck: Bools
 
+    __repr__ = brief
+
     @staticmethod
     def none(supports: Any, state: Floats) -> "Touching":
-        """Nothing touches."""
+        """Nothing touches.
+
+        Parameters
+        ----------
+        supports : the shell's supports, a constraint.
+        state : (N, 3) [m].
+        """
         nowhere, no_nodes = np.empty((0, 3)), np.empty(0, dtype=np.intp)
         return Touching(supports, supports.freedom(state), no_nodes, nowhere, nowhere, np.empty(0, dtype=bool))
 
     def freedom(self, state: Floats) -> Freedom:
+        """The free directions, those along the normals blocked."""
         return self._turned[0]
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
+        """That of the supports: the planes have none."""
         return np.asarray(self.supports.curvature(state, gradient))
 
     def remaining(self, state: Floats) -> Floats | None:
-        """The way to the planes, along the free part of their normals, besides what the supports prescribe."""
-        given = self.supports.remaining(state)
-        result = np.zeros_like(state) if given is None else given.copy()
+        """(N, 3) displacement [m] to the planes along the free part of their normals, and that of the supports."""
+        prescribed = self.supports.remaining(state)
+        result = np.zeros_like(state) if prescribed is None else prescribed.copy()
         _, along, cosine = self._turned
         gap = dot(self.points - state[self.nodes] - result[self.nodes], self.normals)
         result[self.nodes] += (gap / cosine)[:, None] * along
         return result
 
     def retract(self, state: Floats) -> Floats:
+        """The same: planes need no retraction."""
         return state
 
     @cached_property
@@ -90,52 +104,73 @@ class Touching:
         return Freedom(directions, self.free.count), along, cosine
 
     def free_share(self, nodes: Ints, normals: Floats) -> Floats:
-        """(k,) cosines of the normals (k, 3) of some nodes with the directions that their supports leave free."""
+        """(k,) cosines between the normals (k, 3) of `nodes` (k,) and the directions that their supports leave free.
+
+        Parameters
+        ----------
+        nodes : (k,) blocks.
+        normals : (k, 3) unit vectors.
+        """
         along = np.einsum("kcx,kx->kc", self.free.directions[nodes], normals)
         along[np.arange(3) >= self.free.count[nodes][:, None]] = 0.0
         return np.asarray(np.sqrt(dot(along, along)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModifiedMass:
-    """What contact with a target does to a motion.
+    """Contact with a target during a motion [HQK 3.1].
 
     Parameters
     ----------
-    target : its body, closed by the wall under its rim.
-    nodes : blocks that may touch it.
-    stopped : what an inelastic impact takes of a touching node's velocity: all of it [HQK 3.1], or what is along
-        the normal. The first acts on sliding nodes as a drag m/h, which depends on the time step.
-    friction : Coulomb's coefficient, by which touching nodes stick or slip; it stops only what is along the normal.
+    target : its body, closed by the wall below its rim.
+    nodes : (k,) blocks that may touch it.
+    stopped : which part of a touching node's velocity an inelastic impact removes: "all" of it [HQK 3.1], or the
+        "normal" part. The first acts on sliding nodes as a drag m/h, which depends on the time step.
+    friction : Coulomb's coefficient [-], by which touching nodes stick or slip; with friction only the normal part of
+        the velocity is removed.
 
     Raises
     ------
-    InputError : the coefficient is negative or not finite.
+    InputError : the coefficient is negative or not finite; `stopped` is neither "all" nor "normal".
     """
 
     target: Target
     nodes: Ints
-    stopped: Stopped = "wholly"
+    stopped: Stopped = "all"
     friction: float = 0.0
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
-        if not (isfinite(self.friction) and self.friction >= 0):
-            raise InputError(f"the friction coefficient must be 0 or positive, not {self.friction}")
+        instance("target", self.target, Target)
+        choice("stopped", self.stopped, get_args(Stopped))
+        not_negative("the friction coefficient", self.friction)
 
     @property
-    def stops_wholly(self) -> bool:
+    def stops_all(self) -> bool:
         """Whether touching nodes lose their velocity along the surface, too."""
-        return self.stopped == "wholly" and not self.friction
+        return self.stopped == "all" and not self.friction
 
     def touching(self, supports: Any, state: Floats) -> Touching:
-        """The constraint to start a step with: nothing touches, whatever did in the step before."""
+        """The constraint to start a step with: nothing touches, whatever touched in the step before.
+
+        Parameters
+        ----------
+        supports : the shell's supports, a constraint.
+        state : (N, 3) [m].
+        """
         return Touching.none(supports, state)
 
     def below(self, state: Floats, touching: Touching) -> Touching | None:
-        """The constraint with all nodes that are newly below the surface at `state`; None where no node is.
+        """The constraint with all nodes that are newly below the surface at `state`; None if there are none [HQK Eq 8].
 
-        Nodes that touch already are not looked at again: a plane's node is below a hollow by the square of its
-        slide, and on the plane by round-off (ERRATA to Algorithm 1, which could loop on them).
+        Nodes that touch already are not tested again: above a concave surface a node on its plane is below it by the
+        square of its slide, and elsewhere by round-off (ERRATA to Algorithm 1, which could loop on them).
+
+        Parameters
+        ----------
+        state : (N, 3) at the end of the step [m].
+        touching : the constraint of the step so far.
         """
         outside = np.ones(len(state), dtype=bool)
         outside[self.nodes] = self.target.outside(state[self.nodes])
@@ -158,17 +193,22 @@ class ModifiedMass:
         )
 
     def released(self, touching: Touching, reactions: Floats) -> tuple[Touching, Floats] | None:
-        """The constraint without the nodes that stick by more than friction can hold; None where none does.
+        """The constraint without the nodes on which friction does not suffice; None where it suffices on all.
 
-        And the force (N, 3) [N] of friction on these once they slip, against the way they would go.
+        Parameters
+        ----------
+        reactions : (N, 3) of all supports [N]; that of a stuck node must lie in the friction cone,
+            |tangential| <= friction * normal.
 
-        reactions : (N, 3) of all supports [N]; a stuck node's lies in its cone, |tangential| <= friction * normal.
+        Returns
+        -------
+        The constraint, and the friction force (N, 3) [N] on the released nodes while they slip, against their motion.
         """
         if not touching.stuck.any():
             return None
-        given = reactions[touching.nodes]
-        push = np.maximum(dot(given, touching.normals), 0.0)
-        across = given - dot(given, touching.normals)[:, None] * touching.normals
+        reaction = reactions[touching.nodes]
+        push = np.maximum(dot(reaction, touching.normals), 0.0)
+        across = reaction - dot(reaction, touching.normals)[:, None] * touching.normals
         size = np.sqrt(dot(across, across))
         slips = touching.stuck & (size > self.friction * push)
         if not slips.any():
@@ -178,9 +218,15 @@ class ModifiedMass:
         return replace(touching, stuck=touching.stuck & ~slips), rubbing
 
     def landed(self, velocity: Floats, touching: Touching) -> Floats:
-        """(N, 3) the velocity after the inelastic impact."""
+        """(N, 3) the velocity after the inelastic impact.
+
+        Parameters
+        ----------
+        velocity : (N, 3) before the impact [m/s].
+        touching : the nodes that touch, with their normals.
+        """
         result, nodes = velocity.copy(), touching.nodes
-        if self.stops_wholly:
+        if self.stops_all:
             result[nodes] = 0.0
         else:
             result[nodes] -= dot(velocity[nodes], touching.normals)[:, None] * touching.normals

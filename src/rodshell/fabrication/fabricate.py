@@ -11,7 +11,7 @@ from rodshell.fabrication.nesting import Nesting, nest
 from rodshell.fabrication.options import Fabrication
 from rodshell.fabrication.splices import splices
 from rodshell.layout import GridMesh
-from rodshell.layout.layers import layers
+from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
 from rodshell.units import length_text
 

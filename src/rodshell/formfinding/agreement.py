@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.formfinding.popup import Popped
+from rodshell.formfinding.popup import PopUp
 from rodshell.geometry.curves import on_curve
 from rodshell.layout import GridMesh
 from rodshell.targets import Target
@@ -45,7 +45,7 @@ class Agreement:
         )
 
 
-def agreement(popped: Popped, target: Target) -> Agreement:
+def agreement(popped: PopUp, target: Target) -> Agreement:
     """Distance of the popped-up rods to the target, continued smoothly past its end."""
     nodes, mesh = popped.positions, popped.footprint.mesh
     points = np.vstack([nodes, edge_middles(mesh, nodes)])

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from rodshell.errors import InputError
-from rodshell.formfinding.bound import bound_drape
+from rodshell.formfinding.bound_drape import bound_drape
 from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.gravity import gravity_drape
+from rodshell.formfinding.gravity_drape import gravity_drape
 from rodshell.formfinding.methods import Bound, Gravity, Method, require_method
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint, require_joint
@@ -64,6 +64,6 @@ def drape(
         return bound_drape(target, layout, rod, anchor=anchor, warm_start=warm_start, joint=joint, progress=progress)
     if isinstance(method, Gravity):
         return gravity_drape(target, layout, rod, method, anchor=anchor, joint=joint, progress=progress)
-    from rodshell.formfinding.falling import falling_drape  # imported here: it loads the dynamics
+    from rodshell.formfinding.fall_drape import fall_drape  # imported here: it loads the dynamics
 
-    return falling_drape(target, layout, rod, method, anchor=anchor, joint=joint, progress=progress)
+    return fall_drape(target, layout, rod, method, anchor=anchor, joint=joint, progress=progress)

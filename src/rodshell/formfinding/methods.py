@@ -13,7 +13,7 @@ from typing import ClassVar, Literal, get_args
 from rodshell.contact.modified_mass import Stopped
 from rodshell.errors import InputError
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
-from rodshell.validation import choice, instance, number, positive
+from rodshell.validation import choice, instance, not_negative, positive
 
 STANDARD_GRAVITY = 9.81  # m/s2, as in the paper
 STOPPED: tuple[Stopped, ...] = get_args(Stopped)
@@ -67,7 +67,7 @@ class Fall:
     drag : rate at which all velocities decay [1/s].
     stream : folder for the frames, which holds none yet, read with `TimeSeries.load`; None keeps none.
     every : number of steps from one frame to the next.
-    settle : end as soon as the grid is at rest; else go on for the whole duration.
+    settle : end as soon as the grid is at rest; otherwise at the end of the duration.
 
     Raises
     ------
@@ -79,7 +79,7 @@ class Fall:
     coupling: Coupling = field(default_factory=SharedDofs)
     time_step: float | None = None
     duration: float | None = None
-    stopped: Stopped = "wholly"
+    stopped: Stopped = "all"
     friction: float = 0.0
     drag: float = 0.0
     stream: str | Path | None = None
@@ -95,12 +95,9 @@ class Fall:
             value = getattr(self, name)
             if value is not None:
                 positive(f"the fall's {name}", value, "s")
-        _not_negative("the fall's friction", self.friction, "[-]")
-        _not_negative("the fall's drag", self.drag, "1/s")
-        instance(
-            "the fall's coupling", self.coupling, SharedDofs | ImplicitPenalty | ExplicitPenalty,
-            "rodshell.SharedDofs(), rodshell.ImplicitPenalty() or rodshell.ExplicitPenalty()",
-        )  # fmt: skip
+        not_negative("the fall's friction", self.friction)
+        not_negative("the fall's drag", self.drag, "1/s")
+        require_coupling("the fall's coupling", self.coupling)
         choice("the fall's stopped", self.stopped, STOPPED)
         if isinstance(self.every, bool) or not isinstance(self.every, Integral) or self.every < 1:
             raise InputError(f"the fall's every must be a number of steps, 1 or more, not {self.every!r}")
@@ -114,7 +111,7 @@ Method = Bound | Gravity | Fall
 
 
 def require_method(value: object) -> None:
-    """Refuse what is none of the three methods, with one sentence that names them.
+    """Refuse all but the three methods, with one sentence that names them.
 
     Raises
     ------
@@ -125,7 +122,12 @@ def require_method(value: object) -> None:
         raise InputError(f"method must be rodshell.Bound(), rodshell.Gravity() or rodshell.Fall(), not {what}")
 
 
-def _not_negative(name: str, value: object, unit: str) -> None:
-    number(name, value, unit)
-    if float(value) < 0:  # type: ignore[arg-type]
-        raise InputError(f"{name} must not be negative, not {value} {unit}")
+def require_coupling(name: str, value: object) -> None:
+    """Refuse all but the three couplings, with one sentence that calls the argument by its `name`.
+
+    Raises
+    ------
+    InputError : `value` is a word, a class, or anything else.
+    """
+    kinds = "rodshell.SharedDofs(), rodshell.ImplicitPenalty() or rodshell.ExplicitPenalty()"
+    instance(name, value, SharedDofs | ImplicitPenalty | ExplicitPenalty, kinds)

@@ -7,13 +7,13 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, RodshellError
-from rodshell.formfinding.matching import Point, Wanted, match_net, rod_ends
+from rodshell.formfinding.end_matching import EndGoals, Point, match_net, rod_ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import NEAREST_JOINT
 from rodshell.geometry.vectors import unit
 from rodshell.layout import FlatGrid, FlatRod, GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.targets.patch import Patch
+from rodshell.targets import Patch
 
 REMEDY = "turn the layout (layout.rotate), so that its rods cross the seams, or use a smaller spacing"
 FEWEST = 2  # joints of a rod: one that is left out takes those with it that it meets
@@ -93,7 +93,7 @@ def lay_patches(
                 wanted = _wanted(patch, mine, [one.patch for one in laid.values()])
                 found = match_net(patch, layout, anchor, wanted, eccentricity=eccentricity)
                 laid[name] = Laid(patch, found.layout, found.anchor, found.net)
-                for met in found.met:
+                for met in found.matched:
                     other = mine[met.point]
                     meetings.append(Meeting(other.seam, other.point, (other.end, End(name, met.rod, met.side))))
             else:
@@ -106,11 +106,11 @@ def lay_patches(
     return _without_lonely(laid, {end.end for end in waiting}, meetings)
 
 
-def _wanted(patch: Patch, ends: list[_Open], others: list[Patch]) -> Wanted:
+def _wanted(patch: Patch, ends: list[_Open], others: list[Patch]) -> EndGoals:
     """Where a patch's rods should end: at these ends of the others' rods."""
     taken = [k for k in range(len(patch.seams)) if any(_across(patch, k) == other.sides for other in others)]
     points = np.array([end.point for end in ends])
-    return Wanted(
+    return EndGoals(
         points,
         np.array([end.mirrored for end in ends]),
         _rows(np.array([end.seam for end in ends]), points),

@@ -1,4 +1,4 @@
-"""Trim what hangs below the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
+"""Trim what hangs over the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
 
 from dataclasses import dataclass
 
@@ -6,17 +6,18 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding.draped import Draped, laid_in_layers, node_normals
+from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.layers import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound
 from rodshell.geometry.vectors import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
 
 NEAREST_JOINT = 0.15  # spacings: a joint closer to a rod's end cannot be made
-FEWEST_JOINTS = 3  # a rod with fewer swings about the line through them
+FEWEST_JOINTS = 3  # a rod with fewer swings about the line through its joints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Boundary:
     """The final boundary G: where the rod ends go.
 
@@ -34,14 +35,20 @@ class Boundary:
     normals: Floats | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Footprint:
-    """The trimmed grid, flat: its rods end on the footprint G0."""
+    """The trimmed grid, flat: its rods end on the footprint G0.
+
+    Parameters
+    ----------
+    mesh : of the m trimmed rods.
+    """
 
     mesh: GridMesh
 
     @property
     def rods(self) -> tuple[FlatRod, ...]:
+        """The m rods, each with its start and end in the flat grid."""
         return self.mesh.grid.rods
 
     @property
@@ -50,11 +57,17 @@ class Footprint:
         return self.mesh.flat[self.mesh.ends.ravel(), :2]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trimmed:
-    """The draped grid without what hangs over: `positions` (n, 3) of the nodes of `mesh`, and its boundary.
+    """The draped grid without what hangs over.
 
-    Rods in layers have nodes of their own there, on their own lines.
+    Parameters
+    ----------
+    draped : the whole of it.
+    mesh : of the trimmed rods; rods in layers have nodes of their own in it, on their own lines.
+    positions : (n, 3) of its nodes [m].
+    boundary : where the rods end.
+    dropped : names of the rods that are left out, each with the reason.
     """
 
     draped: Draped
@@ -65,13 +78,16 @@ class Trimmed:
 
 
 def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
-    """Cut every rod at the target's end and drop the rods that cannot be built or would swing.
+    """Cut every rod at the target's end and drop the rods that cannot be built or would swing [HQK 3.2].
 
-    fewest : joints of a rod that does not swing.
+    Parameters
+    ----------
+    draped : a grid lying on its target.
+    fewest : number of joints from which a rod does not swing.
 
     Raises
     ------
-    InputError : no rod is left.
+    InputError : no rod is left, or a hanging rod is too short to reach the target's end.
     """
     margin = NEAREST_JOINT * min(draped.layout.spacing)
     rods, positions, dropped = draped.rods, draped.positions, list(draped.dropped)
@@ -93,7 +109,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
     if draped.eccentricity:
         bound = isinstance(draped.method, Bound)
         normals = draped.target.on_surface(positions).normal if bound else node_normals(mesh, positions)
-        mesh, positions, normals = laid_in_layers(mesh, positions, normals, draped.eccentricity)
+        mesh, positions, normals = place_in_layers(mesh, positions, normals, draped.eccentricity)
     boundary = Boundary(positions[mesh.ends.ravel()], end_tangents(mesh, positions), positions, normals)
     return Trimmed(draped, mesh, positions, boundary, tuple(dropped))
 
@@ -101,29 +117,38 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
 def in_layers(footprint: Footprint, boundary: Boundary, eccentricity: float) -> tuple[Footprint, Boundary]:
     """Footprint and boundary of rods that lie in two layers, from those of a grid whose rods share nodes.
 
-    Without a draped state the boundary's points are the ends of the rods' own lines already.
+    Without a draped state the boundary's points are already the ends of the rods' own lines.
+
+    Parameters
+    ----------
+    eccentricity : distance of the layers [m].
     """
     mesh, draped = footprint.mesh, boundary.draped
     if draped is None:
         return Footprint(mesh.in_layers(eccentricity)), boundary
-    layered, positions, normals = laid_in_layers(mesh, draped, node_normals(mesh, draped), eccentricity)
+    layered, positions, normals = place_in_layers(mesh, draped, node_normals(mesh, draped), eccentricity)
     ends = layered.ends.ravel()
     return Footprint(layered), Boundary(positions[ends], boundary.tangents, positions, normals)
 
 
 def untrimmed(draped: Draped) -> Trimmed:
-    """A draped grid as it is, for keeping the partial result of a drape that did not converge."""
+    """A draped grid with nothing cut off, to keep the partial result of a drape that did not converge."""
     mesh, x = draped.mesh, draped.positions
     return Trimmed(draped, mesh, x, Boundary(x[mesh.ends.ravel()], end_tangents(mesh, x), x), draped.dropped)
 
 
 def map_back(trimmed: Trimmed) -> Footprint:
-    """The same cuts on the flat grid: the footprint G0."""
+    """The same cuts on the flat grid: the footprint G0 [HQK 3.2]."""
     return Footprint(trimmed.mesh)
 
 
 def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
-    """(2m, 3) outward unit tangents at both ends of each rod, to second order from the last two edges."""
+    """(2m, 3) outward unit tangents at start and end of each rod in turn, to second order from the last two edges.
+
+    Parameters
+    ----------
+    positions : (n, 3) of the mesh's nodes [m].
+    """
     first, last = mesh.rod_start, mesh.rod_stop - 1
     inwards = np.minimum(np.arange(3)[:, None], last - first)  # a rod of one edge counts it twice
     rows = np.stack([first + inwards, last - inwards], axis=2).reshape(3, -1)

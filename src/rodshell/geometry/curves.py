@@ -1,14 +1,29 @@
-"""Curves given by points: local cubic interpolation."""
+"""Curves given by points: local cubic interpolation, and polylines joined end to end."""
+
+from collections.abc import Iterable
 
 import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats
 
+TOUCH = 1e-6  # of the extent of all polylines: ends this close are one
 
-@nb.njit(cache=True, error_model="numpy")
+
+@nb.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
-    """Points (n, d) at `s` (n,) of the polynomials through `points` (n, p, d) at `knots` (n, p)."""
+    """Interpolate with polynomials, one for each point that is wanted.
+
+    Parameters
+    ----------
+    knots : (n, p), parameters at which each polynomial is known [m].
+    points : (n, p, d), its values there.
+    s : (n,) parameters wanted [m].
+
+    Returns
+    -------
+    (n, d) values at `s`.
+    """
     result = np.zeros((points.shape[0], points.shape[2]))
     for n in range(len(s)):
         for j in range(knots.shape[1]):
@@ -22,11 +37,21 @@ def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
 
 
 def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:
-    """Points (n, 3) at `s` (n,) of a curve through `points` (m, 3) at ascending `knots` (m,).
+    """Interpolate a curve by local cubics, to fourth order.
 
-    Fourth order: through each interval goes the cubic of the four nearest knots, or of all if there are fewer.
+    In each interval the cubic goes through the four nearest knots, or through all if there are fewer.
+
+    Parameters
+    ----------
+    knots : (m,) ascending parameters [m].
+    points : (m, 3) points of the curve there [m].
+    s : (n,) parameters wanted [m].
+
+    Returns
+    -------
+    (n, 3) points of the curve at `s` [m].
     """
-    return _on_curve(knots, np.ascontiguousarray(points), s)
+    return np.asarray(_on_curve(knots, np.ascontiguousarray(points), s))
 
 
 @nb.njit(cache=True)
@@ -40,12 +65,22 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     return lagrange(near, around, s)
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
 def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
-    """Points (m, n, 3) at `s` (n,) of m lines through `points` (k, m, 3) at `knots` (k,), as `on_curve` takes them.
+    """Interpolate m lines with common knots, as `on_curve` does.
 
-    Of each line the nodes around the one at `origin` count that are known without a gap: those between two that are
-    NaN. So many of their steps `beyond` them the cubics go on; further away the line has no points, but NaN.
+    Parameters
+    ----------
+    knots : (k,) ascending parameters of all lines [m].
+    points : (k, m, 3) points of the lines [m]; NaN where a line is not known. Of each line the run of known points
+        around `origin` is used.
+    origin : index of the knot around which the lines are known.
+    s : (n,) parameters wanted [m].
+    beyond : the cubics are continued past the known points by this many steps of the knots.
+
+    Returns
+    -------
+    (m, n, 3) points [m]; NaN further away from the known points.
     """
     count, lines, spare, most = len(knots), points.shape[1], len(s), min(4, len(knots))
     result = np.empty((lines, len(s), 3))
@@ -62,30 +97,30 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
         low = knots[first] - beyond * (knots[min(first + 1, last)] - knots[first])
         high = knots[last] + beyond * (knots[last] - knots[max(first, last - 1)])
         for n in range(len(s)):
-            own, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
+            row, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
             if window < first or window + most - 1 > last:
-                own, window = spare, _window(knots, s[n], right[n], first, last, shares, spare)
+                row, window = spare, _window(knots, s[n], right[n], first, last, shares, spare)
             if not low <= s[n] <= high:
                 x = y = z = np.nan
             for k in range(near):
-                x += shares[own, k] * points[window + k, m, 0]
-                y += shares[own, k] * points[window + k, m, 1]
-                z += shares[own, k] * points[window + k, m, 2]
+                x += shares[row, k] * points[window + k, m, 0]
+                y += shares[row, k] * points[window + k, m, 1]
+                z += shares[row, k] * points[window + k, m, 2]
             result[m, n, 0], result[m, n, 1], result[m, n, 2] = x, y, z
     return result
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _window(knots, at, right, first, last, shares, own):  # type: ignore[no-untyped-def]
-    """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, and their `shares` (:, 4) in
-    the row `own`."""
+def _window(knots, at, right, first, last, shares, row):  # type: ignore[no-untyped-def]
+    """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, and their weights in
+    `shares[row]` (4,)."""
     near = min(4, last - first + 1)
     window = min(max(right - near // 2, first), last + 1 - near)
     for j in range(near):
-        shares[own, j] = 1.0
+        shares[row, j] = 1.0
         for k in range(near):
             if j != k:
-                shares[own, j] *= (at - knots[window + k]) / (knots[window + j] - knots[window + k])
+                shares[row, j] *= (at - knots[window + k]) / (knots[window + j] - knots[window + k])
     return window
 
 
@@ -100,3 +135,51 @@ def _nearest(knots, s):  # type: ignore[no-untyped-def]
         for k in range(count):
             window[n, k] = first + k
     return window
+
+
+def closed_loops(strokes: Iterable[Floats]) -> list[Floats]:
+    """Join polylines end to end into closed loops; those that stay open are left out.
+
+    Parameters
+    ----------
+    strokes : polylines (n, 3) in any order and direction [m].
+
+    Returns
+    -------
+    Loops (n, 3), the longest first; the first point is not repeated at the end.
+    """
+    loops = [line[:-1] for line in join_end_to_end(strokes) if len(line) > 3 and np.array_equal(line[0], line[-1])]
+    return sorted(loops, key=lambda x: -float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum()))
+
+
+def join_end_to_end(strokes: Iterable[Floats]) -> list[Floats]:
+    """Join polylines whose ends touch.
+
+    Parameters
+    ----------
+    strokes : polylines (n, 3) in any order and direction [m].
+
+    Returns
+    -------
+    Polylines (n, 3); one that is closed ends with its first point.
+    """
+    left = list(strokes)
+    if not left:
+        return []
+    tiny = TOUCH * float(np.ptp(np.vstack(left), axis=0).max())
+    lines = list[Floats]()
+    while left:
+        chain, turned = left.pop(), 0
+        while np.linalg.norm(chain[-1] - chain[0]) > tiny:
+            near = [(k, flip) for k, s in enumerate(left) for flip in (False, True)
+                    if np.linalg.norm((s[-1] if flip else s[0]) - chain[-1]) <= tiny]  # fmt: skip
+            if near:
+                k, flip = near[0]
+                stroke = left.pop(k)
+                chain = np.vstack([chain, (stroke[::-1] if flip else stroke)[1:]])
+            elif turned:
+                break
+            else:
+                chain, turned = chain[::-1], 1
+        lines.append(np.vstack([chain[:-1], chain[:1]]) if np.linalg.norm(chain[-1] - chain[0]) <= tiny else chain)
+    return lines

@@ -1,74 +1,290 @@
-"""Where rods meet: the places of a mesh at which two rods cross, and the edges of each rod there."""
+"""Where rods meet: the rods' nodes and edges at each crossing, and the section of each rod there.
 
-from dataclasses import dataclass
+The section of a rod at a node has a tangent T and a normal N. They are means over the one or two edges of the rod at
+the node, N of their material directors m1. The section lies between the middles of the two edges, so that the nearer
+edge has the larger weight: to second order T and N are the rod's own tangent and director there. Frames, sources and
+spin are those of `rods.bend_twist`, which derives them; the kernels here serve every energy of sections. An edge's
+unknowns are its vector e and its twist angle theta.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple, Protocol, TypeVar
 
+import numba as nb
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints
+from rodshell.geometry.frames import adapted, parallel_transport
+from rodshell.geometry.vectors import unit
 from rodshell.layout import GridMesh
 
 
-@dataclass(frozen=True)
-class Places:
-    """A mesh seen from its rods: *place* k is entry k of `mesh.rod_nodes`, a rod's visit to one of its nodes.
+@dataclass(frozen=True, eq=False)
+class RodNodes:
+    """A mesh as its rods see it: *rod node* k is entry k of `mesh.rod_nodes`, a node as one of its rods has it.
 
     Parameters
     ----------
     mesh : the mesh, its rods sharing their nodes at joints or lying in layers.
-    blocks : (k,) block of the state that holds each place: its node's, or one of its own where rods do not share.
-    first_angle : block of the first edge's twist angle; the others follow.
+    blocks : (k,) block of the state that holds each rod node: that of the mesh's node, or the rod's own where rods do
+        not share nodes.
+    first_angle : block of the first edge's twist angle; those of the other edges follow.
     """
 
     mesh: GridMesh
     blocks: Ints
     first_angle: int
 
+    def __repr__(self) -> str:
+        return f"RodNodes({len(self.blocks)} of {len(self.mesh.rod_start)} rods)"
+
     @cached_property
     def rods(self) -> Ints:
-        """(k,) rod of each place."""
+        """(k,) rod of each rod node."""
         return np.repeat(np.arange(len(self.mesh.rod_start)), self.mesh.rod_stop - self.mesh.rod_start)
 
     @cached_property
-    def of_crossings(self) -> Ints:
-        """(c, 2) places of each crossing of the grid, on its first and its second rod."""
+    def at_crossings(self) -> Ints:
+        """(c, 2) rod nodes at each crossing of the grid, of its first and its second rod."""
         key = self.rods * self.mesh.node_count + self.mesh.rod_nodes
         order = np.argsort(key, kind="stable")
         wanted = self.mesh.grid.crossings.rods * self.mesh.node_count + self.mesh.joint_pairs
         return np.asarray(order[np.searchsorted(key[order], wanted)])
 
-    def has(self, places: Ints, side: int) -> np.ndarray:
-        """Whether the rod goes on from each place: before it (side 0), after it (side 1)."""
-        limit = self.mesh.rod_start[self.rods[places]] if side == 0 else self.mesh.rod_stop[self.rods[places]] - 1
-        return np.asarray(places != limit)
+    def has_edge(self, rod_nodes: Ints, side: int) -> Bools:
+        """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`.
 
-    def edge(self, places: Ints, side: int) -> Ints:
-        """Edge before (side 0) or after (side 1) each place, where there is one; edges are counted rod by rod."""
-        return np.asarray(places - self.rods[places] - (1 - side))
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
+        rods = self.rods[rod_nodes]
+        limit = self.mesh.rod_start[rods] if side == 0 else self.mesh.rod_stop[rods] - 1
+        return np.asarray(rod_nodes != limit)
 
-    def angle(self, places: Ints, side: int) -> Ints:
-        """Block of that edge's twist angle."""
-        return np.asarray(self.first_angle + self.edge(places, side))
+    def edge(self, rod_nodes: Ints, side: int) -> Ints:
+        """Edge before (side 0) or after (side 1) each rod node, where there is one; edges are counted rod by rod.
 
-    def neighbour(self, places: Ints, side: int) -> Ints:
-        """Block of the node at that edge's other end."""
-        return np.asarray(self.blocks[places + (1 if side else -1)])
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
+        return np.asarray(rod_nodes - self.rods[rod_nodes] - (1 - side))
 
-    def directions(self, places: Ints) -> Floats:
-        """(.., 2) unit direction of the rod of each place in the flat grid."""
+    def angle(self, rod_nodes: Ints, side: int) -> Ints:
+        """Block of that edge's twist angle.
+
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
+        return np.asarray(self.first_angle + self.edge(rod_nodes, side))
+
+    def neighbour(self, rod_nodes: Ints, side: int) -> Ints:
+        """Block of the node at that edge's other end.
+
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
+        return np.asarray(self.blocks[rod_nodes + (1 if side else -1)])
+
+    def directions(self, rod_nodes: Ints) -> Floats:
+        """(.., 2) unit direction of the rod of each rod node in the flat grid."""
         table = np.array([rod.direction for rod in self.mesh.grid.rods])
-        return np.asarray(table[self.rods[places]])
+        return np.asarray(table[self.rods[rod_nodes]])
 
-    def softness(self, places: Ints) -> Floats:
-        """Sum of 1/length over the edges at each place [1/m]."""
-        total = np.zeros(len(places))
+    def inverse_lengths(self, rod_nodes: Ints) -> Floats:
+        """Sum of 1/length over the edges at each rod node [1/m]."""
+        total = np.zeros(len(rod_nodes))
         for side in range(2):
-            there = self.has(places, side)
-            total[there] += 1.0 / self.mesh.edge_lengths[self.edge(places[there], side)]
+            there = self.has_edge(rod_nodes, side)
+            total[there] += 1.0 / self.mesh.edge_lengths[self.edge(rod_nodes[there], side)]
         return total
 
-    def flat(self, size: int) -> Floats:
-        """(size, 3) state of the flat grid, all angles 0."""
+    def flat_state(self, size: int) -> Floats:
+        """(size, 3) state of the flat grid [m], all angles 0."""
         state = np.zeros((size, 3))
         state[self.blocks] = self.mesh.flat[self.mesh.rod_nodes]
         return state
+
+
+class SectionElements(Protocol):
+    """What every energy of sections has; see `RelativeRotation`."""
+
+    @property
+    def blocks(self) -> Ints: ...
+    @property
+    def legs(self) -> Ints: ...
+    @property
+    def source_tangents(self) -> Floats: ...
+    @property
+    def source_directors(self) -> Floats: ...
+
+
+T = TypeVar("T", bound=SectionElements)
+
+
+def edge_tangents(state: Floats, blocks: Ints, legs: Ints) -> Floats:
+    """(m, l, 3) unit tangents at `state` (N, 3) of the edges `legs` (l, 4) of the joints on `blocks` (m, k).
+
+    Parameters
+    ----------
+    state : (N, 3) node positions [m] and twist angles [rad].
+    blocks : (m, k) nodes and twist angles of the joints.
+    legs : (l, 4) edges of each joint, see `Stencils`.
+    """
+    return unit(state[blocks[:, legs[:, 1]]] - state[blocks[:, legs[:, 0]]])
+
+
+def with_source(elements: T, state: Floats) -> T:
+    """An energy of sections with its source frames moved to `state` (N, 3).
+
+    Parameters
+    ----------
+    elements : joints or ties.
+    state : (N, 3) the state of the new source frames.
+    """
+    tangents = edge_tangents(state, elements.blocks, elements.legs)
+    directors = parallel_transport(elements.source_directors, elements.source_tangents, tangents)
+    return replace(elements, source_tangents=tangents, source_directors=adapted(directors, tangents))  # type: ignore[type-var]
+
+
+class Stencils(NamedTuple):
+    """Joints whose rods have edges on the same sides, so that they touch as many blocks in the same order.
+
+    members : (m,) bool, which of the pairs they are.
+    blocks : (n, k) nodes and twist angles of each.
+    legs : (l, 4) for each edge the columns of `blocks` of its first node, its second node and its twist angle, and its
+        rod, 0 or 1.
+    middles : (2,) columns of the joint's node on either rod.
+    weights : (n, l) share of each edge in its rod's section.
+    """
+
+    members: Bools
+    blocks: Ints
+    legs: Ints
+    middles: Ints
+    weights: Floats
+
+
+def stencils(rod_nodes: RodNodes, pairs: Ints) -> Iterator[Stencils]:
+    """The joints between the rod nodes `pairs` (m, 2), set by set of those that are alike.
+
+    Parameters
+    ----------
+    rod_nodes : of the mesh.
+    pairs : (m, 2) rod nodes that meet, on the first and on the second rod.
+    """
+    sides = np.column_stack([rod_nodes.has_edge(pairs[:, rod], side) for rod in range(2) for side in range(2)])
+    for pattern in np.unique(sides, axis=0):
+        members = (sides == pattern).all(axis=1)
+        yield Stencils(members, *_stencil(rod_nodes, pairs[members], pattern.reshape(2, 2)))
+
+
+def _stencil(rod_nodes: RodNodes, pairs: Ints, has_edge: Bools) -> tuple[Ints, Ints, Ints, Floats]:
+    columns, legs, middles, weights = list[Ints](), list[tuple[int, int, int, int]](), [0, 0], list[Floats]()
+    lengths = rod_nodes.mesh.edge_lengths
+    for rod in range(2):
+        here = pairs[:, rod]
+        if rod == 0 or not np.array_equal(rod_nodes.blocks[here], columns[0]):  # rods that do not share their node
+            middles[rod] = len(columns)
+            columns.append(rod_nodes.blocks[here])
+        for side in np.flatnonzero(has_edge[rod]).tolist():
+            middle, outer, angle = middles[rod], len(columns), len(columns) + 1
+            columns += [rod_nodes.neighbour(here, side), rod_nodes.angle(here, side)]
+            legs.append((middle, outer, angle, rod) if side else (outer, middle, angle, rod))
+            weights.append(1.0 / (lengths[rod_nodes.edge(here, side)] * rod_nodes.inverse_lengths(here)))
+    return np.column_stack(columns), np.array(legs), np.array(middles), np.column_stack(weights)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore[no-untyped-def]
+    """Length of an edge; its tangent, material directors, spin w, and (source + t) / (1 + source.t)."""
+    square, both, along = 0.0, 1.0, 0.0
+    for k in range(3):
+        t[k] = x[blocks[leg[1]], k] - x[blocks[leg[0]], k]
+        square += t[k] * t[k]
+    length = np.sqrt(square)
+    for k in range(3):
+        t[k] /= length
+        both += source[k] * t[k]
+        along += director[k] * t[k]
+    theta = x[blocks[leg[2]], 0]
+    cos, sin = np.cos(theta), np.sin(theta)
+    for k in range(3):
+        half[k] = (source[k] + t[k]) / both
+    for k in range(3):
+        k1, k2 = (k + 1) % 3, (k + 2) % 3
+        w[k] = (source[k1] * t[k2] - source[k2] * t[k1]) / (both * length)
+        d1 = director[k] - along * half[k]
+        d2 = t[k1] * (director[k2] - along * half[k2]) - t[k2] * (director[k1] - along * half[k1])
+        m1[k] = cos * d1 + sin * d2
+        m2[k] = cos * d2 - sin * d1
+    return length
+
+
+@nb.njit(cache=True, error_model="numpy")
+def by_edge(weight, length, t, m1, m2, w, jacobian):  # type: ignore[no-untyped-def]
+    """(6, 4) derivatives of the edge's share of T and N by (e, theta); dm1 = -(m1.dt) t + m2 (dtheta - w.de)."""
+    for i in range(3):
+        for j in range(3):
+            delta = 1.0 if i == j else 0.0
+            jacobian[i, j] = weight * (delta - t[i] * t[j]) / length
+            jacobian[3 + i, j] = -weight * (t[i] * m1[j] / length + m2[i] * w[j])
+        jacobian[i, 3] = 0.0
+        jacobian[3 + i, 3] = weight * m2[i]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ignore[no-untyped-def]
+    """Add the second derivatives of t and m1, contracted with the energy's derivatives by T and N, to `local` (4, 4).
+
+    As in `bend_twist`: first for a frame that does not spin, then the spin dtheta -> dtheta - w.de, then the
+    symmetric part of the derivative of w; what is antisymmetric cancels.
+    """
+    tt, nt, n1, n2 = 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        tt += weight * by_t[k] * t[k]
+        nt += weight * by_n[k] * t[k]
+        n1 += weight * by_n[k] * m1[k]
+        n2 += weight * by_n[k] * m2[k]
+    square = length * length
+    for i in range(3):
+        ti, ni = weight * by_t[i] - tt * t[i], weight * by_n[i] - nt * t[i]
+        for j in range(3):
+            tj, nj = weight * by_t[j] - tt * t[j], weight * by_n[j] - nt * t[j]
+            delta = 1.0 if i == j else 0.0
+            value = -(t[i] * tj + ti * t[j]) - tt * (delta - t[i] * t[j])
+            value += nt * (t[i] * m1[j] + m1[i] * t[j]) - 0.5 * (m1[i] * nj + ni * m1[j])
+            value /= square
+            value += nt / length * (w[i] * m2[j] + m2[i] * w[j]) - n1 * w[i] * w[j]
+            value += 0.5 * n2 / length * (w[i] * (t[j] + half[j]) + (t[i] + half[i]) * w[j])
+            local[i, j] += value
+        mixed = -nt * m2[i] / length + n1 * w[i]
+        local[i, 3] += mixed
+        local[3, i] += mixed
+    local[3, 3] -= n1
+
+
+@nb.njit(cache=True, error_model="numpy")
+def spread(local, leg, other, hessian):  # type: ignore[no-untyped-def]
+    """Add `local` (4, 4), by (e, theta) of two edges, to the rows and columns of their nodes and angles."""
+    for i in range(3):
+        for j in range(3):
+            value = local[i, j]
+            hessian[3 * leg[0] + i, 3 * other[0] + j] += value
+            hessian[3 * leg[0] + i, 3 * other[1] + j] -= value
+            hessian[3 * leg[1] + i, 3 * other[0] + j] -= value
+            hessian[3 * leg[1] + i, 3 * other[1] + j] += value
+        hessian[3 * leg[0] + i, 3 * other[2]] -= local[i, 3]
+        hessian[3 * leg[1] + i, 3 * other[2]] += local[i, 3]
+        hessian[3 * leg[2], 3 * other[0] + i] -= local[3, i]
+        hessian[3 * leg[2], 3 * other[1] + i] += local[3, i]
+    hessian[3 * leg[2], 3 * other[2]] += local[3, 3]

@@ -1,9 +1,9 @@
 """Eccentric joints: two rods one above the other, their centre lines a distance d apart along their common normal.
 
-    E = C/2 |g|^2,   g = x_B - x_A - d (N_A + N_B)/2,   N the normals of the rods' sections (`sections`)
+    E = C/2 |g|^2,   g = x_B - x_A - d (N_A + N_B)/2,   N the normals of the rods' sections (`crossings`)
 
-A tie with a lever arm cannot be an equal index, so it is a stiff spring with every coupling. d is negative where
-rod A lies above rod B.
+A tie with a lever arm cannot be shared unknowns, so it is a stiff spring with every coupling. d is negative where rod
+A lies above rod B.
 """
 
 from dataclasses import dataclass
@@ -14,17 +14,26 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted
-from rodshell.joints.crossings import Places
-from rodshell.joints.sections import by_edge, carried, edge_tangents, frame, of_edge, spread, stencils
-from rodshell.layout.layers import sides
+from rodshell.joints.crossings import (
+    RodNodes,
+    by_edge,
+    edge_tangents,
+    frame,
+    of_edge,
+    spread,
+    stencils,
+    with_source,
+)
+from rodshell.layout.flatgrid import sides
+from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OffsetTie:
-    """Springs between two rods' nodes. See `RelativeRotation` for blocks, legs, weights and sources.
+    """Springs between two rods' nodes; blocks, legs, weights and sources as of `RelativeRotation`.
 
     Parameters
     ----------
@@ -42,7 +51,10 @@ class OffsetTie:
     source_tangents: Floats
     source_directors: Floats
 
+    __repr__ = brief
+
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _offset_tie(
                 state, self.blocks, self.legs, self.middles, self.weights, self.stiffness, self.offsets,
@@ -51,23 +63,32 @@ class OffsetTie:
         )  # fmt: skip
 
     def refreshed(self, state: Floats) -> Self:
-        return carried(self, state)
+        """The same ties with their source frames at `state` (N, 3)."""
+        return with_source(self, state)
 
 
-def offset_ties(places: Places, eccentricity: Floats, stiffness: float, size: int) -> list[OffsetTie]:
-    """Ties of the crossings whose `eccentricity` (c,) [m] is not zero, as elements on `size` blocks."""
-    which = np.flatnonzero(eccentricity)
-    if len(which) == 0:
+def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: float, size: int) -> list[OffsetTie]:
+    """Ties of the eccentric crossings.
+
+    Parameters
+    ----------
+    rod_nodes : of the mesh, whose rods lie in layers.
+    eccentricity : (c,) of each crossing of the grid [m]; those with 0 have no such tie.
+    stiffness : C [N/m].
+    size : number of blocks of the state.
+    """
+    eccentric = np.flatnonzero(eccentricity)
+    if len(eccentric) == 0:
         return []
-    met, flat = places.of_crossings[which], places.flat(size)
-    layer = sides(places.mesh.grid)[places.rods[met]]
-    offsets = 0.5 * eccentricity[which] * (layer[:, 1] - layer[:, 0])
+    pairs, flat = rod_nodes.at_crossings[eccentric], rod_nodes.flat_state(size)
+    layer = sides(rod_nodes.mesh.grid)[rod_nodes.rods[pairs]]
+    offsets = 0.5 * eccentricity[eccentric] * (layer[:, 1] - layer[:, 0])
     sets = []
-    for mine, blocks, legs, middles, weights in stencils(places, met):
+    for members, blocks, legs, middles, weights in stencils(rod_nodes, pairs):
         tangents = edge_tangents(flat, blocks, legs)
-        firm = np.full(len(blocks), stiffness)
         directors = adapted(np.broadcast_to(UP, tangents.shape), tangents)
-        sets.append(OffsetTie(blocks, legs, middles, weights, firm, offsets[mine], tangents, directors))
+        same = np.full(len(blocks), stiffness)
+        sets.append(OffsetTie(blocks, legs, middles, weights, same, offsets[members], tangents, directors))
     return sets
 
 

@@ -1,7 +1,6 @@
 """The assembled shell: free directions of its nodes, and the sum of its energies in them."""
 
-from rodshell.model.assembly import Assembly
-from rodshell.model.freedom import Freedom
+from rodshell.model.assembly import Assembly, Freedom
 from rodshell.model.shell import Shell
 
 __all__ = ["Assembly", "Freedom", "Shell"]

@@ -1,37 +1,141 @@
-"""The sum of element Hessians in the free directions, as the upper triangle of a sparse matrix."""
+"""Free directions of each block of the state, and the sum of element Hessians in them as a sparse matrix."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints
-from rodshell.model.freedom import Freedom
+from rodshell.arrays import Floats, Ints, Longs
+from rodshell.records import brief
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """Free directions of each block [HQK Eq 12].
+
+    Supports, prescribed motion and sliding on a surface all remove directions. The reduced system in the free
+    directions is symmetric (ERRATA E14 to HQK Eq 11, whose row-filtered form is not).
+
+    A direction of zero length is blocked: it stays among the unknowns, where a solver puts 1 on the diagonal, so that
+    nodes that touch and leave at each step of a motion need no new pattern of the matrix.
+
+    Parameters
+    ----------
+    directions : (n, 3, 3); `directions[i, k]` is the k-th free direction of block i, orthonormal.
+    count : (n,) number of free directions, 0 to 3.
+    """
+
+    directions: Floats
+    count: Ints
+
+    def __repr__(self) -> str:
+        return f"Freedom({len(self.count)} blocks, {self.size} free directions)"
+
+    @staticmethod
+    def free(blocks: int) -> "Freedom":
+        """So many `blocks`, each free along x, y and z.
+
+        Parameters
+        ----------
+        blocks : number of blocks.
+        """
+        return Freedom(np.tile(np.eye(3), (blocks, 1, 1)), np.full(blocks, 3, dtype=np.intp))
+
+    def with_directions(self, blocks: Ints, *directions: tuple[float, float, float]) -> "Freedom":
+        """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed).
+
+        Parameters
+        ----------
+        blocks : (k,) indices of blocks.
+        directions : orthonormal vectors, up to three.
+        """
+        table, count = self.directions.copy(), self.count.copy()
+        for k, direction in enumerate(directions):
+            table[blocks, k] = direction
+        count[blocks] = len(directions)
+        return Freedom(table, count)
+
+    @cached_property
+    def first(self) -> Ints:
+        """(n,) index of each block's first reduced DOF."""
+        return np.cumsum(self.count) - self.count
+
+    @cached_property
+    def size(self) -> int:
+        """Number of reduced DOFs."""
+        return int(self.count.sum())
+
+    @cached_property
+    def _slots(self) -> tuple[Ints, Ints]:
+        block = np.repeat(np.arange(len(self.count)), self.count)
+        return block, np.arange(self.size) - self.first[block]
+
+    @cached_property
+    def blocked(self) -> Ints:
+        """Reduced DOFs whose direction is zero."""
+        block, k = self._slots
+        return np.flatnonzero(~self.directions[block, k].any(axis=1))
+
+    def expand(self, q: Floats) -> Floats:
+        """Displacements (n, 3) of reduced DOFs (size,).
+
+        Parameters
+        ----------
+        q : (size,) values of the reduced DOFs.
+        """
+        return np.asarray(_expand(q, self.directions, self.count))
+
+    def reduce(self, gradient: Floats) -> Floats:
+        """Components (size,) of a gradient (n, 3) in the free directions.
+
+        Parameters
+        ----------
+        gradient : (n, 3) [N].
+        """
+        return np.asarray(_reduce(gradient, self.directions, self.count, self.size))
+
+    def reduce_diagonal(self, diagonal: Floats) -> Floats:
+        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses.
+
+        Parameters
+        ----------
+        diagonal : (n, 3) components of d.
+        """
+        block, k = self._slots
+        return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))
+
+
+@dataclass(frozen=True, eq=False)
 class Assembly:
-    """Where each block of each element's Hessian goes; made once per pattern.
+    """Position of each block of each element's Hessian in a sparse matrix; made once per pattern. Build it with `of`.
 
-    The pattern depends on which blocks the elements touch and on how many free directions each block has,
-    not on the directions. Compressed columns, rows ascending, every diagonal present.
+    The pattern depends on which blocks the elements touch and on how many free directions each block has, not on the
+    directions. Compressed columns, rows ascending, every diagonal present.
 
     Parameters
     ----------
     indptr, indices : the pattern (CSC, upper triangle).
     """
 
-    indptr: NDArray[np.int64]
-    indices: NDArray[np.int64]
+    indptr: Longs
+    indices: Longs
     _count: Ints
     _above: Ints  # (n,) rows above the diagonal block in a block's columns
     _slots: tuple[Ints, ...]  # per element set (m, k, k): where the block begins in the data, -1 if not stored
 
+    __repr__ = brief
+
     @staticmethod
     def of(element_blocks: Sequence[Ints], freedom: Freedom) -> "Assembly":
-        """Plan the assembly of element sets with `blocks` (m, k) each."""
+        """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`.
+
+        Parameters
+        ----------
+        element_blocks : of each element set, (m, k) blocks of its elements.
+        freedom : free directions of all blocks.
+        """
         count = freedom.count
         everywhere = np.arange(len(count))[:, None]
         start, rows = _pattern([*element_blocks, everywhere], count)
@@ -40,16 +144,32 @@ class Assembly:
         return Assembly(indptr, indices, count, above, slots)
 
     def assemble(self, hessians: Sequence[Floats], element_blocks: Sequence[Ints], freedom: Freedom) -> Floats:
-        """Values of the reduced Hessian for element Hessians (m, 3k, 3k) of each set."""
+        """(nnz,) values of the reduced Hessian, from the element Hessians (m, 3k, 3k) and blocks (m, k) of each set.
+
+        Parameters
+        ----------
+        hessians : of each element set, (m, 3k, 3k) element Hessians.
+        element_blocks : of each element set, (m, k) blocks of its elements.
+        freedom : free directions, as many of each block as in the plan.
+        """
         data = np.zeros(len(self.indices))
-        for k, (hessian, blocks) in enumerate(zip(hessians, element_blocks, strict=True)):
-            self.add(k, hessian, blocks, freedom, data)
+        for index, (hessian, blocks) in enumerate(zip(hessians, element_blocks, strict=True)):
+            self.add(index, hessian, blocks, freedom, data)
         return data
 
-    def add(self, which: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
-        """Add the Hessians (m, 3k, 3k) of one of the element sets to the values `data`."""
+    def add(self, index: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
+        """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,).
+
+        Parameters
+        ----------
+        index : of the element set.
+        hessian : (m, 3k, 3k) element Hessians.
+        blocks : (m, k) blocks of the elements.
+        freedom : free directions, as many of each block as in the plan.
+        data : (nnz,) values to which theirs are added.
+        """
         if len(blocks):
-            _scatter(hessian, blocks, self._slots[which], self._count, self._above, freedom.directions, data)
+            _scatter(hessian, blocks, self._slots[index], self._count, self._above, freedom.directions, data)
 
     @property
     def diagonal(self) -> Ints:
@@ -63,10 +183,11 @@ def _pattern(element_blocks: Sequence[Ints], count: Ints) -> tuple[Ints, Ints]:
     for blocks in element_blocks:
         _count_pairs(blocks, count, total)
     start = np.cumsum(total)
-    rows, place = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
+    rows, end = np.empty(start[-1], dtype=np.int64), start[:-1].copy()
     for blocks in element_blocks:
-        _fill_pairs(blocks, count, place, rows)
-    return _unique_rows(start, rows)
+        _fill_pairs(blocks, count, end, rows)
+    kept, unique = _unique_rows(start, rows)
+    return kept, unique
 
 
 @nb.njit(cache=True)
@@ -80,14 +201,14 @@ def _count_pairs(blocks, count, total):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)
-def _fill_pairs(blocks, count, place, rows):  # type: ignore[no-untyped-def]
+def _fill_pairs(blocks, count, end, rows):  # type: ignore[no-untyped-def]
     for m in range(blocks.shape[0]):
         for b in range(blocks.shape[1]):
             for a in range(blocks.shape[1]):
                 i, j = blocks[m, a], blocks[m, b]
                 if (i < j or a == b) and count[i] > 0 and count[j] > 0:
-                    rows[place[j]] = i
-                    place[j] += 1
+                    rows[end[j]] = i
+                    end[j] += 1
 
 
 @nb.njit(cache=True)
@@ -181,3 +302,27 @@ def _scatter(hessians, blocks, slots, count, above, directions, data):  # type: 
                         data[begin + r] += (
                             directions[i, r, 0] * w0 + directions[i, r, 1] * w1 + directions[i, r, 2] * w2
                         )
+
+
+@nb.njit(cache=True)
+def _expand(q, directions, count):  # type: ignore[no-untyped-def]
+    result, at = np.zeros((len(count), 3)), 0
+    for i in range(len(count)):
+        for k in range(count[i]):
+            for d in range(3):
+                result[i, d] += q[at] * directions[i, k, d]
+            at += 1
+    return result
+
+
+@nb.njit(cache=True)
+def _reduce(gradient, directions, count, size):  # type: ignore[no-untyped-def]
+    result, at = np.empty(size), 0
+    for i in range(len(count)):
+        for k in range(count[i]):
+            total = 0.0
+            for d in range(3):
+                total += gradient[i, d] * directions[i, k, d]
+            result[at] = total
+            at += 1
+    return result

@@ -1,4 +1,4 @@
-"""The line of a rod at rest: its edges, its clamped ends, and the stretches of rod that its bends stand for."""
+"""A rod at rest: its nodes and edges, its clamped ends, and where it bends, with the length of rod at each bend."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,23 +11,30 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, directors_along, parallel_transport, signed_angle
 from rodshell.geometry.vectors import cross, dot
+from rodshell.records import brief
 from rodshell.rods.section import Rod
-from rodshell.validation import direction, finite
+from rodshell.validation import described, direction, finite, instance
 
 End = Literal["start", "end"]
 Rods = Rod | Sequence[Rod] | Callable[[float], Rod]
 Clamps = Sequence[End] | Mapping[End, ArrayLike]
 
 
-@dataclass(frozen=True)
+_FOLDED = -1 + 1e-9  # cosine of a turn that has no curvature
+
+
+@dataclass(frozen=True, eq=False)
 class RodLine:
-    """Nodes in a row and what follows from them.
+    """Nodes in a row and what follows from them. Build it with `of`.
 
     Parameters
     ----------
-    nodes : (n, 3) [m]; closed : the last edge leads back to the first node.
-    edges : (e, 2) nodes of each; tangents : (e, 3); lengths : (e,) [m].
-    clamps : the tangent along the rod at each clamped end.
+    nodes : (n, 3) [m].
+    closed : a ring: the last edge leads back to the first node.
+    edges : (e, 2) nodes of each edge.
+    tangents : (e, 3) unit tangents of the edges.
+    lengths : (e,) of the edges [m].
+    clamps : (3,) unit tangent along the rod at each clamped end.
     """
 
     nodes: Floats
@@ -37,12 +44,18 @@ class RodLine:
     lengths: Floats
     clamps: dict[End, Floats]
 
+    __repr__ = brief
+
     @staticmethod
     def of(rest: ArrayLike, *, closed: bool, clamped: Clamps) -> "RodLine":
-        """Raises InputError where `rest` or a clamp makes no rod."""
-        count = np.shape(rest)[0] if np.ndim(rest) == 2 else 0
-        if count < 3:
-            raise InputError(f"a rod needs 3 nodes or more, (n, 3), not an array {np.shape(rest)}")
+        """The line through the nodes `rest` (n, 3) [m], clamped at some ends.
+
+        Raises
+        ------
+        InputError : there are fewer than 3 nodes, an edge has no length, the rod folds back on itself, or a clamp is
+            not an end or points against the rod.
+        """
+        count = _points(rest)
         nodes = finite("the positions of a rod's nodes", rest, count, 3).copy()
         starts = np.arange(count if closed else count - 1)
         edges = np.column_stack([starts, (starts + 1) % count])
@@ -59,50 +72,77 @@ class RodLine:
         return RodLine(nodes, closed, edges, tangents, lengths, _clamps(clamped, tangents, lengths, closed))
 
     def rods(self, rod: Rods) -> list[Rod]:
-        """One for each edge."""
+        """The rod of each edge: the same for all, one for each, or a function of the arc length of its middle [m].
+
+        Parameters
+        ----------
+        rod : one rod, a sequence of them, or a function.
+
+        Raises
+        ------
+        InputError : they are not rods, or not as many as there are edges.
+        """
         count = len(self.lengths)
         if isinstance(rod, Rod):
             return [rod] * count
         if callable(rod):
             result = [rod(float(s)) for s in np.cumsum(self.lengths) - 0.5 * self.lengths]
         else:
-            result = list(rod) if isinstance(rod, Sequence) else [rod]
-            if len(result) != count and all(isinstance(one, Rod) for one in result):
+            result = list(rod) if isinstance(rod, Sequence) and not isinstance(rod, str) else [rod]
+            if len(result) != count and all(isinstance(item, Rod) for item in result):
                 raise InputError(f"a rod of {count} edges takes as many rods, one for each edge, not {len(result)}")
-        wrong = [one for one in result if not isinstance(one, Rod)]
-        if wrong:
-            raise InputError(f"a rod is made of Rod(section, material), not of {wrong[0]!r}")
+        for item in result:
+            instance("rod", item, Rod)
         return result
 
     def directors(self, director: ArrayLike | None) -> Floats:
-        """(e, 3) first material directors: of the first edge, carried along without twist, or one for each."""
+        """(e, 3) first material directors of the edges.
+
+        Parameters
+        ----------
+        director : (3,) of the first edge, transported along the rod without twist; (e, 3) of each edge; None: z, or x
+            where the rod starts within 25 degrees of z.
+        """
         if director is None:
             director = (0.0, 0.0, 1.0) if abs(self.tangents[0, 2]) < 0.9 else (1.0, 0.0, 0.0)
         if np.ndim(director) == 2:
             return adapted(finite("the directors, one for each edge,", director, len(self.tangents), 3), self.tangents)
         return directors_along(self.tangents, direction("the director", director))
 
-    def bends(self) -> tuple[Ints, Ints]:
-        """(m,) nodes where the rod bends, and (m, 2) edges before and after; the clamps come on top."""
+    def inner_bends(self) -> tuple[Ints, Ints]:
+        """(m,) nodes at which the rod bends, and (m, 2) edges before and after; without the clamps."""
         nodes = np.arange(len(self.nodes)) if self.closed else np.arange(1, len(self.nodes) - 1)
         return nodes, np.column_stack([(nodes - 1) % len(self.nodes), nodes])
 
     def ghost(self, end: End) -> Floats:
-        """(3,) where the rod would go on past a clamped end by its last edge [m]."""
+        """(3,) position of the ghost node of a clamped end, one last edge past it [m]."""
         edge, node, outward = (0, 0, -1.0) if end == "start" else (-1, -1, 1.0)
         return np.asarray(self.nodes[node] + outward * self.lengths[edge] * self.clamps[end])
 
     def end_director(self, directors: Floats, end: End) -> Floats:
-        """(3,) director at a clamp: that of the last edge, carried there with the twist of the two last edges."""
+        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges.
+
+        Parameters
+        ----------
+        directors : (e, 3) first material directors of the edges.
+        end : the clamped end.
+        """
         order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
         (d0, d1), (t0, t1), (l0, l1) = directors[order], self.tangents[order], self.lengths[order]
         twist = signed_angle(parallel_transport(d1, t1, t0), d0, t0)  # from the inner edge to the last
         turn, tangent = twist * l0 / (l0 + l1), self.clamps[end]
-        carried = parallel_transport(d0, t0, tangent)
-        return np.asarray(np.cos(turn) * carried + np.sin(turn) * cross(tangent, carried))
+        moved = parallel_transport(d0, t0, tangent)
+        return np.asarray(np.cos(turn) * moved + np.sin(turn) * cross(tangent, moved))
 
     def mass(self, size: int, rods: list[Rod], angles: slice) -> Floats:
-        """(size, 3) mass [kg]: half of each edge's at either node; rotary inertia [kg m2] of its angle, if any."""
+        """(size, 3) lumped mass of each block: half of each edge's at either node [kg]; rotary inertia [kg m2].
+
+        Parameters
+        ----------
+        size : number of blocks.
+        rods : of each edge.
+        angles : blocks of the twist angles, or empty.
+        """
         mass = np.zeros((size, 3))
         half = 0.5 * self.lengths * [rod.mass_per_length for rod in rods]
         for side in range(2):
@@ -112,14 +152,91 @@ class RodLine:
         return mass
 
 
-_FOLDED = -1 + 1e-9  # cosine of a turn that has no side
+@dataclass(frozen=True, eq=False)
+class RodBends:
+    """The bends of a rod: at its inner nodes in turn, then at its clamps. Build them with `of`.
+
+    Parameters
+    ----------
+    size : number of blocks of the rod.
+    angles : blocks of the edges' twist angles.
+    blocks : (b, 5) as of `BendTwist`; without twist angles the numbers of angles mean nothing.
+    lengths : (b,) rest length of rod at each bend (Voronoi length; half an edge at a clamp) [m].
+    stiffness : (b, 3) EI1, EI2 and GJ over that length [N m].
+    like : (b,) the inner node whose natural strains it shares, counted from the first.
+    """
+
+    size: int
+    angles: slice
+    blocks: Ints
+    lengths: Floats
+    stiffness: Floats
+    like: Ints
+
+    __repr__ = brief
+
+    @staticmethod
+    def of(line: RodLine, stiffness: Floats, twist: bool) -> "RodBends":
+        """The bends of a line.
+
+        Parameters
+        ----------
+        stiffness : (e, 3) EI1, EI2 and GJ of the edges [N m2]; the compliances of the half edges on either side of a
+            node add up.
+        twist : the rod has twist angles.
+        """
+        n, (middles, edges) = len(line.nodes), line.inner_bends()
+        angles = slice(n, n + (len(line.edges) if twist else 0))
+        blocks = np.column_stack(
+            [line.edges[edges[:, 0], 0], n + edges[:, 0], middles, n + edges[:, 1], line.edges[edges[:, 1], 1]]
+        )
+        compliance = 0.5 * line.lengths[:, None] / stiffness
+        at_bends = 1.0 / (compliance[edges[:, 0]] + compliance[edges[:, 1]])
+        lengths, like = 0.5 * line.lengths[edges].sum(axis=1), np.arange(len(middles))
+        for k, end in enumerate(line.clamps):
+            ghost, (edge, last, inner) = angles.stop + k, (0, 0, 1) if end == "start" else (n - 2, n - 1, n - 2)
+            row = [ghost, ghost + len(line.clamps), last, n + edge, inner]
+            blocks = np.vstack([blocks, row if end == "start" else row[::-1]])
+            lengths = np.append(lengths, 0.5 * line.lengths[edge])
+            at_bends = np.vstack([at_bends, stiffness[edge] / lengths[-1]])
+            like = np.append(like, 0 if end == "start" else n - 3)
+        size = angles.stop + len(line.clamps) * (2 if twist else 1)
+        return RodBends(size, angles, blocks, lengths, at_bends, like)
+
+    def rest_state(self, line: RodLine, directors: Floats) -> tuple[Floats, Floats]:
+        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges.
+
+        Parameters
+        ----------
+        line : the rod at rest.
+        directors : (e, 3) first material directors of its edges.
+        """
+        state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
+        state[: len(line.nodes)], frames[self.angles] = line.nodes, directors
+        for k, end in enumerate(line.clamps):
+            ghost = self.angles.stop + k
+            state[ghost] = line.ghost(end)
+            frames[ghost + len(line.clamps)] = line.end_director(directors, end)
+        return state, frames
+
+
+def _points(rest: ArrayLike) -> int:
+    """How many nodes there are."""
+    try:
+        shape = np.shape(rest)
+    except ValueError:  # rows of different lengths
+        shape = ()
+    if len(shape) != 2 or shape[0] < 3:
+        what = f"an array {shape}" if shape else described(rest)
+        raise InputError(f"a rod needs 3 nodes or more, (n, 3) in m, not {what}")
+    return shape[0]
 
 
 def _clamps(clamped: Clamps, tangents: Floats, lengths: Floats, closed: bool) -> dict[End, Floats]:
-    """Tangent at each clamp."""
+    """Unit tangent at each clamp."""
     wanted: dict[End, ArrayLike | None]
-    if isinstance(clamped, str):
-        raise InputError(f'clamped takes the ends in a row, such as ("{clamped}",), not {clamped!r}')
+    if isinstance(clamped, str) or not isinstance(clamped, Sequence | Mapping):
+        raise InputError(f'clamped must be a sequence of ends, such as ("start",), not {described(clamped)}')
     wanted = dict(clamped) if isinstance(clamped, Mapping) else dict.fromkeys(clamped)
     if wanted and closed:
         raise InputError("a closed ring has no ends to clamp")
@@ -129,7 +246,7 @@ def _clamps(clamped: Clamps, tangents: Floats, lengths: Floats, closed: bool) ->
             raise InputError(f'a rod is clamped at its "start" or "end", not {end!r}')
         (t0, t1), (l0, l1) = (x[:2] if end == "start" else x[-1:-3:-1] for x in (tangents, lengths))
         if tangent is None:
-            tangent = t0 + (t0 - t1) * l0 / (l0 + l1)  # that of the two last edges, to second order
+            tangent = t0 + (t0 - t1) * l0 / (l0 + l1)  # extrapolated from the two last edges, to second order
         result[end] = direction(f'the tangent at the "{end}"', tangent)
         if result[end] @ t0 < _FOLDED:
             raise InputError(f'the tangent at the "{end}" points against the rod: it runs along it, from start to end')

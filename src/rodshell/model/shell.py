@@ -1,18 +1,19 @@
-"""A meshed grid of rods and joints as a sum of energies, with its clamps and, where they matter, its twist angles.
+"""A meshed grid of rods and joints as a sum of energies, with its clamps and, where needed, its twist angles.
 
 The state's blocks are the nodes, then the ghost nodes of the clamps, then the twist angles of the edges (and of the
-ghost edges, where they matter), then, with a penalty coupling, the nodes and the twist angles of the linkers.
+ghost edges, where needed), then, with a penalty coupling, the nodes and the twist angles of the linkers.
 
-The coupling decides the nodes [HQK 2.2]. With shared DOFs rods have one node at a joint, and linkers no unknowns of
-their own. With a penalty every rod and every linker has its own: `like` says which block of the shared form each
-copies, and the mass of that block is divided among its copies equally, so that none is counted twice.
+The coupling decides the nodes [HQK 2.2]. With shared DOFs rods have one node at a joint, and linkers have no unknowns.
+With a penalty each rod and each linker has its own: `like` is the block of the shared form that each copies, and the
+mass of that block is divided equally among its copies, so that none is counted twice.
 
-Eccentric joints lay the rods in two layers, whose mesh gives every rod nodes of its own (`GridMesh.in_layers`).
+Eccentric joints lay the rods in two layers, whose mesh gives each rod its own nodes (`GridMesh.in_layers`).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,41 +21,54 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import unit
-from rodshell.joints import Ball, Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, SharedDofs, Ties
-from rodshell.joints.crossings import Places
-from rodshell.joints.elastic import elastic_joints, refuse_mixtures
+from rodshell.joints import (
+    Ball,
+    Coupling,
+    ExplicitPenalty,
+    ImplicitPenalty,
+    Joint,
+    Linker,
+    SharedDofs,
+    Ties,
+    require_joint,
+)
+from rodshell.joints.crossings import RodNodes
+from rodshell.joints.joint_stiffness import elastic_joints, refuse_mixtures
 from rodshell.joints.linkers import Corners, LinkerBend
 from rodshell.joints.offset_tie import offset_ties
 from rodshell.layout import GridMesh
-from rodshell.model.freedom import Freedom
+from rodshell.model.assembly import Freedom
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
-from rodshell.rods.isotropic_bend import IsotropicBend
+from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
 from rodshell.rods.stretch import Stretch
+from rodshell.validation import instance
 
 UP = (0.0, 0.0, 1.0)
-OFFSET_STIFFNESS = 10.0  # of an edge's: ties of eccentric joints
-SPIN = (1.0, 0.0, 0.0)  # the one component of an angle block that means anything
+OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
+ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
+Item = TypeVar("Item")
+COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shell:
     """The assembled shell. Build it with `of`.
 
     Parameters
     ----------
     mesh : its nodes and edges, rods sharing their nodes at joints.
-    coupling : how its rods hold together.
-    node_count : of the rods' nodes: the mesh's, or more where rods do not share them.
-    within : energies of single rods and linkers: bending, and twist where it matters.
+    coupling : how rods that meet at a joint are tied.
+    node_count : number of the rods' nodes: the mesh's, or more where rods do not share them.
+    within : energies of single rods and linkers: bending, and twist where needed.
     between : energies between rods and linkers: joints and ties.
     stretch : the edges.
     ends : (2m,) block of each rod end, start and end of each rod in turn.
-    ghosts : (2m,) ghost node past each end, or empty where the ends are pinned.
+    ghosts : (2m,) block of the ghost node past each end, or empty if the ends are pinned.
     angles : number of twist angles, or 0.
-    spinning : (s,) blocks of one twist angle of each rod that nothing else keeps from spinning about itself.
-    like : (N,) for each block that of the shared form which it copies; there, the block itself.
+    spinning : (s,) block of one twist angle of each rod that could otherwise spin about itself.
+    like : (N,) the block of the shared form that each block copies: with shared DOFs the block itself.
     mass : (N, 3) lumped mass of each block's components [kg; of twist angles kg m2].
     """
 
@@ -71,6 +85,11 @@ class Shell:
     like: Ints
     mass: Floats
 
+    def __repr__(self) -> str:
+        ends = "clamped" if len(self.ghosts) else "pinned"
+        coupled = "" if isinstance(self.coupling, SharedDofs) else f", {self.coupling.name} coupling"
+        return f"Shell({self.node_count} nodes, {len(self.stretch.blocks)} edges, {ends}{coupled})"
+
     @staticmethod
     def of(
         mesh: GridMesh,
@@ -85,29 +104,34 @@ class Shell:
 
         Parameters
         ----------
-        mesh : where joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
-        rod : one for all, or one for each rod of the grid.
-        clamped : each rod goes on to a ghost node past its end that holds its direction there. The end's
-            Voronoi length is half its last edge, so that the clamp acts exactly at the end (second order). A rod
-            may spin in its clamp.
-        joint : one for all, or one for each crossing of the grid; ball joints without.
-        coupling : shared DOFs without. Eccentric joints are tied by springs with any coupling.
-        twist : carry twist angles; None: where any energy depends on them.
+        mesh : if joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
+        rod : the same for all, or one for each rod of the grid.
+        clamped : each rod continues to a ghost node past its end that holds its direction there. The end's Voronoi
+            length is half its last edge, so that the clamp acts exactly at the end (second order). A rod may spin in
+            its clamp.
+        joint : the same for all, or one for each crossing of the grid; None: ball joints.
+        coupling : None: shared DOFs. Eccentric joints are tied by springs with any coupling.
+        twist : give the rods twist angles; None: if any energy depends on them.
 
         Raises
         ------
-        InputError : rods or joints are not as many as those of the grid; joints that exclude each other.
+        InputError : an argument is of the wrong kind; rods or joints are not as many as those of the grid; joints
+            exclude each other; `twist` is False although an energy depends on twist angles.
         """
+        instance("mesh", mesh, GridMesh)
+        require_joint(joint)
+        if coupling is not None:
+            instance("coupling", coupling, Coupling, COUPLING)
         return _Builder(mesh, rod, joint, coupling or SharedDofs(), clamped, twist).shell()
 
     @property
     def elements(self) -> tuple[Elements, ...]:
-        """Every energy but the stretch. That of explicit ties is in here too: an equilibrium is the same."""
+        """All energies but the stretch, those of explicit ties included: an equilibrium is the same."""
         return (*self.within, *self.between)
 
     @property
     def explicit(self) -> tuple[Elements, ...]:
-        """Those of the elements whose forces a motion freezes at the start of each step."""
+        """The elements whose forces a motion freezes at the start of each step."""
         return self.between if isinstance(self.coupling, ExplicitPenalty) else ()
 
     @property
@@ -122,8 +146,8 @@ class Shell:
         return self.mesh.rod_nodes if shared else np.arange(len(self.mesh.rod_nodes))
 
     @cached_property
-    def places(self) -> Floats:
-        """(N, 2) where each block lies in the flat grid [m]; a twist angle in the middle of its edge."""
+    def flat_coordinates(self) -> Floats:
+        """(N, 2) coordinates of each block in the flat grid [m]; of a twist angle those of its edge's middle."""
         flat = self.mesh.flat[:, :2]
         ghosts = flat[self.mesh.ends.ravel()[: len(self.ghosts)]]
         middles = flat[self.mesh.edges].mean(axis=1)
@@ -131,10 +155,14 @@ class Shell:
         return np.vstack([flat, ghosts, angles])[self.like]
 
     def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
-        """State blocks from the positions (n, 3) of the mesh's nodes and the outward end tangents (2m, 3).
+        """(N, 3) state of the shell.
 
+        Parameters
+        ----------
+        positions : (n, 3) of the mesh's nodes [m].
+        tangents : (2m, 3) outward unit tangents at the rod ends, which clamped ends need.
         normals : (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
-            without, the directors are those of the flat grid, carried along by the smallest rotation.
+            None: the directors are those of the flat grid, moved by the smallest rotation.
         """
         shared = np.zeros((self.like.max() + 1, 3))
         shared[: len(positions)] = positions
@@ -147,20 +175,30 @@ class Shell:
         return state
 
     def positions(self, state: Floats) -> Floats:
-        """(n, 3) positions of the mesh's nodes in a state [m]; of nodes that a penalty ties, their middle."""
+        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         result, visits = np.zeros((self.mesh.node_count, 3)), np.zeros(self.mesh.node_count)
         np.add.at(result, self.mesh.rod_nodes, state[self.node_blocks])
         np.add.at(visits, self.mesh.rod_nodes, 1.0)
         return result / visits[:, None]
 
     def freedom(self) -> Freedom:
-        """All nodes free, ghosts fixed, one free component a twist angle; what would spin for nothing is held."""
+        """All nodes free, ghosts fixed, one free component a twist angle; rods that could spin freely are held."""
         free = Freedom.free(len(self.like)).with_directions(self.ghosts)
         turning = np.flatnonzero(self.like >= self.mesh.node_count + len(self.ghosts))
-        return free.with_directions(turning, SPIN).with_directions(self.spinning)
+        return free.with_directions(turning, ANGLE).with_directions(self.spinning)
 
     def with_elements(self, elements: tuple[Elements, ...]) -> "Shell":
-        """The same shell with its elements' source frames elsewhere."""
+        """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere.
+
+        Parameters
+        ----------
+        elements : those within rods and linkers, then those between them.
+        """
         count = len(self.within)
         return replace(self, within=elements[:count], between=elements[count:])
 
@@ -172,19 +210,25 @@ class Shell:
         """Set the twist angles so that the first directors are as near to the normals as they can be."""
         flat = self.mesh.flat[self.mesh.edges]
         before, now = (unit(np.diff(ends, axis=1)[:, 0]) for ends in (flat, state[self.stretch.blocks]))
-        carried = parallel_transport(adapted(np.broadcast_to(UP, before.shape), before), before, now)
+        moved = parallel_transport(adapted(np.broadcast_to(UP, before.shape), before), before, now)
         wanted = adapted(unit(normals[self.mesh.edges].sum(axis=1)), now)
-        self.turn_edges(state, signed_angle(carried, wanted, now))
+        self.turn_edges(state, signed_angle(moved, wanted, now))
 
     def turn_edges(self, state: Floats, turns: Floats) -> None:
-        """Add `turns` (e,) [rad] to the twist angles of the rods' edges, and of the linkers that copy them."""
+        """Add `turns` (e,) [rad] to the twist angles in `state` of the rods' edges and their copies.
+
+        Parameters
+        ----------
+        state : (N, 3), which is changed.
+        turns : (e,) of the mesh's edges [rad].
+        """
         first = self.mesh.node_count + len(self.ghosts)
         turning = np.flatnonzero((self.like >= first) & (self.like < first + len(turns)))
         state[turning, 0] += turns[self.like[turning] - first]
 
 
 class _Builder:
-    """What the assembly of a shell needs on the way."""
+    """The assembly of a shell, step by step."""
 
     def __init__(
         self,
@@ -195,20 +239,22 @@ class _Builder:
         clamped: bool,
         twist: bool | None,
     ) -> None:
-        self.rods = _one_each(rod, Rod, len(mesh.grid.rods), "rods")
-        self.joints = _one_each(joint or Ball(), None, len(mesh.grid.crossings), "crossings")
+        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
+        for item in self.rods:
+            instance("rod", item, Rod)
+        self.joints = _per_item(joint or Ball(), len(mesh.grid.crossings), "crossings")
         if isinstance(joint, Sequence):
             refuse_mixtures(mesh.joint_nodes, self.joints)
-        eccentricity = max((one.eccentricity for one in self.joints), default=0.0)
+        eccentricity = max((item.eccentricity for item in self.joints), default=0.0)
         if eccentricity and not mesh.layered:
             mesh = mesh.in_layers(eccentricity)
         self.mesh, self.coupling = mesh, coupling
-        self.stiffness = np.array([(*one.bend_stiffnesses, one.twist_stiffness) for one in self.rods])
+        self.stiffness = np.array([(*item.bend_stiffnesses, item.twist_stiffness) for item in self.rods])
         self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
-        needed = not self.isotropic or any(one.turns_frames for one in self.joints)
+        needed = not self.isotropic or any(item.turns_frames for item in self.joints)
         self.twist = needed if twist is None else twist
         if needed and not self.twist:
-            raise InputError("these rods and joints turn frames: they cannot go without twist angles")
+            raise InputError("these rods or joints need twist angles: leave out twist=False")
         self.apart = mesh.layered or not isinstance(coupling, SharedDofs)
         self.parts = mesh.apart if self.apart and not mesh.layered else mesh
         n = self.parts.node_count
@@ -217,43 +263,44 @@ class _Builder:
         self.first_angle = n + len(self.ghosts)
         self.angles = (len(mesh.edges) + (0 if self.isotropic else len(self.ghosts))) if self.twist else 0
         self.size = self.first_angle + self.angles
-        self.places = Places(mesh, self.parts.rod_nodes, self.first_angle)
+        self.rod_nodes = RodNodes(mesh, self.parts.rod_nodes, self.first_angle)
         shared = mesh.node_count
         rest = shared + np.arange(len(self.ghosts) + self.angles)
         self.like = np.append(mesh.rod_nodes if self.apart else np.arange(shared), rest)
 
     def shell(self) -> Shell:
         mesh, parts = self.mesh, self.parts
-        stretch = Stretch.elastic(
-            parts.edges, mesh.edge_lengths, np.array([rod.stretch_stiffness for rod in self.rods])[mesh.edge_rods]
-        )
+        axial = np.array([rod.stretch_stiffness for rod in self.rods])[mesh.edge_rods]
+        stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, axial)
         bends = self._bends()
         linkers, linker_ties = self._linkers()
-        turned = [n for n, one in enumerate(self.joints) if one.holds_normals]
-        steady = np.unique(mesh.grid.crossings.rods[turned]) if self.isotropic else np.arange(len(self.rods))
-        loose = np.setdiff1d(np.arange(len(self.rods)), steady) if self.twist else np.empty(0, dtype=np.intp)
-        spinning = self.first_angle + np.searchsorted(mesh.edge_rods, loose)
         copies = np.bincount(self.like)
-        shared = self._shared_mass()
-        mass = shared[self.like] / copies[self.like][:, None]
+        mass = self._shared_mass()[self.like] / copies[self.like][:, None]
         within, between = (*bends, *linkers), (*self._elastic(), *self._ties(), *linker_ties)
         return Shell(
             mesh, self.coupling, parts.node_count, within, between, stretch,
-            parts.ends.ravel(), self.ghosts, self.angles, spinning, self.like, mass,
+            parts.ends.ravel(), self.ghosts, self.angles, self._spinning(), self.like, mass,
         )  # fmt: skip
 
+    def _spinning(self) -> Ints:
+        """Block of the first twist angle of each rod that could spin about itself."""
+        if not (self.isotropic and self.twist):
+            return np.empty(0, dtype=np.intp)
+        holding = [index for index, joint in enumerate(self.joints) if joint.holds_normals]
+        held = np.unique(self.mesh.grid.crossings.rods[holding])
+        loose = np.setdiff1d(np.arange(len(self.rods)), held)
+        return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
+
     def _bends(self) -> tuple[Elements, ...]:
-        """Of single rods. Isotropic ones bend without their frames: see `ElasticRod`."""
+        """Bending and twist of single rods. Isotropic rods bend without their frames: see `ElasticRod`."""
         mesh, parts = self.mesh, self.parts
         per_length = self.stiffness[mesh.bend_rods] / mesh.voronoi_lengths[:, None]
         edge = self.first_angle + np.arange(len(mesh.edges))
-        same = mesh.edge_rods[1:] == mesh.edge_rods[:-1]
-        nodes, angles = parts.bends, np.column_stack([edge[:-1][same], edge[1:][same]])
+        same_rod = mesh.edge_rods[1:] == mesh.edge_rods[:-1]
+        nodes, angles = parts.bends, np.column_stack([edge[:-1][same_rod], edge[1:][same_rod]])
         if len(self.ghosts):
-            ends = parts.ends.ravel()
-            rows = np.column_stack([_inner_nodes(parts), ends, self.ghosts])
-            of_rods = np.repeat(np.arange(len(self.rods)), 2)
-            at_clamps = self.stiffness[of_rods] / (0.5 * last_edges(mesh)[:, None])
+            rows = np.column_stack([_inner_nodes(parts), parts.ends.ravel(), self.ghosts])
+            at_clamps = self.stiffness[np.repeat(np.arange(len(self.rods)), 2)] / (0.5 * last_edges(mesh)[:, None])
         if self.isotropic:
             bends, stiffness = nodes, per_length[:, 0]
             if len(self.ghosts):
@@ -266,10 +313,9 @@ class _Builder:
             last = np.searchsorted(mesh.edge_rods, np.arange(len(self.rods)), side="right") - 1
             first = np.searchsorted(mesh.edge_rods, np.arange(len(self.rods)))
             ghost_angles = self.first_angle + len(edge) + np.arange(len(self.ghosts))
-            # at a start the ghost comes first: an edge runs as its rod does
-            rows[::2], own = rows[::2, ::-1], edge[np.column_stack([first, last]).ravel()]
-            pairs = np.column_stack([own, ghost_angles])
-            pairs[::2] = pairs[::2, ::-1]
+            pairs = np.column_stack([edge[np.column_stack([first, last]).ravel()], ghost_angles])
+            # at a start the ghost comes first: an edge has the direction of its rod
+            rows[::2], pairs[::2] = rows[::2, ::-1], pairs[::2, ::-1]
             nodes, angles = np.vstack([nodes, rows]), np.vstack([angles, pairs])
             per_length = np.vstack([per_length, at_clamps])
         return (self._bend_twist(nodes, angles, per_length[:, :2], per_length[:, 2]),)
@@ -288,28 +334,39 @@ class _Builder:
         return flat
 
     def _elastic(self) -> tuple[Elements, ...]:
-        which = np.array([n for n, one in enumerate(self.joints) if not isinstance(one, Linker)], dtype=np.intp)
-        return elastic_joints(self.places, which, [self.joints[n] for n in which], self.stiffness, self.size)
+        """Joints other than linkers."""
+        crossings = [index for index, joint in enumerate(self.joints) if not isinstance(joint, Linker)]
+        joints = [self.joints[index] for index in crossings]
+        return elastic_joints(
+            self.rod_nodes, np.array(crossings, dtype=np.intp), joints, self.stiffness, self.size  # type: ignore[arg-type]
+        )  # fmt: skip
 
     def _linkers(self) -> tuple[list[Elements], list[Elements]]:
-        """Linkers, and the ties that hold those with unknowns of their own; these get their blocks here."""
+        """Linkers, and the ties of those with their own unknowns, whose blocks are added here."""
         linkers, ties = list[Elements](), list[Elements]()
-        for joint in {one for one in self.joints if isinstance(one, Linker)}:
-            crossings = np.array([n for n, one in enumerate(self.joints) if one == joint], dtype=np.intp)
-            corners = Corners.of(self.places, crossings, joint.corners)
+        for joint in {item for item in self.joints if isinstance(item, Linker)}:
+            crossings = np.array([index for index, item in enumerate(self.joints) if item == joint], dtype=np.intp)
+            corners = Corners.of(self.rod_nodes, crossings, joint.corners)
             blocks = corners.blocks
             if self.apart:
                 blocks = self.size + np.arange(5 * len(blocks)).reshape(-1, 5)
                 self.size += blocks.size
                 self.like = np.append(self.like, self.like[corners.blocks])
-                ties.append(self._tied(np.column_stack([blocks[:, ::2].ravel(), corners.blocks[:, ::2].ravel()]), 1))
-                ties.append(self._tied(np.column_stack([blocks[:, 2], corners.joints[:, 1]]), 1))
-                ties.append(self._tied(np.column_stack([blocks[:, 1::2].ravel(), corners.blocks[:, 1::2].ravel()]), 2))
+                c1, c2 = self._penalties()
+                nodes = np.column_stack([blocks[:, ::2].ravel(), corners.blocks[:, ::2].ravel()])
+                angles = np.column_stack([blocks[:, 1::2].ravel(), corners.blocks[:, 1::2].ravel()])
+                ties += [
+                    _ties(nodes, c1),
+                    _ties(np.column_stack([blocks[:, 2], corners.joints[:, 1]]), c1),
+                    _ties(angles, c2),
+                ]
             flat = self._flat()
             if self.apart:
                 flat[blocks] = flat[corners.blocks]
-            own = None if joint.rod is None else [*joint.rod.bend_stiffnesses, joint.rod.twist_stiffness]
-            stiffness = self.stiffness[corners.rods].mean(axis=1) if own is None else np.tile(own, (len(blocks), 1))
+            if joint.rod is None:
+                stiffness = self.stiffness[corners.rods].mean(axis=1)
+            else:
+                stiffness = np.tile([*joint.rod.bend_stiffnesses, joint.rod.twist_stiffness], (len(blocks), 1))
             linkers.append(LinkerBend.of(corners, blocks, flat, stiffness))
         return linkers, ties
 
@@ -317,37 +374,40 @@ class _Builder:
         """Between the nodes of rods at joints without linkers."""
         if not self.apart:
             return []
-        met = self.places.of_crossings
-        eccentric = np.array([one.eccentricity for one in self.joints])
-        plain = np.array([n for n, one in enumerate(self.joints) if not (eccentric[n] or isinstance(one, Linker))])
-        ties = [self._tied(self.places.blocks[met[plain.astype(np.intp)]], 1)] if len(plain) else []
-        return [*ties, *offset_ties(self.places, eccentric, self._offset_stiffness(), self.size)]
+        eccentricity = np.array([joint.eccentricity for joint in self.joints])
+        centric = [
+            index for index, joint in enumerate(self.joints) if not (eccentricity[index] or isinstance(joint, Linker))
+        ]
+        pairs = self.rod_nodes.blocks[self.rod_nodes.at_crossings[np.array(centric, dtype=np.intp)]]
+        ties = [_ties(pairs, self._penalties()[0])] if centric else []
+        return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]
 
     def _offset_stiffness(self) -> float:
-        """Of eccentric ties [N/m]. A hundred thousand times stiffer ones, like a penalty's, would make a geometric
-        stiffness that outweighs bending of the micrometres by which rods miss their distance in a first guess."""
+        """Stiffness of eccentric ties [N/m].
+
+        Ties a hundred thousand times stiffer, as of a penalty, would have a geometric stiffness that outweighs bending
+        already at the micrometres by which rods miss their distance in an initial guess.
+        """
         if not isinstance(self.coupling, SharedDofs):
-            return self._penalty(1)
+            return self._penalties()[0]
         edge = float(np.median(self.mesh.edge_lengths))
         return OFFSET_STIFFNESS * min(rod.stretch_stiffness for rod in self.rods) / edge
 
-    def _tied(self, pairs: Ints, which: int) -> Ties:
-        return Ties(pairs, np.full(len(pairs), self._penalty(which)))
-
-    def _penalty(self, which: int) -> float:
-        """C1 [N/m] or C2 [N m/rad]; the softest rod decides where they are not given."""
+    def _penalties(self) -> tuple[float, float]:
+        """C1 [N/m] and C2 [N m/rad]; by default those of the softest rod."""
         coupling = ImplicitPenalty() if isinstance(self.coupling, SharedDofs) else self.coupling
         edge = float(np.median(self.mesh.edge_lengths))
-        of_rods = [coupling.of(rod, edge) for rod in set(self.rods)]
-        return min(float(one.C1 if which == 1 else one.C2) for one in of_rods)  # type: ignore[arg-type]
+        values = [coupling.with_defaults(rod, edge) for rod in set(self.rods)]
+        return min(float(value.C1 or 0.0) for value in values), min(float(value.C2 or 0.0) for value in values)
 
     def _shared_mass(self) -> Floats:
+        """Lumped mass of the blocks of the shared form."""
         mesh = self.mesh
         mass = np.zeros((int(self.like.max()) + 1, 3))
         half = 0.5 * mesh.edge_lengths * np.array([rod.mass_per_length for rod in self.rods])[mesh.edge_rods]
         for side in range(2):
             np.add.at(mass, mesh.edges[:, side], half[:, None])
-        of_joints = 0.5 * np.array([one.mass for one in self.joints])
+        of_joints = 0.5 * np.array([joint.mass for joint in self.joints])
         for nodes in (mesh.joint_nodes, mesh.joint_nodes if mesh.second_nodes is None else mesh.second_nodes):
             np.add.at(mass, nodes, of_joints[:, None])  # half on either rod
         if self.twist:
@@ -357,13 +417,17 @@ class _Builder:
         return mass
 
 
-def _one_each(given, kind, count: int, of_what: str):  # type: ignore[no-untyped-def]
-    """A tuple of `count`."""
-    if not isinstance(given, Sequence):
-        return (given,) * count
-    if len(given) != count:
-        raise InputError(f"the grid has {count} {of_what}: give one for all, or as many, not {len(given)}")
-    return tuple(given)
+def _per_item(value: Item | Sequence[Item], count: int, items: str) -> tuple[Item, ...]:
+    """A tuple of `count` values, from one for all or one for each."""
+    if not isinstance(value, Sequence):
+        return (value,) * count
+    if len(value) != count:
+        raise InputError(f"the grid has {count} {items}: give one value for all, or one for each, not {len(value)}")
+    return tuple(value)
+
+
+def _ties(pairs: Ints, stiffness: float) -> Ties:
+    return Ties(pairs, np.full(len(pairs), stiffness))
 
 
 def _inner_nodes(mesh: GridMesh) -> Ints:
@@ -372,6 +436,11 @@ def _inner_nodes(mesh: GridMesh) -> Ints:
 
 
 def last_edges(mesh: GridMesh) -> Floats:
-    """(2m,) rest length of the edge at each rod end [m]."""
+    """(2m,) rest length of the edge at each rod end of a `mesh` [m].
+
+    Parameters
+    ----------
+    mesh : with m rods.
+    """
     s, first, stop = mesh.stations, mesh.rod_start, mesh.rod_stop
     return np.column_stack([s[first + 1] - s[first], s[stop - 1] - s[stop - 2]]).ravel()

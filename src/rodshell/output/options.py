@@ -10,8 +10,8 @@ from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint
 from rodshell.output.drawing import LAYERS
 from rodshell.output.dxf import FORBIDDEN
-from rodshell.rods.fibres import VON_MISES, refuse_unknown_stress
 from rodshell.rods.section import Rod
+from rodshell.rods.section_stress import VON_MISES, require_known_stress
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 MOST_STAGES = 1000
@@ -120,7 +120,7 @@ class OutputOptions:
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
         """InputError where a strength is given and the stress that it stands against cannot be known."""
         if self.strength is not None:
-            refuse_unknown_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)
+            require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)
 
     def parameters(self) -> dict[str, dict[str, Any]]:
         """As it stands in a case file."""

@@ -4,7 +4,8 @@ Texts are set in the typeface of `fonts`, of which the file holds the glyphs tha
 """
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
 from itertools import groupby
@@ -49,18 +50,31 @@ def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: s
     canvas.setAuthor("")
     canvas.setSubject("")
     canvas.showOutline()
-    for number, sheet in enumerate(sheets, start=1):
-        canvas.bookmarkPage(str(number))
-        canvas.addOutlineEntry(sheet.title, str(number))
-        canvas.scale(POINTS, POINTS)
-        canvas.setLineJoin(1)
-        drawn: list[Path | Mark] = [*sheet.paths, *sheet.marks]
-        for pen, items in groupby(drawn, key=sheet.pen):
-            _draw(canvas, pen, items)
-        _write(canvas, sheet.texts)
-        canvas.showPage()
-    canvas.save()
+    with _binary_streams():
+        for number, sheet in enumerate(sheets, start=1):
+            canvas.bookmarkPage(str(number))
+            canvas.addOutlineEntry(sheet.title, str(number))
+            canvas.scale(POINTS, POINTS)
+            canvas.setLineJoin(1)
+            drawn: list[Path | Mark] = [*sheet.paths, *sheet.marks]
+            for pen, items in groupby(drawn, key=sheet.pen):
+                _draw(canvas, pen, items)
+            _write(canvas, sheet.texts)
+            canvas.showPage()
+        canvas.save()
     return stream.getvalue()
+
+
+@contextmanager
+def _binary_streams() -> Iterator[None]:
+    """Pages as bytes, not as text of ASCII letters, which reportlab prefers: a fifth shorter, and faster."""
+    from reportlab import rl_config
+
+    before, rl_config.useA85 = rl_config.useA85, 0
+    try:
+        yield
+    finally:
+        rl_config.useA85 = before
 
 
 @cache
@@ -117,17 +131,27 @@ def _draw(canvas: "Canvas", pen: Pen, items: Iterable[Path | Mark]) -> None:
 
 
 def _write(canvas: "Canvas", texts: Iterable[Text]) -> None:
+    """Texts, with a new font and colour only where they change."""
     written = canvas.beginText()
-    for text in texts:
-        (x, y), c, s = text.at.tolist(), cos(text.angle), sin(text.angle)
-        if text.anchor != "start":
-            back = (0.5 if text.anchor == "middle" else 1.0) * text_width(text.text, text.size, bold=text.bold)
-            x, y = x - back * c, y - back * s
-        written.setFont(SANS[text.bold], text.size)
-        written.setFillColor(_colour(text.colour or LAYERS[text.layer].colour))
-        written.setTextTransform(c, s, -s, c, x, y)
-        written.textOut(text.text)
+    for (bold, size, colour), group in groupby(texts, key=_look):
+        written.setFont(SANS[bold], size)
+        written.setFillColor(_colour(colour))
+        for text in group:
+            (x, y), c, s = text.at.tolist(), cos(text.angle), sin(text.angle)
+            if text.anchor != "start":
+                back = (0.5 if text.anchor == "middle" else 1.0) * text_width(text.text, size, bold=bold)
+                x, y = x - back * c, y - back * s
+            if text.angle:
+                written.setTextTransform(c, s, -s, c, x, y)
+            else:
+                written.setTextOrigin(x, y)
+            written.textOut(text.text)
     canvas.drawText(written)
+
+
+def _look(text: Text) -> tuple[bool, float, str]:
+    """Weight, size and colour."""
+    return text.bold, text.size, text.colour or LAYERS[text.layer].colour
 
 
 @cache

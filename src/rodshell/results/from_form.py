@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from rodshell.arrays import Floats
 from rodshell.checks import Checks
 from rodshell.formfinding import Agreement as FoundAgreement
-from rodshell.formfinding import Draped, Footprint, FoundForm, PoppedTable
-from rodshell.formfinding.bound import shape_of_net
-from rodshell.formfinding.flatness import is_flat
+from rodshell.formfinding import Draped, Footprint, PatchForm
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
-from rodshell.formfinding.sewn import SewnForm
+from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.joints.joint import Joint as JointModel
 from rodshell.nets import ChebyshevNet
@@ -56,7 +56,21 @@ from rodshell.targets import Target as TargetSurface
 States = dict[str, NDArray[Any]]
 
 
-def form_results(form: FoundForm) -> Results:
+def results_of(stages: PatchForm | PatchedForm) -> Results:
+    """The results of a form, before it is checked."""
+    if isinstance(stages, PatchedForm):
+        return patches_results(stages)
+    return table_results(stages, "popup") if stages.from_table else form_results(stages)
+
+
+def states_of(stages: PatchForm | PatchedForm) -> States:
+    """The states of a form, before it is checked."""
+    if isinstance(stages, PatchedForm):
+        return patches_states(stages)
+    return table_states(stages) if stages.from_table else form_states(stages)
+
+
+def form_results(form: PatchForm) -> Results:
     """The results of a form in one piece, before it is checked."""
     found = Results(
         **_head(form.target.name, form.status, form.warnings),
@@ -73,7 +87,7 @@ def form_results(form: FoundForm) -> Results:
     return found if form.draped.net is None else found.changed(net=_net(form.draped.net))
 
 
-def form_states(form: FoundForm) -> States:
+def form_states(form: PatchForm) -> States:
     """The states of a form in one piece."""
     states = _mesh_states(form.footprint)
     states["draped"] = form.trimmed.positions
@@ -85,7 +99,7 @@ def form_states(form: FoundForm) -> States:
     return states
 
 
-def table_results(table: PoppedTable, name: str) -> Results:
+def table_results(table: PatchForm, name: str) -> Results:
     """The results of a table of rods that was popped up, before it is checked."""
     return Results(
         **_head(name, table.status, table.warnings),
@@ -96,12 +110,12 @@ def table_results(table: PoppedTable, name: str) -> Results:
     )
 
 
-def table_states(table: PoppedTable) -> States:
+def table_states(table: PatchForm) -> States:
     """The states of a table of rods that was popped up."""
     return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
 
 
-def patches_results(form: SewnForm) -> Results:
+def patches_results(form: PatchedForm) -> Results:
     """The results of a form in patches, before it is checked: those of one shell, with `patches` and `seams`."""
     nets = [laid.net for laid in form.laid.values()]
     tightest = min(nets, key=lambda net: net.min_angle)
@@ -118,23 +132,23 @@ def patches_results(form: SewnForm) -> Results:
         end_tangents=form.boundary.tangents.tolist(),
         agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
         drape=_drape_of_all([_drape(found.draped) for found in form.found.values()]),
-        pop_up={ends: _pop_up(report, "draped") for ends, (_, report) in form.popped.items()},
+        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
     )
 
 
-def patches_states(form: SewnForm) -> States:
+def patches_states(form: PatchedForm) -> States:
     """The states of a form in patches."""
     states = _mesh_states(form.footprint)
     states["draped"] = form.draped
     states["gap_draped"] = form.target.gap(form.draped).distance
-    for ends, (positions, _) in form.popped.items():
-        states[f"popped_{ends}"] = positions
+    for ends, shell in form.popped.items():
+        states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:
             states[f"gap_{ends}"] = form.agreement[ends].gaps
     return states
 
 
-def with_seam_forces(results: Results, form: SewnForm, checks: Checks) -> Results:
+def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Results:
     """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces."""
     row = {rod.name: k for k, rod in enumerate(form.footprint.rods)}
     seams = []
@@ -297,7 +311,7 @@ def _agreement(gap: FoundAgreement) -> Agreement:
     )
 
 
-def _patch(form: SewnForm, name: str) -> Patch:
+def _patch(form: PatchedForm, name: str) -> Patch:
     laid, found = form.laid[name], form.found[name]
     return Patch(
         id=name,
@@ -316,7 +330,7 @@ def _patch(form: SewnForm, name: str) -> Patch:
     )
 
 
-def _seam(form: SewnForm, index: int) -> Seam:
+def _seam(form: PatchedForm, index: int) -> Seam:
     meetings = [
         Meeting(point=plain(meeting.point), ends=(str(meeting.ends[0]), str(meeting.ends[1])))
         for meeting in form.meetings

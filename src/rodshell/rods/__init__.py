@@ -1,1 +1,1 @@
-"""Material, sections and one elastic rod: stretch, bend and twist energies [HQK Eq 1]."""
+"""Rods: sections and trade sizes, materials, stress over a section; stretch, bend and twist energies [HQK Eq 1]."""

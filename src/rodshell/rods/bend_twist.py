@@ -9,7 +9,7 @@ either side of a node, (m1, m2) their material frames and kb = 2 te x tf / (1 + 
     tau = theta_f - theta_e + m_ref.
 
 So ki is the turn of the tangent towards mi, and EIi resists it. Averaged over two frames that differ by the
-twist, the curvature (k1, k2) has the length |kb| cos(tau/2): twist softens a sharp bend.
+twist, the curvature (k1, k2) has the length |kb| cos(tau/2): twist softens a sharp bend (ERRATA E2).
 
 Reference frames. The twist angle theta turns the material frame from the reference frame (t, d1, d2). Each
 element keeps a *source* for its two edges: a tangent and a director d1. The reference frame at a state is the
@@ -38,16 +38,17 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BendTwist:
-    """Bends and twists between consecutive edges of rods or linkers. Build it with `starting_at`.
+    """Bends and twists between consecutive edges of rods or linkers [HQK Eq 1b, 1c]. Build it with `starting_at`.
 
     Parameters
     ----------
-    blocks : (b, 5) node, twist angle of edge e, node, twist angle of edge f, node; e and f run from node to
+    blocks : (b, 5) node, twist angle of edge e, node, twist angle of edge f, node; e and f go from node to
         node in this order. Elements that share an edge agree on its direction and its reference frame.
     bend_stiffness : (b, 2) EI1 and EI2 over the Voronoi length of the rest state [N m]; EI1 resists bends
         towards m1 (and so about m2), EI2 bends towards m2.
@@ -67,6 +68,8 @@ class BendTwist:
     source_directors: Floats
     source_twist: Floats
 
+    __repr__ = brief
+
     @classmethod
     def starting_at(
         cls,
@@ -81,14 +84,18 @@ class BendTwist:
     ) -> Self:
         """Elements whose source frames are those of `state`.
 
-        directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), one for
-            all, such as z on a flat grid. Only their part across the edge is used.
-        The stiffnesses and the natural strains, as above, are broadcast over the elements.
+        Parameters
+        ----------
+        blocks : (b, 5), see the class.
+        state : (N, 3) node positions [m] and twist angles [rad].
+        directors : (N, 3), in the row of each twist angle the first director of its edge; or (3,), the same for
+            all, such as z on a flat grid. Only their part perpendicular to the edge is used.
+        bend_stiffness, twist_stiffness, natural_curvature, natural_twist : see the class; broadcast over the elements.
         """
         count = len(blocks)
         tangents = _tangents(state, blocks)
-        given = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, 1:4:2]]
-        chosen = adapted(given, tangents)
+        wanted = np.broadcast_to(np.asarray(directors, dtype=float), state.shape)[blocks[:, 1:4:2]]
+        first_directors = adapted(wanted, tangents)
         return cls(
             np.ascontiguousarray(blocks),
             np.broadcast_to(np.asarray(bend_stiffness, dtype=float), (count, 2)).copy(),
@@ -96,17 +103,27 @@ class BendTwist:
             np.broadcast_to(np.asarray(natural_curvature, dtype=float), (count, 2)).copy(),
             np.broadcast_to(np.asarray(natural_twist, dtype=float), (count,)).copy(),
             tangents,
-            chosen,
-            _reference_twist(tangents, chosen),
+            first_directors,
+            _reference_twist(tangents, first_directors),
         )
 
     def relaxed(self, state: Floats) -> Self:
-        """The same elements, free of stress at `state`, as a linker is on the flat grid."""
+        """The same elements with `state` (N, 3) as their stress-free state, as linkers have the flat grid.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         strains = self.strains(state)
         return replace(self, natural_curvature=strains[:, :2].copy(), natural_twist=strains[:, 2].copy())
 
     def strains(self, state: Floats) -> Floats:
-        """(b, 3) curvatures k1, k2 [-] and twist tau [rad]."""
+        """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3).
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         moved = self.refreshed(state)
         theta, m1 = state[self.blocks[:, 1:4:2], 0], moved.material_directors(state)
         te, tf = moved.source_tangents[:, 0], moved.source_tangents[:, 1]
@@ -116,12 +133,18 @@ class BendTwist:
         return np.column_stack([k1, k2, theta[:, 1] - theta[:, 0] + moved.source_twist])
 
     def material_directors(self, state: Floats) -> Floats:
-        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`."""
+        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         theta = state[self.blocks[:, 1:4:2], 0, None]
         d1 = self.source_directors
         return np.asarray(np.cos(theta) * d1 + np.sin(theta) * cross(self.source_tangents, d1))
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _bend_twist(
                 state,
@@ -139,11 +162,12 @@ class BendTwist:
         )
 
     def refreshed(self, state: Floats) -> Self:
+        """The same elements with their source frames at `state` (N, 3): strains and angles do not change."""
         source = self.source_tangents, self.source_directors, self.source_twist
         tangents, directors, twist = (np.empty_like(part) for part in source)
-        _carried(state, self.blocks, *source, tangents, directors, twist)
-        given = self.blocks, self.bend_stiffness, self.twist_stiffness, self.natural_curvature, self.natural_twist
-        return type(self)(*given, tangents, directors, twist)  # at each step of a motion: `replace` takes longer
+        _transported(state, self.blocks, *source, tangents, directors, twist)
+        same = self.blocks, self.bend_stiffness, self.twist_stiffness, self.natural_curvature, self.natural_twist
+        return type(self)(*same, tangents, directors, twist)  # not `replace`, which is slow at each step of a motion
 
 
 def _tangents(state: Floats, blocks: Ints) -> Floats:
@@ -152,23 +176,23 @@ def _tangents(state: Floats, blocks: Ints) -> Floats:
 
 
 def _reference_twist(tangents: Floats, directors: Floats) -> Floats:
-    """(b,) angles from the frame of e, carried along the rod to f, to the frame of f, in (-pi, pi] [rad]."""
+    """(b,) angles from the frame of e, transported along the rod to f, to the frame of f, in (-pi, pi] [rad]."""
     te, tf = tangents[:, 0], tangents[:, 1]
     return signed_angle(parallel_transport(directors[:, 0], te, tf), directors[:, 1], tf)
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _shares_edge(stencils, b):  # type: ignore[no-untyped-def]
-    """Whether the edge e of element b is the edge f of the one before it, as along a rod; both have one frame."""
+    """Whether the edge e of element b is the edge f of the delta before it, as along a rod; both have one frame."""
     if b == 0:
         return False
-    before, own = stencils[b - 1], stencils[b]
-    return own[1] == before[3] and own[0] == before[2] and own[2] == before[4]
+    before, here = stencils[b - 1], stencils[b]
+    return here[1] == before[3] and here[0] == before[2] and here[2] == before[4]
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _carried(x, stencils, sources, source_directors, source_twist, tangents, directors, twist):  # type: ignore[no-untyped-def]
-    """Frames and reference twists carried from the sources to the state x; fills the last three arguments."""
+def _transported(x, stencils, sources, source_directors, source_twist, tangents, directors, twist):  # type: ignore[no-untyped-def]
+    """Frames and reference twists transported from the sources to the state x; fills the last three arguments."""
     for b in range(stencils.shape[0]):
         for s in range(2):
             t, d = tangents[b, s], directors[b, s]
@@ -272,7 +296,7 @@ def _bend_twist(  # type: ignore[no-untyped-def]
             m21 += m2[0, k] * m1[1, k]
         less = 1.0 / (1.0 + c)
         kappa1, kappa2 = (a1 - b1) * less, (a2 - b2) * less
-        # angle from m1e, carried along the rod, to m1f; then the branch next to the source's
+        # angle from m1e, transported along the rod, to m1f; then the branch next to the source's
         tau = np.arctan2(m21 - a2 * b1 * less, m11 - a1 * b1 * less)
         near = source_twist[b] + x[stencils[b, 3], 0] - x[stencils[b, 1], 0]
         tau += 2.0 * np.pi * np.floor((near - tau) / (2.0 * np.pi) + 0.5)
@@ -344,21 +368,21 @@ def _bend_twist(  # type: ignore[no-untyped-def]
             s1e, s2e, s3e = bend[b, 0] * strain[0, i], bend[b, 1] * strain[1, i], twist[b] * strain[2, i]
             s1f, s2f, s3f = bend[b, 0] * strain[0, 4 + i], bend[b, 1] * strain[1, 4 + i], twist[b] * strain[2, 4 + i]
             for j in range(i + 1):
-                one = 1.0 if i == j else 0.0
-                value = around_e * (one - t[0, i] * t[0, j])
+                delta = 1.0 if i == j else 0.0
+                value = around_e * (delta - t[0, i] * t[0, j])
                 value -= ye[i] * other[0, j] + other[0, i] * ye[j] + sp[i] * t[0, j] + t[0, i] * sp[j]
                 value = (value - binormal[i] * ue[j] - ue[i] * binormal[j]) * ee
                 value -= w[0, i] * se[j] + se[i] * w[0, j]
                 hee[i, j] = hee[j, i] = value + s1e * strain[0, j] + s2e * strain[1, j] + s3e * strain[2, j]
-                value = around_f * (one - t[1, i] * t[1, j])
+                value = around_f * (delta - t[1, i] * t[1, j])
                 value -= yf[i] * other[1, j] + other[1, i] * yf[j] + sq[i] * t[1, j] + t[1, i] * sq[j]
                 value = (value - binormal[i] * uf[j] - uf[i] * binormal[j]) * ff
                 value -= w[1, i] * sf[j] + sf[i] * w[1, j]
                 hff[i, j] = hff[j, i] = value + s1f * strain[0, 4 + j] + s2f * strain[1, 4 + j] + s3f * strain[2, 4 + j]
             for j in range(3):
-                one = 1.0 if i == j else 0.0
+                delta = 1.0 if i == j else 0.0
                 value = other[0, i] * (m[1, j] - sq[j]) - (m[0, i] + sp[i]) * other[1, j] + turned[i, j]
-                value -= kappa * (one - t[0, i] * t[0, j] - t[1, i] * t[1, j] + c * t[0, i] * t[1, j])
+                value -= kappa * (delta - t[0, i] * t[0, j] - t[1, i] * t[1, j] + c * t[0, i] * t[1, j])
                 value = (value * less - torque * binormal[i] * mid[j]) * ef
                 value -= w[0, i] * hf3[j] + he7[i] * w[1, j]
                 hef[i, j] = value + s1e * strain[0, 4 + j] + s2e * strain[1, 4 + j] + s3e * strain[2, 4 + j]

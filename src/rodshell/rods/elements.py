@@ -3,7 +3,7 @@
 The state of a shell is an (N, 3) array of *blocks*. A node is a block of three coordinates [m]; the twist
 angle of an edge is a block of which only the first component is used [rad]. An element set names, for each
 of its m elements, the k blocks that it touches: 2 for stretch, 3 for isotropic bending, 5 for bending and
-twist (x, theta, x, theta, x). A solver sees only the sum of such sets.
+twist (x, theta, x, theta, x). A solver sees only the sum of such sets [HQK Eq 1, 2, 4].
 """
 
 from typing import Protocol, Self
@@ -27,13 +27,17 @@ class Elements(Protocol):
     def blocks(self) -> Ints: ...
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J] at `state` (N, 3); adds its gradient to `gradient` (N, 3).
+        """Energy [J], with its gradient and, where wanted, its Hessians.
 
-        Fills `hessians` (m, 3k, 3k) with the element Hessians, unless it is empty; rows and columns of the
-        unused components of a twist angle are zero.
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
+        hessians : (m, 3k, 3k), filled with the element Hessians unless empty; rows and columns of the unused
+            components of a twist angle are zero.
         """
         ...
 
     def refreshed(self, state: Floats) -> Self:
-        """The same energy with its source frames moved to `state`; called at every accepted iterate."""
+        """The same energy with its source frames moved to `state`; called at each accepted iterate."""
         ...

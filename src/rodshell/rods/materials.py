@@ -1,16 +1,18 @@
 """Materials of rods: elastic constants and density, and named presets with their characteristic strengths.
 
 The figures of a preset are characteristic, short-term values at the moisture and temperature that their source names.
-No factor for duration of load, moisture or safety is applied: reduce them as the rules that you build by demand.
+No factor for duration of load, moisture or safety is applied: reduce them as the applicable building code demands.
 """
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, Self, get_args
 
 from rodshell.errors import InputError
+from rodshell.records import brief
 from rodshell.units import shown
-from rodshell.validation import positive
+from rodshell.validation import number, positive
 
+_REPLACEABLE = ("youngs_modulus", "density", "shear", "poisson_ratio")
 PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]
 
 
@@ -21,10 +23,10 @@ class Preset:
     Parameters
     ----------
     youngs_modulus, shear, density : mean values [Pa, Pa, kg/m3]; shear None: incompressible, Poisson's ratio 0.5.
-    bending_strength, shear_strength : characteristic and short-term [Pa]; None: the source gives none.
-    grade : what the figures hold for.
-    strength_note : how the strengths are meant, and what they are to be reduced for.
-    source : where they come from, in words.
+    bending_strength, shear_strength : characteristic and short-term [Pa]; None: the source has none.
+    grade : to which the figures apply.
+    strength_note : what the strengths mean, and for what they must be reduced.
+    source : of the figures.
     """
 
     youngs_modulus: float
@@ -118,15 +120,24 @@ PRESETS: dict[PresetName, Preset] = {
         "Huang, Qin and Khalid Jawed 2021, section 3.1; it gives no strength",
     ),
 }  # fmt: skip
-"""Rubber is what the paper's examples are made of: no material to build shells of metres with."""
+"""Rubber is the material of the paper's examples, not one for shells of metres."""
 
 
 @dataclass(frozen=True)
 class Material:
-    """Linear elastic material: `youngs_modulus` [Pa], `density` [kg/m3], and `poisson_ratio` [-].
+    """Linear elastic material.
 
-    In place of Poisson's ratio a shear modulus `shear` [Pa] may be given, as of timber, which is not isotropic. A
-    material made by `Material.preset` has the preset's `name`, and through it strengths.
+    Parameters
+    ----------
+    youngs_modulus : [Pa].
+    density : [kg/m3].
+    poisson_ratio : [-], above -1 and up to 0.5, which is incompressible.
+    shear : shear modulus [Pa] in place of Poisson's ratio, as for timber, which is not isotropic.
+    name : of the preset, which has the strengths; set by `Material.preset`.
+
+    Raises
+    ------
+    InputError : a value is out of range; Poisson's ratio and a shear modulus are both given; no such preset.
     """
 
     youngs_modulus: float
@@ -135,9 +146,12 @@ class Material:
     shear: float | None = None
     name: PresetName | None = None
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         positive("Young's modulus", self.youngs_modulus, "Pa")
         positive("density", self.density, "kg/m3")
+        number("Poisson's ratio", self.poisson_ratio)
         if not -1 < self.poisson_ratio <= 0.5:
             raise InputError(f"Poisson's ratio must lie above -1 and not above 0.5, not {self.poisson_ratio}")
         if self.shear is not None:
@@ -149,12 +163,20 @@ class Material:
 
     @classmethod
     def preset(cls, name: PresetName, **changed: float) -> Self:
-        """A named material; `changed` replaces youngs_modulus, density, shear or poisson_ratio.
+        """A named material.
+
+        Parameters
+        ----------
+        name : of the preset, such as "larch".
+        changed : values that replace the preset's: youngs_modulus, density, shear or poisson_ratio.
 
         Raises
         ------
         InputError : there is no such preset; a value cannot be used.
         """
+        for key in changed:
+            if key not in _REPLACEABLE:
+                raise InputError(f"a preset has no {key} to replace: its values are {', '.join(_REPLACEABLE)}")
         return cls(**preset_values(name, changed), name=name)
 
     @property
@@ -164,28 +186,28 @@ class Material:
 
     @property
     def bending_strength(self) -> float | None:
-        """The preset's, characteristic and short-term [Pa]; None: not known."""
+        """Of the preset, characteristic and short-term [Pa]; None: not known."""
         return None if self.name is None else PRESETS[self.name].bending_strength
 
     @property
     def shear_strength(self) -> float | None:
-        """The preset's, characteristic and short-term [Pa]; None: not known."""
+        """Of the preset, characteristic and short-term [Pa]; None: not known."""
         return None if self.name is None else PRESETS[self.name].shear_strength
 
     def parameters(self) -> dict[str, object]:
-        """The numbers given, in SI, as they stand in a case file; with the preset's name, if it has one."""
-        given: dict[str, object] = asdict(self)
-        del given["poisson_ratio" if self.shear is not None else "shear"]
-        name = given.pop("name")
-        return given if name is None else {"preset": name, **given}
+        """The values in SI as they stand in a case file; with the preset's name, if it has one."""
+        values: dict[str, object] = asdict(self)
+        del values["poisson_ratio" if self.shear is not None else "shear"]
+        name = values.pop("name")
+        return values if name is None else {"preset": name, **values}
 
 
 def preset_named(name: str) -> Preset:
-    """The preset of this name.
+    """The preset of this `name`.
 
     Raises
     ------
-    InputError : there is none.
+    InputError : there is no such preset.
     """
     if name not in get_args(PresetName):
         raise InputError(f"there is no material {shown(name)}: use {', '.join(get_args(PresetName))}")
@@ -193,7 +215,17 @@ def preset_named(name: str) -> Preset:
 
 
 def preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
-    """Keyword arguments of `Material` for a preset of which some values are `changed`."""
+    """Keyword arguments of `Material` for the preset `name` with some values `changed`.
+
+    Parameters
+    ----------
+    name : of the preset.
+    changed : values that replace the preset's, by their names.
+
+    Raises
+    ------
+    InputError : there is no such preset.
+    """
     known = preset_named(name)
     values: dict[str, Any] = {key: getattr(known, key) for key in ("youngs_modulus", "shear", "density")}
     if "poisson_ratio" in changed or known.shear is None:

@@ -1,23 +1,34 @@
-"""Cross-sections of a rod, and the stiffnesses that follow from one and a material.
+"""Cross-sections of a rod, the sizes in trade, and the stiffnesses that follow from a section and a material.
 
 A section has two axes, those of the material directors m1 and m2. The second moments (I1, I2) resist bends
 *towards* m1 and m2: I1 is the integral of the square of the coordinate along m1.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from math import inf, pi, tanh
+from math import pi, tanh
 
 from rodshell.errors import InputError
+from rodshell.records import brief
 from rodshell.rods.materials import Material as Material
-from rodshell.validation import instance, positive
+from rodshell.rods.materials import PresetName
+from rodshell.validation import instance, not_negative, positive
+
+MM = 1e-3
 
 
 class _Round:
-    """Second moments of a section with one for all diameters."""
+    """A section whose second moment of area is the same about every diameter."""
+
+    @property
+    def outer_radius(self) -> float:
+        """[m]"""
+        raise NotImplementedError
 
     @property
     def second_moment(self) -> float:
+        """Second moment of area about any diameter [m4]."""
         raise NotImplementedError
 
     @property
@@ -30,10 +41,24 @@ class _Round:
         """J [m4]: of circles and tubes the polar second moment of area."""
         return 2 * self.second_moment
 
+    @property
+    def depth(self) -> float:
+        """The diameter [m]."""
+        return 2 * self.outer_radius
+
 
 @dataclass(frozen=True)
 class Circle(_Round):
-    """Solid circular section of the given `radius` [m]."""
+    """Solid circular section.
+
+    Parameters
+    ----------
+    radius : [m].
+
+    Raises
+    ------
+    InputError : the radius is not a positive number.
+    """
 
     radius: float
 
@@ -42,6 +67,7 @@ class Circle(_Round):
 
     @property
     def outer_radius(self) -> float:
+        """[m]"""
         return self.radius
 
     @property
@@ -61,7 +87,17 @@ class Circle(_Round):
 
 @dataclass(frozen=True)
 class Tube(_Round):
-    """Circular tube: outer `radius` and wall `thickness` [m]."""
+    """Circular tube.
+
+    Parameters
+    ----------
+    radius : outer radius [m].
+    thickness : of the wall [m].
+
+    Raises
+    ------
+    InputError : one of them is not a positive number; the wall is thicker than the radius.
+    """
 
     radius: float
     thickness: float
@@ -74,10 +110,12 @@ class Tube(_Round):
 
     @property
     def outer_radius(self) -> float:
+        """[m]"""
         return self.radius
 
     @property
     def inner_radius(self) -> float:
+        """[m]"""
         return self.radius - self.thickness
 
     @property
@@ -97,7 +135,16 @@ class Tube(_Round):
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Solid ellipse with half-axes `a` along m1 and `b` along m2 [m]."""
+    """Solid ellipse.
+
+    Parameters
+    ----------
+    a, b : half-axes along m1 and m2 [m].
+
+    Raises
+    ------
+    InputError : one of them is not a positive number.
+    """
 
     a: float
     b: float
@@ -121,6 +168,11 @@ class Ellipse:
         """J [m4] by Saint-Venant, exact."""
         return pi * (self.a * self.b) ** 3 / (self.a**2 + self.b**2)
 
+    @property
+    def depth(self) -> float:
+        """The longer axis [m]."""
+        return 2 * max(self.a, self.b)
+
     def parameters(self) -> dict[str, object]:
         """The section's kind and numbers in SI, as they stand in a case file."""
         return {"kind": "ellipse", "a": self.a, "b": self.b}
@@ -128,7 +180,16 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class RectangularSection:
-    """Solid rectangle: `width` along m1, `height` along m2 [m]. (`rodshell.Rectangle` is a target's domain.)"""
+    """Solid rectangle. (`rodshell.Rectangle` is a target's domain.)
+
+    Parameters
+    ----------
+    width, height : sides along m1 and m2 [m].
+
+    Raises
+    ------
+    InputError : one of them is not a positive number.
+    """
 
     width: float
     height: float
@@ -155,6 +216,11 @@ class RectangularSection:
         series = sum(tanh(n * pi * wide / (2 * thin)) / n**5 for n in range(1, 50, 2))
         return wide * thin**3 * (1 / 3 - 64 / pi**5 * thin / wide * series)
 
+    @property
+    def depth(self) -> float:
+        """The longer side [m]."""
+        return max(self.width, self.height)
+
     def parameters(self) -> dict[str, object]:
         """The section's kind and numbers in SI, as they stand in a case file."""
         return {"kind": "rectangle", "width": self.width, "height": self.height}
@@ -170,11 +236,15 @@ class GivenSection:
     EI1, EI2 : stiffnesses against bends towards m1 and m2 [N m2].
     GJ : twist stiffness [N m2].
     mass : per length [kg/m].
-    rotary_inertia : about the tangent, per length [kg m]; wanted by dynamics with twist only.
+    rotary_inertia : about the tangent, per length [kg m]; needed only for dynamics with twist.
     fibre_distances : of the outermost fibres from the axis, along m1 and m2 [m]. With this and the next two its stress
-        is known, which a strength needs.
+        is known, which a check of strength needs.
     fibre_modulus : Young's modulus of the outermost fibres [Pa].
-    torsion_modulus : twisting moment over the largest shear stress that it causes [m3]; of rods that are twisted.
+    torsion_modulus : twisting moment over the largest shear stress that it causes [m3]; needed if rods are twisted.
+
+    Raises
+    ------
+    InputError : a stiffness or a fibre value is not a positive number, or a mass is negative.
     """
 
     EA: float
@@ -187,17 +257,23 @@ class GivenSection:
     fibre_modulus: float | None = None
     torsion_modulus: float | None = None
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         for name, unit in (("EA", "N"), ("EI1", "N m2"), ("EI2", "N m2"), ("GJ", "N m2")):
             positive(name, getattr(self, name), unit)
-        for distance in self.fibre_distances or ():
-            positive("fibre distance", distance, "m")
         for name, unit in (("fibre_modulus", "Pa"), ("torsion_modulus", "m3")):
             if getattr(self, name) is not None:
                 positive(name, getattr(self, name), unit)
         for name, unit in (("mass", "kg/m"), ("rotary_inertia", "kg m")):
-            if not 0 <= getattr(self, name) < inf:
-                raise InputError(f"{name} must not be negative, but is {getattr(self, name)} {unit}")
+            not_negative(name, getattr(self, name), unit)
+        if self.fibre_distances is not None:
+            distances = self.fibre_distances
+            if not isinstance(distances, Sequence) or isinstance(distances, str) or len(distances) != 2:
+                raise InputError(f"fibre_distances must be two lengths along m1 and m2 in m, not {distances!r}")
+            for distance in distances:
+                positive("fibre distance", distance, "m")
+            object.__setattr__(self, "fibre_distances", tuple(distances))
 
     def parameters(self) -> dict[str, object]:
         """The section's kind and numbers in SI, as they stand in a case file."""
@@ -211,10 +287,22 @@ SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 
 @dataclass(frozen=True)
 class Rod:
-    """One kind of rod: its section and material give the stiffnesses of HQK Eq 1; a `GivenSection` brings its own."""
+    """One kind of rod; its section and material give the stiffnesses of HQK Eq 1.
+
+    Parameters
+    ----------
+    section : its cross-section. A `GivenSection` has the stiffnesses itself.
+    material : what it is made of; None only with a `GivenSection`.
+
+    Raises
+    ------
+    InputError : section or material are something else, or exclude each other.
+    """
 
     section: Section | GivenSection
     material: Material | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         instance("section", self.section, Section | GivenSection, SECTIONS)
@@ -222,7 +310,7 @@ class Rod:
             instance("material", self.material, Material)
         if isinstance(self.section, GivenSection):
             if self.material is not None:
-                raise InputError("a given section says all stiffnesses and masses itself: leave the material out")
+                raise InputError("a given section has all stiffnesses and masses itself: leave the material out")
         elif self.material is None:
             raise InputError(f"a rod of section {type(self.section).__name__} needs a material")
 
@@ -243,11 +331,16 @@ class Rod:
 
     @cached_property
     def bend_stiffness(self) -> float:
-        """EI [N m2] of a rod that bends alike in all directions."""
+        """EI [N m2] of a rod with the same bending stiffness in all directions.
+
+        Raises
+        ------
+        InputError : it has two.
+        """
         first, second = self.bend_stiffnesses
         if first != second:
             raise InputError(
-                f"this rod has two bending stiffnesses, {first:g} and {second:g} N m2: no one EI says both"
+                f"this rod has two bending stiffnesses, {first:g} and {second:g} N m2: use bend_stiffnesses"
             )
         return first
 
@@ -281,3 +374,61 @@ class Rod:
         """Section and material in SI, as they stand in a case file."""
         material = {} if self.material is None else {"material": self.material.parameters()}
         return {"section": self.section.parameters(), **material}
+
+
+def scaled(section: Section, factor: float) -> Section:
+    """The same shape of section with all its lengths times `factor` [-].
+
+    Parameters
+    ----------
+    section : the shape.
+    factor : of all its lengths [-].
+    """
+    return type(section)(**{key: factor * value for key, value in vars(section).items()})
+
+
+# Sizes in trade
+
+
+def _rods(*diameters: float) -> tuple[Section, ...]:
+    return tuple(Circle(d / 2 * MM) for d in diameters)
+
+
+def _tubes(*sizes: tuple[float, float]) -> tuple[Section, ...]:
+    """Outer diameter and wall [mm]."""
+    return tuple(Tube(d / 2 * MM, wall * MM) for d, wall in sizes)
+
+
+def _laths(*sizes: tuple[float, float]) -> tuple[Section, ...]:
+    """Thickness and breadth [mm] of laths that lie flat."""
+    return tuple(RectangularSection(width=thickness * MM, height=breadth * MM) for thickness, breadth in sizes)
+
+
+_TIMBER = _laths(
+    (3, 10), (5, 15), (8, 20), (10, 30), (12, 30), (15, 40), (20, 40), (24, 48), (30, 50), (40, 60), (50, 80)
+)
+
+TRADE_SIZES: dict[PresetName, tuple[Section, ...]] = {
+    "larch": _TIMBER,
+    "spruce": _TIMBER,
+    "oak": _TIMBER,
+    "bamboo": _tubes((15, 2), (20, 3), (30, 4), (40, 5), (60, 6), (80, 8), (100, 10)),  # walls of about a tenth
+    "gfrp": (
+        *_rods(1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12),
+        *_tubes((16, 2.5), (20, 2.5), (25, 3), (32, 3), (38, 3.5), (42, 3.5), (50, 4), (60, 5), (76, 6), (90, 6)),
+    ),
+    "plywood": _laths((4, 20), (6.5, 25), (9, 30), (12, 40), (15, 50), (18, 50), (21, 60), (24, 70)),
+    "petg": _rods(1.75, 2.85, 4, 5, 6, 8, 10, 12, 15, 20),  # the first two are printers' filament
+    "spring-steel": _rods(0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.2, 1.5, 2, 2.5, 3),
+    "rubber": (),
+}
+"""Sections in which each preset material is usually sold, thin ones first; what a supplier has may differ."""
+
+
+def size_text(section: Section) -> str:
+    """A size in trade as a supplier names it [mm]: 8 x 20 mm, a rod of 12 mm, a tube of 20 x 3 mm."""
+    if isinstance(section, RectangularSection):
+        return f"{section.width / MM:g} x {section.height / MM:g} mm"
+    if isinstance(section, Tube):
+        return f"a tube of {2 * section.radius / MM:g} x {section.thickness / MM:g} mm"
+    return f"a rod of {section.depth / MM:g} mm"

@@ -11,12 +11,13 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stretch:
-    """Elastic edges.
+    """Elastic edges [HQK Eq 1a].
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ class Stretch:
     stiffness : (e,) EA [N].
     multipliers : (e,) N0 [N].
     forces : (e,) axial forces [N] of the geometric stiffness in the Hessian; None takes N0 + EA eps, which
-        makes the Hessian exact. A solver that carries the forces as unknowns gives its own.
+        makes the Hessian exact. A solver that has the forces among its unknowns passes them here.
     """
 
     blocks: Ints
@@ -34,41 +35,73 @@ class Stretch:
     multipliers: Floats
     forces: Floats | None = None
 
+    __repr__ = brief
+
     @staticmethod
     def elastic(blocks: Ints, rest_lengths: Floats, stiffness: Floats) -> "Stretch":
-        """The paper's elastic edges."""
+        """The paper's elastic edges: no multipliers. Parameters as of the class."""
         return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
 
     def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
+        """The same edges with other axial `forces` (e,) [N] and, if given, other `multipliers` (e,) [N].
+
+        Parameters
+        ----------
+        forces : (e,) axial forces of the geometric stiffness [N]; None: those of the strains.
+        multipliers : (e,) N0 [N]; None: unchanged.
+        """
         return replace(self, forces=forces, multipliers=self.multipliers if multipliers is None else multipliers)
 
     def strains(self, state: Floats) -> Floats:
-        """(e,) axial strains [-]."""
-        return _strains(state, self.blocks, self.rest_lengths)
+        """(e,) axial strains [-] at `state` (N, 3)."""
+        return np.asarray(_strains(state, self.blocks, self.rest_lengths))
 
     def elongation(self, state: Floats, motion: Floats) -> Floats:
-        """(e,) change of the strains [-] to first order for displacements (N, 3) [m]."""
-        return _elongation(state, motion, self.blocks, self.rest_lengths)
+        """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        motion : (N, 3) displacements [m].
+        """
+        return np.asarray(_elongation(state, motion, self.blocks, self.rest_lengths))
 
     def add_axial(self, state: Floats, forces: Floats, gradient: Floats) -> None:
-        """Add the gradient [N] of edges that carry the axial forces (e,) [N]."""
+        """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N].
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        forces : (e,) axial forces [N].
+        gradient : (N, 3), to which theirs is added [N].
+        """
         _add_axial(state, self.blocks, forces, gradient)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        own = self.forces is None
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        exact = self.forces is None
         forces = self.rest_lengths if self.forces is None else self.forces
         return float(
             _stretch(
-                state, self.blocks, self.rest_lengths, self.stiffness, self.multipliers, forces, own, gradient, hessians
+                state,
+                self.blocks,
+                self.rest_lengths,
+                self.stiffness,
+                self.multipliers,
+                forces,
+                exact,
+                gradient,
+                hessians,
             )
         )
 
     def refreshed(self, state: Floats) -> Self:
+        """The same: there are no source frames."""
         return self
 
 
 @nb.njit(cache=True, error_model="numpy")
-def _stretch(x, edges, rest, stiffness, multipliers, forces, own, gradient, hessians):  # type: ignore[no-untyped-def]
+def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_a, x_b) [m]; energies [J], from HQK Eq 1a."""
     wanted = hessians.shape[0] > 0
     energy = 0.0
@@ -87,7 +120,7 @@ def _stretch(x, edges, rest, stiffness, multipliers, forces, own, gradient, hess
         gradient[b, 1] += force * t1
         gradient[b, 2] += force * t2
         if wanted:
-            across = (force if own else forces[e]) / length  # geometric stiffness
+            across = (force if exact else forces[e]) / length  # geometric stiffness
             along = stiffness[e] / rest[e] - across
             t = (t0, t1, t2)
             for i in range(3):

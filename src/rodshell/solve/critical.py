@@ -15,17 +15,19 @@ from math import sqrt
 from typing import Literal
 
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats
 from rodshell.rods.elements import Elements
-from rodshell.solve.linear import SingularError
-from rodshell.solve.problem import Problem
-from rodshell.solve.tangent import Tangent
+from rodshell.solve.equilibrium import Equilibrium
+from rodshell.solve.sparse_ldl import SingularError
+from rodshell.solve.tangent import Tangent, TangentAssembly, orthonormal, subspace_iteration
 
 Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
 
 CLOSE = 2e-3  # of the factor: the last stable point is as near as this to the first unstable one
 MODES = 4  # lowest ones that are looked at
+MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative change of the lowest eigenvalue: modes only say how far to go
 MOST_FACTORIZATIONS = 120
 MOST_STEPS = 12  # of Newton's method for a point
 FARTHEST = 0.1  # of the length that a node moves from point to point
@@ -87,27 +89,24 @@ class _Point:
 
 
 def first_critical(
-    problem: Problem,
-    state: Floats,
-    forces: Floats,
+    unloaded: Equilibrium,
     load: Floats,
     *,
     most: float = 100.0,
     progress: Callable[[int, float], None] = lambda count, factor: None,
 ) -> Critical:
-    """Follow a shell from equilibrium without the load until it loses its stability.
+    """Follow a structure from equilibrium without the load until it loses its stability.
 
     Parameters
     ----------
-    problem : the shell; its elements' source frames are at `state`, its edges elastic, its supports at rest. A load
-        that it has stays as it is.
-    state, forces : (n, 3) its equilibrium [m], axial forces (e,) [N].
+    unloaded : the equilibrium at factor 0; its edges elastic, its supports at rest. A load that it has stays as it is.
     load : (n, 3) W, the dead load that grows, at factor 1 [N]; not zero in the free directions.
     most : factor up to which the path is followed.
-    progress : told of the factorisations made and the factor reached, at every step; what it raises ends the search.
+    progress : called at every step with the factorisations made and the factor reached; what it raises ends the
+        search.
     """
-    path = _Path(problem, state, load)
-    here = path.begin(state, forces)
+    path, length = _Path(unloaded, load), unloaded.problem.length
+    here = path.begin(unloaded)
     if here is None or here.negative_modes:
         return Critical(0.0, "unstable unloaded", None, path.factorizations)
     limit: Limit = "lost"
@@ -122,7 +121,7 @@ def first_critical(
             limit = "limit point" if beyond.rate < 0 else "bifurcation"
             break
         step = min(path.next_step(here, beyond, most, doubt), longest)
-        if step <= LEAST * max(here.arc, LEAST * problem.length):
+        if step <= LEAST * max(here.arc, LEAST * length):
             break
         there = path.point(here, before or beyond, step)
         if there is None or (there.negative_modes == 0 and -there.behind < RETURNED * step):
@@ -156,24 +155,30 @@ def _peak(here: _Point, beyond: _Point) -> float:
 class _Path:
     """Points on the path of a problem under a growing load."""
 
-    def __init__(self, problem: Problem, state: Floats, load: Floats) -> None:
-        self._problem, self._load = problem, load
+    def __init__(self, unloaded: Equilibrium, load: Floats) -> None:
+        self._problem, self._load = unloaded.problem, load
+        problem = unloaded.problem
         self._constant = np.zeros_like(load) if problem.load is None else problem.load
         self._nodes = np.unique(problem.stretch.blocks)  # the other blocks are angles
-        self._tangent = Tangent(problem, state)
+        self._assembly = TangentAssembly(problem, unloaded.state)
+        self._scale = np.empty(0)
         self._least_force = 1e-6 * float(problem.stretch.stiffness.max())
+        self.factorizations = 0
 
-    @property
-    def factorizations(self) -> int:
-        return self._tangent.factorizations
-
-    def begin(self, state: Floats, forces: Floats) -> _Point | None:
-        """The unloaded shell."""
+    def begin(self, unloaded: Equilibrium) -> _Point | None:
+        """The unloaded structure; None where its stiffness is singular."""
+        self.factorizations += 1
         try:
-            negative = self._tangent.factor(self._problem.elements, state, forces)
+            tangent = unloaded.tangent
         except SingularError:
             return None
-        return self._with_tangent(0.0, state, forces, self._problem.elements, negative)
+        # modes are measured by the first stiffness's diagonal: metres and radians alike
+        self._scale = 1.0 / np.sqrt(np.abs(tangent.values[tangent.pattern.assembly.diagonal]))
+        return self._on_path(0.0, unloaded.state, unloaded.forces, unloaded.elements, tangent)
+
+    def _tangent(self, elements: tuple[Elements, ...], state: Floats, forces: Floats) -> Tangent:
+        self.factorizations += 1
+        return self._assembly.tangent(elements, state, forces)
 
     def next_step(self, here: _Point, beyond: _Point | None, most: float, doubt: float) -> float:
         """How far to go: for the singular stiffness ahead, from below until it is near enough to pass."""
@@ -201,7 +206,7 @@ class _Path:
         )
         if found is None:
             return None
-        point = self._with_tangent(*found, here, step)
+        point = self._on_path(*found, here, step)
         return replace(point, strayed=self._reach(point.state - state) / reach)
 
     def at_one(self, here: _Point, there: _Point) -> Floats | None:
@@ -218,19 +223,19 @@ class _Path:
     def _correct(
         self, state: Floats, forces: Floats, factor: float, elements: tuple[Elements, ...], *,
         across: Floats | None = None, near: float = np.inf,
-    ) -> tuple[float, Floats, Floats, tuple[Elements, ...], int] | None:  # fmt: skip
+    ) -> tuple[float, Floats, Floats, tuple[Elements, ...], Tangent] | None:  # fmt: skip
         """Newton's method to the equilibrium at this factor, or on the plane through the state `across` a motion
-        (n, 3), at most `near` [m] away; the last factors are those of the end."""
-        tangent, stretch, length, first = self._tangent, self._problem.stretch, self._problem.length, state
+        (n, 3), at most `near` [m] away: factor, state, forces and elements there, and the tangent next to it."""
+        stretch, length, first = self._problem.stretch, self._problem.length, state
         last, chord = np.inf, False
         elements = _refreshed(elements, state)
         try:
             for _ in range(MOST_STEPS):
                 if not chord:
-                    negative = tangent.factor(elements, state, forces)
+                    tangent = self._tangent(elements, state, forces)
                     at, axial, along = state, forces, tangent.solve(self._load)
                 strains = stretch.strains(state)
-                gradient = tangent.gradient(elements, state, forces) - self._constant - factor * self._load
+                gradient = self._assembly.gradient(elements, state, forces) - self._constant - factor * self._load
                 stretch.add_axial(at, stretch.stiffness * strains - forces, gradient)
                 motion, more = tangent.solve(-gradient), 0.0
                 if across is not None:
@@ -251,18 +256,18 @@ class _Path:
                 if moved < SETTLED and changed < SETTLED_FORCE:
                     since = float(np.abs(state - at).max()) / length, float(np.abs(forces - axial).max()) / size
                     if since[0] > SAME_STIFFNESS[0] or since[1] > SAME_STIFFNESS[1]:
-                        negative = tangent.factor(elements, state, forces)
-                    return factor, state, forces, elements, negative
+                        tangent = self._tangent(elements, state, forces)
+                    return factor, state, forces, elements, tangent
         except SingularError:
             pass
         return None
 
-    def _with_tangent(
-        self, factor: float, state: Floats, forces: Floats, elements: tuple[Elements, ...], negative: int,
+    def _on_path(
+        self, factor: float, state: Floats, forces: Floats, elements: tuple[Elements, ...], tangent: Tangent,
         last: _Point | None = None, step: float = 0.0,
     ) -> _Point:  # fmt: skip
-        """The point at a state whose stiffness was factorised last, a step after the last point."""
-        along = self._tangent.solve(self._load)
+        """The point at a state with its tangent, a step after the last point."""
+        along = tangent.solve(self._load)
         rate = 1.0 / sqrt(self._inner(along, along))
         if last is not None and self._inner(along, last.motion) < 0:
             rate = -rate
@@ -270,20 +275,36 @@ class _Path:
         stretch = self._problem.stretch
         change = stretch.stiffness * stretch.elongation(state, motion)
         arc, modes = (0.0, None) if last is None else (last.arc + step, last.modes)
-        point = _Point(factor, arc, state, forces, elements, negative, motion, change, rate)
-        return point if negative else self._looking_ahead(point, modes)
+        point = _Point(factor, arc, state, forces, elements, tangent.negative_modes, motion, change, rate)
+        return point if tangent.negative_modes else self._looking_ahead(point, tangent, modes)
 
-    def _looking_ahead(self, here: _Point, start: Floats | None) -> _Point:
+    def _looking_ahead(self, here: _Point, tangent: Tangent, start: Floats | None) -> _Point:
         """With its modes and the nearest singular stiffness, as the stiffness of the lowest modes changes here."""
-        values, modes = self._tangent.lowest(MODES, start)
+        values, modes = self._lowest_modes(tangent, start)
         step = PROBE * self._problem.length / self._reach(here.motion)
         state, forces = here.state + step * here.motion, here.forces + step * here.change
-        change = self._tangent.change(here.elements, state, forces, modes, step)
+        _, ahead_values = self._assembly.values(here.elements, state, forces)
+        change = _between(modes, tangent.pattern.upper((ahead_values - tangent.values) / step))
         root = 1.0 / np.sqrt(values)
         loss = np.linalg.eigvalsh(-change * root[:, None] * root)  # 1/m: the modes' stiffness vanishes at 1/loss
         ahead = 1.0 / loss[-1] if loss[-1] > 0 else np.inf
         behind = 1.0 / loss[0] if loss[0] < 0 else -np.inf
         return replace(here, modes=modes, ahead=float(ahead), behind=float(behind))
+
+    def _lowest_modes(self, tangent: Tangent, start: Floats | None) -> tuple[Floats, Floats]:
+        """The `MODES` lowest modes of a stable tangent: values (k,) ascending and modes (k, dofs), whose square sum
+        over the scale is 1.
+
+        start : (k, dofs) modes of a state nearby, or None.
+        """
+        scale, size = self._scale, tangent.freedom.size
+        if start is None:  # no symmetry of the shell is one of this start
+            start = np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(MODES, size))[:, None]) * scale
+        inverse, rows = subspace_iteration(
+            lambda row: tangent.factors.solve(row / scale) / scale,
+            start / scale, settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS,
+        )  # fmt: skip
+        return 1.0 / inverse, orthonormal(rows) * scale
 
     def _reach(self, motion: Floats) -> float:
         """Largest displacement of a node [m]."""
@@ -296,3 +317,14 @@ class _Path:
 
 def _refreshed(elements: Sequence[Elements], state: Floats) -> tuple[Elements, ...]:
     return tuple(element.refreshed(state) for element in elements)
+
+
+def _between(modes: Floats, upper: csc_matrix) -> Floats:
+    """(k, k) x' A y between modes (k, dofs), of a symmetric matrix given by its upper triangle."""
+    half = _products(modes, np.array([upper @ mode for mode in modes]))
+    return half + half.T - _products(modes, upper.diagonal() * modes)
+
+
+def _products(a: Floats, b: Floats) -> Floats:
+    """(k, k) inner products of rows."""
+    return np.asarray(np.einsum("ik,jk->ij", a, b))

@@ -15,12 +15,17 @@ ground, kinetic and elastic energy together do not grow. Smaller steps have more
 
 The source frames of the elements stay those of the step's start and are refreshed when it is accepted. The twist
 angles of a motion are hence measured from frames that travel with the rod, and mean nothing without them.
+
+With contact (`ContactEuler`) [HQK Algorithm 1] a step is a predictor, and a corrector until no new node is below the
+target. Every step starts with nothing in contact, so that nodes can leave: one that the rest of the step lifts is not
+below after the predictor. Where a law has friction, touching nodes first stick; those that stick by more than friction
+can hold slip, with the force of friction held over the rest of the step.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from math import isfinite
-from typing import Protocol, Self
+from typing import Protocol, Self, TypeVar
 
 import numba as nb
 import numpy as np
@@ -29,10 +34,10 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
-from rodshell.solve.constraint import NO_CURVATURE, Constraint, Supports
-from rodshell.solve.forces import Damping, Force, ImplicitForce
-from rodshell.solve.linear import SingularError
-from rodshell.solve.summed import SummedMatrix, narrow_or_sparse
+from rodshell.solve.forces import Damping, Force, ImplicitForce, PointLoads
+from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
+from rodshell.solve.problem import NO_CURVATURE, Constraint, Supports
+from rodshell.solve.sparse_ldl import SingularError
 
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
@@ -41,6 +46,7 @@ ROUND_OFF = 1e-13  # of the state: no step can be told from zero below this
 CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth going on with
 MOST_ITERATIONS = 20
 LEAST_SHARE = 1 / 64
+MOST_PASSES = 30  # of predictor and corrector, with contact
 PART = 1024  # elements evaluated at a time: their Hessians (2 MB) stay in the cache, and memory stays small
 
 
@@ -87,11 +93,15 @@ class Motion:
     ) -> Self:
         """The motion of a rod or a shell; without a constraint it is free.
 
-        A constraint that never moves may be given as a `Freedom`.
+        Parameters
+        ----------
+        body : its source frames being at the state to start from.
+        constraint : as of `Motion`; one that never moves may be given as a `Freedom`.
+        forces : external forces.
         """
         given = body.freedom() if constraint is None else constraint
         supports = Supports(given) if isinstance(given, Freedom) else given
-        implicit = [one for one in body.elements if all(one is not other for other in body.explicit)]
+        implicit = [element for element in body.elements if all(element is not other for other in body.explicit)]
         return cls((*implicit, body.stretch), body.mass, supports, forces, body.explicit)
 
     def constraint_at(self, time: float) -> Constraint:
@@ -112,7 +122,12 @@ class Motion:
         return type(self)(elements, self.mass, self.constraint, self.forces, explicit)
 
     def in_parts(self, most: int = PART) -> Self:
-        """The same motion with its element sets cut into sets of at most `most` elements."""
+        """The same motion with its element sets divided, so that their Hessians stay in the cache.
+
+        Parameters
+        ----------
+        most : elements of a set.
+        """
         return replace(self, elements=tuple(part for element in self.elements for part in _parts(element, most)))
 
 
@@ -143,7 +158,19 @@ class ImplicitEuler:
         self._planned: tuple[object, ...] = ()
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
-        """The step from `time` on, `step` long [s]. The elements' source frames belong to `state`."""
+        """One step.
+
+        Parameters
+        ----------
+        motion : its source frames being at the state.
+        state : (N, 3) at the start [m, at twist angles rad]; velocity : (N, 3) [m/s, rad/s].
+        time : of the start [s].
+        step : its length [s].
+
+        Raises
+        ------
+        InputError : an external force is not finite.
+        """
         end = time + step
         constraint = motion.constraint_at(end)
         free = constraint.freedom(state)
@@ -175,6 +202,84 @@ class ImplicitEuler:
         self.matrix = self._make_matrix(blocks, free)
         widths = {3 * b.shape[1]: max(len(c) for c in blocks if c.shape[1] == b.shape[1]) for b in blocks}
         self.buffers = {width: np.zeros((count, width, width)) for width, count in widths.items()}
+
+
+class Planes(Constraint, Protocol):
+    """The supports and the planes of nodes in contact."""
+
+    @property
+    def nodes(self) -> Ints: ...
+
+
+P = TypeVar("P", bound=Planes)
+
+
+class ContactLaw(Protocol[P]):
+    """What `contact.modified_mass.ModifiedMass` offers."""
+
+    def touching(self, supports: Constraint, state: Floats) -> P:
+        """The constraint that a step from `state` (N, 3) begins with."""
+        ...
+
+    def below(self, state: Floats, touching: P) -> P | None:
+        """With the nodes that `state` (N, 3) has below the target, too; None where there are no new ones."""
+        ...
+
+    def released(self, touching: P, reactions: Floats) -> tuple[P, Floats] | None:
+        """With the nodes free to slip that stick by more than friction can hold, by the `reactions` (N, 3) [N], and
+        the friction (N, 3) on them [N]; None where there are none."""
+        ...
+
+    def landed(self, velocity: Floats, touching: P) -> Floats:
+        """(N, 3) `velocity` at the end of a step, without what the contact takes of it [m/s]."""
+        ...
+
+
+class ContactEuler:
+    """Takes single steps, as `ImplicitEuler` does.
+
+    Attributes
+    ----------
+    last : the constraint that the last step ended with.
+
+    Parameters
+    ----------
+    law : what holds nodes that touch.
+    matrix : makes the matrix of the Newton iterations.
+    """
+
+    def __init__(self, law: ContactLaw[P], matrix: MakeMatrix = narrow_or_sparse) -> None:
+        self._law, self._euler = law, ImplicitEuler(matrix)
+        self.last: P | None = None
+
+    def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
+        """One step; parameters as of `ImplicitEuler.take`."""
+        law = self._law
+        touching = law.touching(motion.constraint_at(time + step), state)
+        rubbing = np.zeros_like(state)
+        forces = motion.forces
+        iterations = factorizations = 0
+        for _ in range(MOST_PASSES):
+            bound = replace(motion, constraint=touching, forces=forces)
+            taken = self._euler.take(bound, state, velocity, time=time, step=step)
+            factorizations += taken.factorizations
+            if isinstance(taken, Refused):
+                return replace(taken, factorizations=factorizations)
+            iterations += taken.iterations
+            more = law.below(taken.state, touching)
+            if more is not None:
+                touching = more
+                continue
+            slipping = law.released(touching, taken.reactions)
+            if slipping is not None:
+                touching, rubs = slipping
+                rubbing += rubs
+                forces = (*motion.forces, PointLoads(touching.nodes, rubbing[touching.nodes]))
+                continue
+            self.last = touching
+            landed = law.landed(taken.velocity, touching)
+            return Step(taken.state, landed, taken.reactions + rubbing, iterations, factorizations)
+        return Refused(f"contact has not settled in {MOST_PASSES} passes", factorizations)
 
 
 def _gradient(elements: tuple[Elements, ...], state: Floats) -> Floats:
@@ -254,16 +359,16 @@ class _Newton:
         total -= self.held
         if hessian:
             matrix.clear()
-        for which, element in enumerate(self.motion.elements):
+        for number, element in enumerate(self.motion.elements):
             hessians = buffers[3 * element.blocks.shape[1]][: len(element.blocks)] if hessian else NO_HESSIANS
             element.evaluate(state, total, hessians)
             if hessian:
-                matrix.add(which, hessians, element.blocks, free)
-        for which, force in enumerate(self.implicit, start=len(self.motion.elements)):
+                matrix.add(number, hessians, element.blocks, free)
+        for number, force in enumerate(self.implicit, start=len(self.motion.elements)):
             given, hessians = force.at(self.end, state, moved / self.step, self.step)
             total -= given
             if hessian:
-                matrix.add(which, hessians, force.blocks, free)
+                matrix.add(number, hessians, force.blocks, free)
         if hessian:
             curvature = self.constraint.curvature(state, total)
             matrix.add_blocks(self.inertia, curvature if len(curvature) else NO_CURVATURE, free)

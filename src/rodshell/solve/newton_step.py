@@ -1,11 +1,11 @@
 """One step of Newton's method with the axial forces as unknowns, and how far to go.
 
-Near the end a factorisation serves for the steps after it, too, which then cost a gradient and a solve (chord steps).
+Near the end a factorisation also serves the next steps, which then cost one gradient and one solve (chord steps).
 
-A step along which rods turn by a leaves them strained by a^2/2, with forces that may buckle them. The next
-factorisation tells: where it counts several negative modes more than the one that the step was made with, the step was
-too long, and a part of it is taken instead. It is a trust region, with the modes as its measure: the energy would not
-do, for it jumps with those strains.
+A step along which rods turn by an angle a leaves them strained by a^2/2, with forces that may buckle them. The next
+factorisation shows it: where it counts several more negative modes than the last, the step was too long, and only a
+part of it is taken. This is a trust region whose measure are the modes; the energy does not serve, since it jumps with
+those strains.
 """
 
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.rods.elements import NO_HESSIANS, Elements
-from rodshell.solve.linear import SingularError
-from rodshell.solve.problem import Problem, pattern_of
+from rodshell.solve.problem import Problem
+from rodshell.solve.sparse_ldl import Factors, SingularError
 
 TOLERANCE = 1e-13  # of the length: estimate of the error that is left
 FORCE_TOLERANCE = 1e-10  # of the largest axial force: the same for the forces
@@ -35,7 +35,7 @@ TINY = 1e-300  # no step is shorter, but for none at all
 
 
 @dataclass(frozen=True)
-class _Stride:
+class _LastStep:
     """The last step, so that less of it can be taken: from where, at how many negative modes; the whole motion (n, 3),
     `reach` [m] long, with the change (e,) of the forces; and the share taken of both."""
 
@@ -49,23 +49,25 @@ class _Stride:
     share: float
 
 
-class HopelessError(Exception):
+class TooManyModesError(Exception):
     """The start of an iteration has too many negative modes for an equilibrium to be near."""
 
 
 class NewtonStep:
     """One iteration, with the buffers, the pattern and the factorisation that all iterations share."""
 
-    def __init__(self, problem: Problem, state: Floats, *, cut: bool = False, most_modes: int | None = None) -> None:
-        self._problem, self._cut, self._most_modes = problem, cut, most_modes
+    def __init__(
+        self, problem: Problem, state: Floats, *, limit_steps: bool = False, most_modes: int | None = None
+    ) -> None:
+        self._problem, self._limit_steps, self._most_modes = problem, limit_steps, most_modes
         self.elements = problem.elements
-        free = problem.constraint.freedom(state)
-        everywhere = np.arange(len(state))[:, None]
-        self._blocks = (*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere)
-        self.pattern = pattern_of(problem, self._blocks, free)
+        self._free = problem.constraint.freedom(state)
+        self._blocks = problem.blocks(len(state))
+        self.pattern = problem.pattern_at(state)
         self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
+        self._factors: Factors | None = None  # their memory serves for all factorisations of this iteration
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
-        self.dofs = free.size
+        self.dofs = self._free.size
         self.iterations = 0
         self.factorizations = 0
         self.negative_modes = 0
@@ -73,7 +75,7 @@ class NewtonStep:
         self._longest = LONGEST_STEP
         self._nearest = np.inf  # the last step that was near
         self._shifted = False  # the last step was one of the shifted Hessian
-        self._stride: _Stride | None = None
+        self._last_step: _LastStep | None = None
         self._factored = state, np.empty(0)  # where the matrix is from
         self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
         self._chord = self._was_chord = self.settled = False
@@ -84,10 +86,17 @@ class NewtonStep:
         return not (self._chord and self._was_chord)
 
     def refresh(self, state: Floats) -> None:
+        """Carry the source frames of the elements to `state` (n, 3)."""
         self.elements = tuple(element.refreshed(state) for element in self.elements)
 
     def gradient(self, state: Floats, forces: Floats) -> Floats:
-        """Gradient (n, 3) of energy and load with the given axial forces [N]."""
+        """Gradient of energy and load.
+
+        Parameters
+        ----------
+        state : (n, 3) [m, rad].
+        forces : (e,) axial forces that the edges carry [N].
+        """
         gradient = np.zeros_like(state) if self._problem.load is None else -self._problem.load
         for element in self.elements:
             element.evaluate(state, gradient)
@@ -95,7 +104,23 @@ class NewtonStep:
         return gradient
 
     def take(self, state: Floats, forces: Floats, descend: bool) -> tuple[float, Floats, Floats, float]:
-        """Length of the step, the next state and forces, and how far these are from matching the strains."""
+        """One step.
+
+        Parameters
+        ----------
+        state : (n, 3) [m, rad].
+        forces : (e,) axial forces [N].
+        descend : shift the Hessian wherever it is indefinite.
+
+        Returns
+        -------
+        Length of the step [m], the next state and forces, and how far these are from matching the strains [-].
+
+        Raises
+        ------
+        SingularError : a pivot vanishes, and not by a mode without stiffness.
+        TooManyModesError : the start has more negative modes than are allowed.
+        """
         problem = self._problem
         if not self._chord:
             self._factored = state, forces
@@ -120,7 +145,7 @@ class NewtonStep:
             gradient += self._times(prescribed)
         direction = self._direction(-free.reduce(gradient), descend)
         if direction is None:
-            return self._retreat()
+            return self._shorten()
         motion = free.expand(direction)
         if prescribed is not None:
             motion += prescribed
@@ -131,31 +156,31 @@ class NewtonStep:
         share = min(1.0, self._longest * problem.length / reach) if reach > 0 else 1.0
         strains += stretch.elongation(at, motion)
         change = base + stretch.stiffness * strains - forces
-        stride = _Stride(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
-        state_next, forces_next = self._stridden(stride)
+        last = _LastStep(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
+        state_next, forces_next = self._after(last)
         left = problem.stretch.strains(state_next)
         if not problem.inextensible:
             left = left - forces_next / problem.stretch.stiffness
         self._judge(reach / problem.length, forces, forces_next)
         return reach, state_next, forces_next, float(np.abs(left).max())
 
-    def _stridden(self, stride: _Stride) -> tuple[Floats, Floats]:
+    def _after(self, last: _LastStep) -> tuple[Floats, Floats]:
         """State and forces after a step."""
-        self._stride = stride
-        state = self._problem.constraint.retract(stride.state + stride.share * stride.motion)
-        return state, stride.forces + stride.share * stride.change
+        self._last_step = last
+        state = self._problem.constraint.retract(last.state + last.share * last.motion)
+        return state, last.forces + last.share * last.change
 
-    def _retreat(self) -> tuple[float, Floats, Floats, float]:
+    def _shorten(self) -> tuple[float, Floats, Floats, float]:
         """As `take`, for a part of the last step in its place: no iteration of its own."""
-        assert self._stride is not None
-        stride = replace(self._stride, share=PART * self._stride.share)
-        moved, self.elements = stride.share * stride.reach, stride.elements
+        assert self._last_step is not None
+        last = replace(self._last_step, share=PART * self._last_step.share)
+        moved, self.elements = last.share * last.reach, last.elements
         self._longest = moved / self._problem.length
-        return moved, *self._stridden(stride), np.inf
+        return moved, *self._after(last), np.inf
 
     def _near(self, moved: float) -> bool:
         """Whether a step of Newton's so long leads to the equilibrium at hand, be it a saddle."""
-        before = min(self._nearest, np.inf if self._shifted else self._last[0]) if self._cut else np.inf
+        before = min(self._nearest, np.inf if self._shifted else self._last[0]) if self._limit_steps else np.inf
         near = moved < min(NEAR, NEARER * before)
         if near:
             self._nearest = moved
@@ -164,8 +189,8 @@ class NewtonStep:
     def _too_far(self) -> bool:
         """Whether the last step was not short and led to more negative modes than it began with: by several, which are
         rods that buckle; one more is a saddle on the way."""
-        last = self._stride
-        if last is None or not self._cut or self.negative_modes <= last.negative_modes + 1:
+        last = self._last_step
+        if last is None or not self._limit_steps or self.negative_modes <= last.negative_modes + 1:
             return False
         return last.share * last.reach > NEAR * self._problem.length
 
@@ -196,19 +221,19 @@ class NewtonStep:
         """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated."""
         self._shift_until_definite()
         mode = self._free.expand(self._inverse_iteration(12)[0])
-        return mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max())
+        return np.asarray(mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max()))
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
         where the step that led there was too long."""
         if self._chord:
-            return self._solver.solve(right)
+            return self._solve(right)
         self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
         regular = self._count_negative_modes()
         if self.factorizations == 1 and self._most_modes is not None and self.negative_modes > self._most_modes:
-            raise HopelessError
+            raise TooManyModesError
         if self.negative_modes and regular and not descend:
-            step = self._solver.solve(right)
+            step = self._solve(right)
             if self._near(float(np.abs(step).max()) / self._problem.length):
                 self._shifted = False
                 return step
@@ -218,13 +243,13 @@ class NewtonStep:
         self._shifted = self.negative_modes > 0
         if self.negative_modes:
             self._shift_until_definite()
-        return self._solver.solve(right)
+        return self._solve(right)
 
     def _count_negative_modes(self) -> bool:
         """Factorise the Hessian; whether that can be done. A mode without stiffness counts as a negative one."""
         self.factorizations += 1
         try:
-            self.negative_modes = self._solver.factor(self._data)
+            self.negative_modes = self._factor(self._data)
         except SingularError:
             if not np.isfinite(self._data).all():
                 raise
@@ -253,14 +278,24 @@ class NewtonStep:
         shifted = self._data.copy()
         shifted[self._assembly.diagonal] += shift
         self.factorizations += 1
-        return self._solver.factor(shifted)
+        return self._factor(shifted)
+
+    def _factor(self, data: Floats) -> int:
+        """Factorise; the number of negative modes."""
+        self._factors = self._solver.factor(data, reuse=self._factors)
+        return self._factors.negative
+
+    def _solve(self, right: Floats) -> Floats:
+        """By the last factors."""
+        assert self._factors is not None
+        return self._factors.solve(right)
 
     def _inverse_iteration(self, steps: int) -> tuple[Floats, float]:
         """Eigenvector (dofs,) of the smallest eigenvalue of the matrix last factorised, and that eigenvalue."""
         v = np.sin(1.0 + np.arange(self._free.size) ** 2)  # no symmetry of the shell is one of this start
         for _ in range(steps):
             v /= np.linalg.norm(v)
-            image = self._solver.solve(v)
+            image = self._solve(v)
             smallest = 1.0 / float(v @ image)
             v = image
         return v, smallest

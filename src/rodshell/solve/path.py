@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import Equilibrium, find_equilibrium, find_stable
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import SolveReport, Status
 
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
@@ -56,14 +55,14 @@ def follow(
     while t < 1.0:
         there = min(1.0, t + step)
 
-        def told(iteration: int, residual: float, there: float = there) -> None:
+        def at_share(iteration: int, residual: float, there: float = there) -> None:
             if progress is not None:
                 progress(there, iteration, residual)
 
         problem = problem_at(there)
         if last is not None:
-            problem = replace(problem, elements=last.elements, pattern=last.pattern)
-        found = find_stable(problem, state, forces, most_iterations=MOST, progress=told)
+            problem = going_on(problem, last)
+        found = find_stable(problem, state, forces, most_iterations=MOST, progress=at_share)
         reports.append(found.report)
         if found.report.converged:
             t, state, forces, last = there, found.state, found.forces, found
@@ -73,10 +72,10 @@ def follow(
             step = 0.4 * min(step, there - t)
         if found.report.status is Status.OUT_OF_TIME:
             break
-        if t < 1.0 and (step < SMALLEST_STEP or sum(one.iterations for one in reports) > MOST_OF_ALL):
+        if t < 1.0 and (step < SMALLEST_STEP or sum(report.iterations for report in reports) > MOST_OF_ALL):
             break
     ended = last or found
-    report = ended.report.after(*(one for one in reports if one is not ended.report))
+    report = ended.report.after(*(report for report in reports if report is not ended.report))
     if t >= 1.0:
         return replace(ended, report=report)
     late = found.report.status is Status.OUT_OF_TIME
@@ -111,7 +110,7 @@ class Trace:
 
 def trace(
     problem_at: Callable[[float], Problem], here: Equilibrium, start: float, stop: float, *,
-    shortest: float, snap: bool, most_factorizations: int, told: Callable[[float], None] = lambda t: None,
+    shortest: float, snap: bool, most_factorizations: int, progress: Callable[[float], None] = lambda t: None,
 ) -> Trace:  # fmt: skip
     """Go from the stable equilibrium `here` at t = `start` towards `stop`, up or down, branch by branch.
 
@@ -121,7 +120,7 @@ def trace(
     shortest : step in t at which a branch that cannot be followed has ended.
     snap : whether to go down the energy there and on from where that leads; else the path ends there.
     most_factorizations : the path ends when they are used up.
-    told : called with t before each step; it may raise an error to end the path.
+    progress : called with t before each step; it may raise an error to end the path.
 
     Returns
     -------
@@ -129,13 +128,13 @@ def trace(
     """
     t, step, done, snaps = start, abs(stop - start), 0, list[Snap]()
     while t != stop:
-        told(t)
+        progress(t)
         step = min(step, abs(stop - t))
         there = stop if step == abs(stop - t) else t + float(np.copysign(step, stop - t))
-        problem = replace(problem_at(there), elements=here.elements, pattern=here.pattern)
+        problem = going_on(problem_at(there), here)
         found = find_stable(problem, here.state, here.forces, most_iterations=MOST_A_STEP)
         done += found.report.factorizations
-        if not found.report.stable or unaccounted(problem, here, found):
+        if not found.report.stable or unaccounted(here, found):
             if done >= most_factorizations or (step <= shortest and not snap):
                 break
             if step > shortest:
@@ -145,8 +144,8 @@ def trace(
             done += found.report.factorizations
             if not found.report.stable:
                 break
-            if surplus(problem, here, found) < -UNACCOUNTED:
-                snaps.append(Snap(t, there, farthest(problem, here, found)))
+            if surplus(here, found) < -UNACCOUNTED:
+                snaps.append(Snap(t, there, farthest(here, found)))
             step = 4 * shortest
         elif found.report.iterations <= EASY:
             step *= 1.6
@@ -154,32 +153,41 @@ def trace(
     return Trace(t, here, tuple(snaps), done)
 
 
-def unaccounted(problem: Problem, here: Equilibrium, there: Equilibrium) -> bool:
+def going_on(problem: Problem, last: Equilibrium) -> Problem:
+    """The problem with the source frames and the pattern of an equilibrium of the same structure.
+
+    Parameters
+    ----------
+    problem : the next one on a path.
+    last : the equilibrium that the next solve starts from.
+    """
+    return replace(problem, elements=last.elements, pattern=last.problem.pattern)
+
+
+def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule."""
-    return abs(surplus(problem, here, there)) > UNACCOUNTED
+    by the trapezoidal rule; parameters as for `surplus`."""
+    return abs(surplus(here, there)) > UNACCOUNTED
 
 
-def surplus(problem: Problem, here: Equilibrium, there: Equilibrium) -> float:
-    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell."""
-    assert isinstance(problem.constraint, Supports)
-    moved = problem.constraint.moved
-    one, two = (potential(problem, at) for at in (here, there))
+def surplus(here: Equilibrium, there: Equilibrium) -> float:
+    """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell.
+
+    Parameters
+    ----------
+    here, there : equilibria of one structure under one load, the second with prescribed `Supports`.
+    """
+    supports = there.problem.constraint
+    assert isinstance(supports, Supports)
+    moved, before, after = supports.moved, here.energy, there.energy
     work = 0.5 * float(np.sum((here.gradient + there.gradient)[moved] * (there.state - here.state)[moved]))
-    return (two - one - work) / max(abs(one), abs(two), TINY)
+    return (after - before - work) / max(abs(before), abs(after), TINY)
 
 
-def potential(problem: Problem, found: Equilibrium) -> float:
-    """Energy of an equilibrium less the work of the load [J]."""
-    unused = np.zeros_like(found.state)
-    elastic = sum(one.evaluate(found.state, unused) for one in (*found.elements, problem.stretch))
-    return elastic - (0.0 if problem.load is None else float(np.sum(problem.load * found.state)))
-
-
-def farthest(problem: Problem, one: Equilibrium, two: Equilibrium) -> float:
-    """Largest distance of a node between two states [m]."""
-    nodes = np.unique(problem.stretch.blocks)
-    return float(np.linalg.norm(two.state[nodes] - one.state[nodes], axis=1).max())
+def farthest(here: Equilibrium, there: Equilibrium) -> float:
+    """Largest distance of a node between two equilibria of one structure [m]."""
+    nodes = np.unique(here.problem.stretch.blocks)
+    return float(np.linalg.norm(there.state[nodes] - here.state[nodes], axis=1).max())
 
 
 def _fallen(problem: Problem, here: Equilibrium, found: Equilibrium) -> Equilibrium:
@@ -196,7 +204,7 @@ def _fallen(problem: Problem, here: Equilibrium, found: Equilibrium) -> Equilibr
         state, forces = found.state + DISTURBANCE * problem.length * found.mode, found.forces
         problem = replace(problem, elements=found.elements)
     down = find_equilibrium(problem, state, forces, descend=True)
-    if down.report.stable and surplus(problem, here, down) < UNACCOUNTED:
+    if down.report.stable and surplus(here, down) < UNACCOUNTED:
         return down
     state = state.copy()
     state[supports.moved] = supports.goals

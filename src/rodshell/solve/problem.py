@@ -1,23 +1,112 @@
-"""A shell in equilibrium, as a problem to solve: energies, edges, loads, a constraint; and its matrices' pattern."""
+"""A structure in equilibrium, as a problem: energies, edges, loads, a constraint; and its matrices' pattern."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
 
-from rodshell.arrays import Floats, Ints
-from rodshell.model import Assembly, Freedom
+from rodshell.arrays import Floats, Ints, Longs
+from rodshell.model import Assembly, Freedom, Shell
 from rodshell.rods.elements import Elements
 from rodshell.rods.stretch import Stretch
-from rodshell.solve.constraint import Constraint
-from rodshell.solve.linear import LinearSolver, Qdldl
-from rodshell.solve.multifrontal import Multifrontal
+from rodshell.solve.sparse_ldl import LinearSolver, Multifrontal, Qdldl
+
+NO_CURVATURE = np.empty((0, 3, 3))
+
+
+class Constraint(Protocol):
+    """A manifold on which the state moves. The count of free directions of each block never changes."""
+
+    def freedom(self, state: Floats) -> Freedom:
+        """The free directions.
+
+        Parameters
+        ----------
+        state : (n, 3) on the manifold [m, at twist angles rad].
+        """
+        ...
+
+    def curvature(self, state: Floats, gradient: Floats) -> Floats:
+        """Contribution of the constraint forces to the Hessian.
+
+        Parameters
+        ----------
+        state : (n, 3) on the manifold [m, rad].
+        gradient : (n, 3) of energy and load there [N, N m].
+
+        Returns
+        -------
+        (n, 3, 3) -lambda phi'' of each block [N/m], or an empty array.
+        """
+        ...
+
+    def remaining(self, state: Floats) -> Floats | None:
+        """Prescribed displacement that is still to go.
+
+        Parameters
+        ----------
+        state : (n, 3) the state now [m, rad].
+
+        Returns
+        -------
+        (n, 3) across the free directions [m, rad]; None where nothing moves.
+        """
+        ...
+
+    def retract(self, state: Floats) -> Floats:
+        """The state moved back onto the manifold after a step along the free directions.
+
+        Parameters
+        ----------
+        state : (n, 3) next to the manifold [m, rad].
+        """
+        ...
 
 
 @dataclass(frozen=True)
+class Supports:
+    """Fixed directions that never turn: supports, clamps, ghost nodes.
+
+    Parameters
+    ----------
+    free : what remains free.
+    moved : (k,) blocks that are prescribed, all their directions being fixed; goals : (k, 3) where they go [m].
+    """
+
+    free: Freedom
+    moved: Ints = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    goals: Floats = field(default_factory=lambda: np.empty((0, 3)))
+
+    def freedom(self, state: Floats) -> Freedom:
+        return self.free
+
+    def curvature(self, state: Floats, gradient: Floats) -> Floats:
+        return NO_CURVATURE
+
+    def remaining(self, state: Floats) -> Floats | None:
+        if len(self.moved) == 0:
+            return None
+        result = np.zeros_like(state)
+        result[self.moved] = self.goals - state[self.moved]
+        return result
+
+    def retract(self, state: Floats) -> Floats:
+        return state
+
+
+@dataclass(frozen=True, eq=False)
 class Pattern:
-    """Which blocks (m, k) of unknowns the energies couple, each block with `count` (n,) free directions; and what
-    follows from that alone: the assembly's maps, and a solver with its order of elimination."""
+    """What follows from the pattern of a problem's matrices alone. It never changes, so that any number of solves and
+    tangents share it.
+
+    Parameters
+    ----------
+    blocks : (m, k) blocks of unknowns that each set of energies couples.
+    count : (n,) free directions of each block.
+    assembly : the maps from element Hessians to the sparse matrix.
+    solver : the order of elimination and the symbolic factorisation.
+    """
 
     blocks: tuple[Ints, ...]
     count: Ints
@@ -25,24 +114,36 @@ class Pattern:
     solver: LinearSolver
 
     def serves(self, blocks: tuple[Ints, ...], count: Ints) -> bool:
-        """Whether another problem has this pattern."""
+        """Whether another problem has this pattern.
+
+        Parameters
+        ----------
+        blocks : (m, k) of each of its sets of energies.
+        count : (n,) free directions of each of its blocks.
+        """
         here, there = (*self.blocks, self.count), (*blocks, count)
         return len(here) == len(there) and all(map(np.array_equal, here, there))
+
+    def upper(self, values: Floats) -> csc_matrix:
+        """The upper triangle (dofs, dofs) of a matrix with these `values` (nnz,)."""
+        size = len(self.assembly.indptr) - 1
+        return csc_matrix((values, self.assembly.indices, self.assembly.indptr), shape=(size, size))
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A shell in equilibrium: elastic elements, edges, loads and a constraint.
+    """A structure in equilibrium: elastic elements, edges, loads and a constraint.
 
     Parameters
     ----------
     elements : every energy but the stretch.
     stretch : the edges.
-    inextensible : the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
     constraint : supports or a surface.
     length : characteristic length of the shape [m]: steps are measured by it.
+    inextensible : the strain must vanish (the edges' stiffness is a penalty), else edges are elastic.
     load : (n, 3) dead forces [N], or None.
-    places : (n, 2) where the blocks lie in the flat grid, from which the order of elimination follows, or None.
+    flat_coordinates : (n, 2) where the blocks lie in the flat grid [m], from which the order of elimination follows,
+        or None.
     pattern : of a problem that was solved before; where this one has the same, it need not be analysed again.
     """
 
@@ -52,23 +153,83 @@ class Problem:
     length: float
     inextensible: bool = False
     load: Floats | None = None
-    places: Floats | None = None
+    flat_coordinates: Floats | None = None
     pattern: Pattern | None = None
 
+    @classmethod
+    def of_shell(
+        cls,
+        shell: Shell,
+        points: Floats,
+        *,
+        goals: Floats | None = None,
+        elements: tuple[Elements, ...] | None = None,
+        pattern: Pattern | None = None,
+    ) -> Self:
+        """A shell without loads whose rod ends are held, or are on their way.
 
-def linear_solver(
-    indptr: NDArray[np.int64], indices: NDArray[np.int64], free: Freedom, places: Floats | None
-) -> LinearSolver:
-    """The solver for a pattern: ordered by the `places` (n, 2) of the blocks in the flat grid, if they are known."""
-    if places is None:
+        Parameters
+        ----------
+        points : (k, 3) points of the shape [m], whose width gives the characteristic length.
+        goals : (k, 3) where the ends, and the ghost nodes of clamps after them, go [m]; None: they stay.
+        elements : the shell's own energies, with their source frames elsewhere; None: as the shell has them.
+        pattern : of an earlier solve of this shell.
+        """
+        free = shell.held_ends()
+        supports = Supports(free) if goals is None else Supports(free, np.append(shell.ends, shell.ghosts), goals)
+        return cls(
+            shell.elements if elements is None else elements,
+            shell.stretch,
+            supports,
+            half_width(points),
+            flat_coordinates=shell.flat_coordinates,
+            pattern=pattern,
+        )
+
+    def blocks(self, count: int) -> tuple[Ints, ...]:
+        """(m, k) blocks that each set of energies couples, of `count` blocks in all: the elements, the edges, and each
+        block with itself, for the curvature of the constraint."""
+        return (*(element.blocks for element in self.elements), self.stretch.blocks, np.arange(count)[:, None])
+
+    def pattern_at(self, state: Floats) -> Pattern:
+        """The pattern of this problem: the one that comes with it where it serves, or a new one.
+
+        Parameters
+        ----------
+        state : (n, 3) any state of the problem.
+        """
+        blocks, free = self.blocks(len(state)), self.constraint.freedom(state)
+        if self.pattern is not None and self.pattern.serves(blocks, free.count):
+            return self.pattern
+        assembly = Assembly.of(blocks, free)
+        solver = linear_solver(assembly.indptr, assembly.indices, free, self.flat_coordinates)
+        return Pattern(blocks, free.count, assembly, solver)
+
+    def refreshed(self, state: Floats) -> Self:
+        """The same problem with the source frames of its elements at `state` (n, 3)."""
+        return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
+
+    def potential(self, state: Floats) -> float:
+        """Elastic energy at `state` (n, 3) less the work of the load [J]."""
+        unused = np.zeros_like(state)
+        elastic = sum(element.evaluate(state, unused) for element in (*self.elements, self.stretch))
+        return elastic - (0.0 if self.load is None else float(np.sum(self.load * state)))
+
+
+def linear_solver(indptr: Longs, indices: Longs, free: Freedom, flat_coordinates: Floats | None) -> LinearSolver:
+    """The solver for a pattern, ordered by where the blocks lie in the flat grid if that is known.
+
+    Parameters
+    ----------
+    indptr, indices : the pattern, upper triangle in compressed columns.
+    free : the free directions of the blocks.
+    flat_coordinates : (n, 2) of the blocks [m]; None: ordered by approximate minimum degree.
+    """
+    if flat_coordinates is None:
         return Qdldl(indptr, indices)
-    return Multifrontal(indptr, indices, np.repeat(places, free.count, axis=0))
+    return Multifrontal(indptr, indices, np.repeat(flat_coordinates, free.count, axis=0))
 
 
-def pattern_of(problem: Problem, blocks: tuple[Ints, ...], free: Freedom) -> Pattern:
-    """The pattern of a problem: the one that comes with it, or a new one."""
-    if problem.pattern is not None and problem.pattern.serves(blocks, free.count):
-        return problem.pattern
-    assembly = Assembly.of(blocks, free)
-    solver = linear_solver(assembly.indptr, assembly.indices, free, problem.places)
-    return Pattern(blocks, free.count, assembly, solver)
+def half_width(points: Floats) -> float:
+    """Half of the largest extent of points (k, 3) along x, y or z [m]: the characteristic length of a shape."""
+    return 0.5 * float(np.ptp(points, axis=0).max())

@@ -15,10 +15,10 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
+from rodshell.solve.equilibrium import Equilibrium, find_stable
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
-from rodshell.solve.mixed_newton import Equilibrium, find_stable
+from rodshell.solve.newton_matrix import SparseSum
 from rodshell.solve.problem import Problem, linear_solver
-from rodshell.solve.summed import SparseSum
 
 FIRST = 6.0  # the first step leaves 1/36 of D in the matrix
 GROWTH, SHRINKAGE = 3.0, 0.25
@@ -28,9 +28,17 @@ MOST_STEPS = 400
 
 
 def relax(problem: Problem, state: Floats, *, progress: Callable[[int, float], None] | None = None) -> Equilibrium:
-    """The equilibrium below `state` (N, 3), whose edges are elastic; the last steps are those of `find_stable`.
+    """The stable equilibrium that lies below a state; the last steps are those of `find_stable`.
 
-    The report counts the descent's work too.
+    Parameters
+    ----------
+    problem : with elastic edges.
+    state : (N, 3) to begin with [m, at twist angles rad].
+    progress : called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.
+
+    Returns
+    -------
+    Its report counts the descent's work too.
     """
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)
@@ -39,7 +47,7 @@ def relax(problem: Problem, state: Floats, *, progress: Callable[[int, float], N
         motion = replace(motion, forces=(_Dead(problem.load),))
     stepper = ImplicitEuler(
         lambda blocks, free: SparseSum(
-            blocks, free, lambda indptr, indices: linear_solver(indptr, indices, free, problem.places)
+            blocks, free, lambda indptr, indices: linear_solver(indptr, indices, free, problem.flat_coordinates)
         )
     )
     still, length, factorizations, number = np.zeros_like(state), FIRST, 0, 0

@@ -10,7 +10,7 @@ class Status(Enum):
     CONVERGED = "converged"
     STALLED = "stalled"
     DIVERGED = "diverged"
-    SLID_OFF = "slid off"
+    LOST_CONTACT = "lost contact"
     MOVING = "not at rest"
     BUCKLED = "buckled"
     OUT_OF_TIME = "out of time"
@@ -25,7 +25,8 @@ _SENTENCES = {
     Status.STALLED: "stopped at the largest number of iterations above its tolerance; refine the mesh or "
     "reduce the spacing",
     Status.DIVERGED: "the iteration diverged; reduce the spacing, or choose another anchor or heading",
-    Status.SLID_OFF: "the grid slid off the target (nothing holds it there without friction); use method = bound",
+    Status.LOST_CONTACT: "the grid lost contact with the target (without friction nothing holds it there); "
+    "use method = bound",
     Status.BUCKLED: "was given up at its start: released from the target, the rods would buckle between their joints "
     "in very many places; a smaller spacing, a flatter target or, of laths, narrower ones may do",
     Status.OUT_OF_TIME: "was out of time",
@@ -70,10 +71,15 @@ class SolveReport:
         return self.converged and self.negative_modes == 0
 
     def after(self, *earlier: "SolveReport") -> "SolveReport":
-        """This report with the work of earlier solves added."""
+        """This report with the work of earlier solves added.
+
+        Parameters
+        ----------
+        earlier : reports of the solves that led to this one.
+        """
         return replace(
             self,
-            iterations=self.iterations + sum(one.iterations for one in earlier),
-            factorizations=self.factorizations + sum(one.factorizations for one in earlier),
-            seconds=self.seconds + sum(one.seconds for one in earlier),
+            iterations=self.iterations + sum(report.iterations for report in earlier),
+            factorizations=self.factorizations + sum(report.factorizations for report in earlier),
+            seconds=self.seconds + sum(report.seconds for report in earlier),
         )

@@ -5,7 +5,6 @@ shares of the rod's own, so that neither the unit nor the size of the rod decide
 change along the way, where natural strains are let go bit by bit, so that `follow` does not serve.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,19 +13,16 @@ from numpy.typing import ArrayLike
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.geometry.vectors import cross, unit
+from rodshell.model import Freedom
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
-from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
-from rodshell.solve.constraint import Supports
-from rodshell.solve.mixed_newton import NUDGE, Equilibrium, find_equilibrium
-from rodshell.solve.problem import Problem
+from rodshell.solve.equilibrium import NUDGE, Equilibrium, find_equilibrium
+from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import SolveReport, Status
-from rodshell.solve.rod_supports import RodSupports, SupportPath, index_of
-from rodshell.validation import finite, vector
-
-_NONE: Mapping[int, ArrayLike] = {}
+from rodshell.solve.rod_supports import RodLoads, RodSupports, SupportPath
+from rodshell.validation import finite
 
 EASY = 6  # a step of no more iterations may be followed by a longer one
 MOST, MOST_DOWN = 40, 320  # iterations of a step; on the way down from a saddle
@@ -94,18 +90,10 @@ class RodShape:
 
 def solve_rod(
     rod: ElasticRod,
+    supports: RodSupports | None = None,
+    loads: RodLoads | None = None,
     *,
     start: ArrayLike | RodShape | None = None,
-    positions: Mapping[int, ArrayLike | None] = _NONE,
-    along: Mapping[int, Sequence[tuple[float, float, float]]] | None = None,
-    tangents: Mapping[End, ArrayLike] | None = None,
-    directors: Mapping[End, ArrayLike] | None = None,
-    turns: Mapping[End, float] | None = None,
-    spinning: Sequence[End] = (),
-    angles: Mapping[int, float] | None = None,
-    forces: Mapping[int, ArrayLike] | ArrayLike = _NONE,
-    moments: Mapping[int | End, float] | None = None,
-    gravity: ArrayLike | None = None,
     steps: int = 1,
     stable: bool = True,
 ) -> RodShape:
@@ -113,28 +101,17 @@ def solve_rod(
 
     Parameters
     ----------
+    supports, loads : where the rod is held, and what it carries; None: as its clamps are, and nothing. A rod that
+        nothing keeps from spinning about itself is held at its first edge's angle.
     start : a state (N, 3), or a shape found before (then `rod` is shape.rod); by default the rest shape. What held
         it is let go bit by bit, unless it is given again: the loads and supports of a shape; of a state, natural
         strains go from what they are there to the rod's own, and forces that hold what is left fade.
-    positions : node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
-    along : node -> orthonormal directions along which alone it is free.
-    tangents : clamped end -> tangent (3,) along the rod there. Clamps that are not named stay as they are.
-    directors : clamped end -> first material director m1 (3,) there; its part across the tangent is used.
-    turns : clamped end -> how far it turns about its tangent [rad], on top of that; more than once around if so given.
-    spinning : clamped ends that hold position and direction but let the rod spin.
-    angles : edge -> twist angle that it is held at [rad].
-    forces : node -> dead force (3,) [N]; or (n, 3), one for each node.
-    moments : edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
-        the twist angle, counted from frames carried from the last step's shape.
-    gravity : acceleration (3,) [m/s2].
     steps : equal steps to begin with; they halve where the solver fails and grow back.
         Where ends travel far in a step, the solver can land on another branch than the one that a rod would
         follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
         twice as many end with the same energy.
     stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path goes on
         over saddles, and the report counts the negative modes at its end.
-
-    A rod that nothing keeps from spinning about itself is held at its first edge's angle.
 
     Raises
     ------
@@ -143,20 +120,17 @@ def solve_rod(
     """
     if not (isinstance(steps, int) and steps >= 1):
         raise InputError(f"a path takes 1, 2, ... steps, not {steps}")
-    came = start if isinstance(start, RodShape) else None
-    state = came.state if came else rod.state() if start is None else np.array(start, dtype=float)
-    if came and came.rod is not rod:
-        raise InputError("twist angles belong to their frames: go on from a shape with its own rod, shape.rod")
-    if state.shape != (rod.block_count, 3):
-        raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
-    finite("the state to start from", state, *state.shape)
-    wanted = RodSupports(positions, along or {}, tangents or {}, directors or {}, turns or {}, spinning, angles or {})
-    path = SupportPath.of(rod, state, wanted)
-    load = _load(rod, forces, moments or {}, gravity, spinning)
+    supports, loads = supports or RodSupports(), loads or RodLoads()
+    state = _start_state(rod, start)
+    path, load = SupportPath.of(rod, state, supports), loads.on(rod, supports.spinning)
     if path.holds_spin and load[rod.angles.start :, 0].any():
         raise InputError("nothing keeps this rod from spinning under its moments: hold an angle, or clamp an end")
-    axial = came.axial_forces if came else rod.stretch.stiffness * rod.stretch.strains(state)
-    held = () if came else tuple(_stress_free(element, state) for element in rod.elements)
+    held: tuple[Elements, ...] = ()
+    if isinstance(start, RodShape):
+        axial = start.axial_forces
+    else:
+        axial = rod.stretch.stiffness * rod.stretch.strains(state)
+        held = tuple(_stress_free(element, state) for element in rod.elements)
     before = _gradient(held or rod.elements, rod, state, axial)  # this load makes the start an equilibrium
     scale = _scale(rod)
     t, step = 0.0, 1.0 / steps
@@ -191,6 +165,18 @@ def solve_rod(
             report,
         )
     return _shape(rod, state, axial, load, path.free, report)
+
+
+def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
+    """(N, 3) the state to start from."""
+    if isinstance(start, RodShape):
+        if start.rod is not rod:
+            raise InputError("twist angles belong to their frames: go on from a shape with its own rod, shape.rod")
+        return start.state
+    state = rod.state() if start is None else np.array(start, dtype=float)
+    if state.shape != (rod.block_count, 3):
+        raise InputError(f"a state of this rod has the shape {(rod.block_count, 3)}, not {state.shape}")
+    return finite("the state to start from", state, *state.shape)
 
 
 def _shape(rod: ElasticRod, state: Floats, axial: Floats, load: Floats, free: Freedom, report: SolveReport) -> RodShape:
@@ -260,11 +246,11 @@ def _stress_free(element: Elements, state: Floats) -> Elements:
     return element.relaxed(state) if isinstance(element, BendTwist) else element
 
 
-def _released(held: tuple[Elements, ...], own: tuple[Elements, ...], t: float) -> tuple[Elements, ...]:
-    """The elements `own`, their natural strains only the share t of the way from those of `held`, if any."""
-    result = list(own)
+def _released(held: tuple[Elements, ...], elements: tuple[Elements, ...], t: float) -> tuple[Elements, ...]:
+    """The elements, their natural strains only the share t of the way from those of `held`, if any."""
+    result = list(elements)
     for k, first in enumerate(held):
-        last = own[k]
+        last = elements[k]
         if isinstance(first, BendTwist) and isinstance(last, BendTwist) and t < 1:
             result[k] = replace(
                 last,
@@ -281,30 +267,3 @@ def _gradient(elements: tuple[Elements, ...], rod: ElasticRod, state: Floats, ax
         element.evaluate(state, gradient)
     rod.stretch.add_axial(state, axial, gradient)
     return gradient
-
-
-def _load(
-    rod: ElasticRod,
-    forces: Mapping[int, ArrayLike] | ArrayLike,
-    moments: Mapping[int | End, float],
-    gravity: ArrayLike | None,
-    spinning: Sequence[End],
-) -> Floats:
-    """(N, 3) dead load [N, at angles N m]."""
-    load = np.zeros((rod.block_count, 3)) if gravity is None else rod.weight(gravity)
-    if isinstance(forces, Mapping):
-        for node, force in forces.items():
-            load[index_of(node, rod.node_count, "node")] += vector(f"the force on node {node}", force)
-    else:
-        load[rod.nodes] += finite("the forces on all nodes", forces, rod.node_count, 3)
-    if moments and not rod.twists:
-        raise InputError("this rod carries no twist angles: build it with twist=True")
-    for place, given in moments.items():
-        moment = finite(f"the moment at {place!r}", given)
-        if isinstance(place, str):
-            if place not in spinning:
-                raise InputError(f'the moment at "{place}" needs a clamp there that spins: spinning=("{place}",)')
-            load[rod.ghost_angles[rod.clamps.index(place)], 0] += moment
-        else:
-            load[rod.node_count + index_of(place, rod.edge_count, "edge"), 0] += moment
-    return load

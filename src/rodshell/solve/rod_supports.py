@@ -1,7 +1,7 @@
-"""Supports of one rod and their way from a start to a goal: held nodes and angles, clamps that turn."""
+"""Supports and loads of one rod, and the supports' way from a start to a goal: held nodes and angles, clamps."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,28 +10,40 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
 from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.model import Freedom
 from rodshell.model.elastic_rod import ElasticRod
-from rodshell.model.freedom import Freedom
 from rodshell.model.rod_line import End
-from rodshell.solve.constraint import Supports
+from rodshell.solve.problem import Supports
 from rodshell.validation import direction, finite, vector
 
 SPIN = (1.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class RodSupports:
-    """The supports as `solve_rod` was given them."""
+    """Where a rod is held. Clamps that are not named stay as they are.
 
-    positions: Mapping[int, ArrayLike | None]
-    along: Mapping[int, Sequence[tuple[float, float, float]]]
-    tangents: Mapping[End, ArrayLike]
-    directors: Mapping[End, ArrayLike]
-    turns: Mapping[End, float]
-    spinning: Sequence[End]
-    angles: Mapping[int, float]
+    Parameters
+    ----------
+    positions : node -> where it is held (3,) [m], or None: where it is. Nodes may count from the end (-1).
+    along : node -> orthonormal directions along which alone it is free.
+    tangents : clamped end -> tangent (3,) along the rod there.
+    directors : clamped end -> first material director m1 (3,) there; its part across the tangent is used.
+    turns : clamped end -> how far it turns about its tangent [rad], on top of that; more than once around if so given.
+    spinning : clamped ends that hold position and direction but let the rod spin.
+    angles : edge -> twist angle that it is held at [rad].
+    """
 
-    def check(self, rod: ElasticRod) -> None:
+    positions: Mapping[int, ArrayLike | None] = field(default_factory=dict)
+    along: Mapping[int, Sequence[tuple[float, float, float]]] = field(default_factory=dict)
+    tangents: Mapping[End, ArrayLike] = field(default_factory=dict)
+    directors: Mapping[End, ArrayLike] = field(default_factory=dict)
+    turns: Mapping[End, float] = field(default_factory=dict)
+    spinning: Sequence[End] = ()
+    angles: Mapping[int, float] = field(default_factory=dict)
+
+    def require(self, rod: ElasticRod) -> None:
+        """Raise InputError where this rod cannot be held so."""
         for end in (*self.tangents, *self.directors, *self.turns, *self.spinning):
             if end not in rod.clamps:
                 raise InputError(f'the rod is not clamped at "{end}": build it with clamped=("{end}",)')
@@ -40,6 +52,48 @@ class RodSupports:
                 raise InputError(f'the clamp at "{end}" cannot both spin and be turned')
         if (self.directors or self.turns or self.spinning or self.angles) and not rod.twists:
             raise InputError("this rod carries no twist angles: build it with twist=True")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RodLoads:
+    """Dead loads on a rod.
+
+    Parameters
+    ----------
+    forces : node -> force (3,) [N]; or (n, 3), one for each node.
+    moments : edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
+        the twist angle, counted from frames carried from the last step's shape.
+    gravity : acceleration (3,) [m/s2].
+    """
+
+    forces: Mapping[int, ArrayLike] | ArrayLike = field(default_factory=dict)
+    moments: Mapping[int | End, float] = field(default_factory=dict)
+    gravity: ArrayLike | None = None
+
+    def on(self, rod: ElasticRod, spinning: Sequence[End]) -> Floats:
+        """(N, 3) load on each block [N, at angles N m], the clamps `spinning` being free to spin.
+
+        Raises
+        ------
+        InputError : a load that this rod cannot carry.
+        """
+        load = np.zeros((rod.block_count, 3)) if self.gravity is None else rod.weight(self.gravity)
+        if isinstance(self.forces, Mapping):
+            for node, force in self.forces.items():
+                load[index_of(node, rod.node_count, "node")] += vector(f"the force on node {node}", force)
+        else:
+            load[rod.nodes] += finite("the forces on all nodes", self.forces, rod.node_count, 3)
+        if self.moments and not rod.twists:
+            raise InputError("this rod carries no twist angles: build it with twist=True")
+        for place, given in self.moments.items():
+            moment = finite(f"the moment at {place!r}", given)
+            if isinstance(place, str):
+                if place not in spinning:
+                    raise InputError(f'the moment at "{place}" needs a clamp there that spins: spinning=("{place}",)')
+                load[rod.ghost_angles[rod.clamps.index(place)], 0] += moment
+            else:
+                load[rod.node_count + index_of(place, rod.edge_count, "edge"), 0] += moment
+        return load
 
 
 @dataclass(frozen=True)
@@ -55,7 +109,8 @@ class SupportPath:
 
     @staticmethod
     def of(rod: ElasticRod, state: Floats, wanted: RodSupports) -> "SupportPath":
-        wanted.check(rod)
+        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted."""
+        wanted.require(rod)
         goals = dict[int, Floats]()
         for k, node in enumerate(rod.clamped_nodes):
             goals[int(node)] = state[node]
@@ -81,7 +136,8 @@ class SupportPath:
         return SupportPath(free, moved, state[moved], last, clamps, holds_spin)
 
     def at(self, t: float) -> Supports:
-        moved = np.concatenate([self.moved, np.array([c.ghost for c in self.clamps], dtype=np.intp)])
+        """The supports at t from 0 to 1."""
+        moved = np.concatenate([self.moved, np.array([clamp.ghost for clamp in self.clamps], dtype=np.intp)])
         goals = (1 - t) * self.first + t * self.last
         ghosts = [clamp.at(t) for clamp in self.clamps]
         return Supports(self.free, moved, np.vstack([goals, *ghosts]))
@@ -125,9 +181,9 @@ class _TurningClamp:
         return _TurningClamp(ghost, state[node], goals[node], outward * reach, now, side, angle)
 
     def at(self, t: float) -> Floats:
-        """(3,) place of the ghost."""
+        """(3,) position of the ghost at t from 0 to 1 [m]."""
         turned = np.cos(t * self.angle) * self.tangent + np.sin(t * self.angle) * self.side
-        return (1 - t) * self.start + t * self.goal + self.reach * turned
+        return np.asarray((1 - t) * self.start + t * self.goal + self.reach * turned)
 
 
 def _about(name: str, angle: float) -> Floats:
@@ -136,13 +192,14 @@ def _about(name: str, angle: float) -> Floats:
 
 
 def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) -> Sequence[tuple[float, float, float]]:
-    rows = np.array([vector(f"a free direction of node {node}", one) for one in directions]).reshape(-1, 3)
+    rows = np.array([vector(f"a free direction of node {node}", along) for along in directions]).reshape(-1, 3)
     if np.abs(rows @ rows.T - np.eye(len(rows))).max(initial=0.0) > 1e-9:
         raise InputError(f"the free directions of node {node} must be unit vectors at right angles to each other")
     return directions
 
 
 def index_of(given: int, count: int, what: str) -> int:
+    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`."""
     if not isinstance(given, int | np.integer):
         raise InputError(f"a {what} is a whole number, not {given!r}")
     if not -count <= given < count:

@@ -1,106 +1,276 @@
-"""The tangent stiffness at a state with given axial forces: its factors, its negative modes, its lowest modes."""
+"""The tangent stiffness of an equilibrium: its factors, its inertia, its lowest modes.
 
-from collections.abc import Sequence
+K is the second derivative of the elastic energy in the free directions. Axial forces are unknowns of their own in the
+Newton iteration (`equilibrium`), but the tangent is that of the whole elastic structure: edges contribute their
+axial stiffness EA and the geometric stiffness of the axial forces at hand; a surface that holds nodes contributes its
+curvature times its contact forces. Where edges are inextensible, their stiffness is a penalty, and so it is in K.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats
+from rodshell.errors import InputError
+from rodshell.model import Freedom
 from rodshell.rods.elements import Elements
-from rodshell.solve.problem import Problem, pattern_of
+from rodshell.solve.problem import Pattern, Problem
+from rodshell.solve.sparse_ldl import Factors, SingularError
 
-CLOSE = 1e-2  # last change of the lowest eigenvalue, over it: modes only say how far to go
-MOST_ITERATIONS = 12
+GUARDS = 4  # vectors of the subspace iteration beyond the modes that are asked for
+MOST_SWEEPS = 200
+FIRST_SHIFT = 1e-9  # of the mean diagonal: the first shift of a stiffness that is not positive definite
+SHIFT_GROWTH, MOST_SHIFTS = 8.0, 40
+BELOW = 1.5  # times the lowest eigenvalue: the shift that serves in the end
 
 
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes K x = s W x, ascending: values s (k,), and shapes x (k, N, 3) with x' W x = 1.
+
+    W is the lumped mass [kg], s then a squared angular frequency [1/s2]; or the identity, and s a stiffness [N/m].
+    """
+
+    values: Floats
+    shapes: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Tangent:
-    """Stiffness and gradient of a problem, with one pattern and one set of factors: the last state counts.
+    """The tangent stiffness K at a state, factorised. It never changes: nothing that another solve does reaches it.
 
-    The supports must not move (`Supports` without `moved`). Axial forces are unknowns of their own, as in
-    `mixed_newton`: the geometric stiffness is that of the forces given.
+    Parameters
+    ----------
+    state : (N, 3) [m, at twist angles rad].
+    forces : (e,) axial forces of the edges [N].
+    freedom : the free directions at the state.
+    values : (nnz,) upper triangle of K in the free directions, in the order of the pattern.
+    pattern : what belongs to the pattern alone, shared with other solves.
+    factors : the factors of K, its own.
+    """
+
+    state: Floats
+    forces: Floats
+    freedom: Freedom
+    values: Floats
+    pattern: Pattern
+    factors: Factors
+
+    @property
+    def negative_modes(self) -> int:
+        """Number of negative eigenvalues of K; 0 says stable."""
+        return self.factors.negative
+
+    def solve(self, loads: Floats) -> Floats:
+        """Displacements K^-1 f in the free directions; zero across them.
+
+        Parameters
+        ----------
+        loads : (N, 3) forces [N, at twist angles N m], or (k, N, 3) of k cases.
+
+        Returns
+        -------
+        Displacements of the same shape [m, rad].
+        """
+        return self._each("loads", loads, self.factors.solve)
+
+    def product(self, motions: Floats) -> Floats:
+        """Forces K x in the free directions; zero across them.
+
+        Parameters
+        ----------
+        motions : (N, 3) displacements [m, rad], or (k, N, 3) of k cases; their part in the free directions counts.
+        """
+        upper = self.pattern.upper(self.values)
+        diagonal = upper.diagonal()
+        return self._each("displacements", motions, lambda x: upper @ x + upper.T @ x - diagonal * x)
+
+    def lowest_modes(
+        self,
+        count: int,
+        *,
+        mass: Floats | None = None,
+        tolerance: float = 1e-12,
+        most_sweeps: int = MOST_SWEEPS,
+        guards: int = GUARDS,
+    ) -> Modes:
+        """The `count` lowest modes, or as many as there are; negative ones first where the state is not stable.
+
+        By subspace iteration with the inverse [Bathe 2014, section 11.6], shifted where K is not positive definite.
+
+        Parameters
+        ----------
+        mass : (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0; None: the
+            modes of K itself.
+        tolerance : relative change of the eigenvalues in the last sweep.
+        most_sweeps : the iteration ends after so many in any case: a few give directions that are good enough to
+            search in.
+        guards : further vectors that are iterated: the more, the faster the modes asked for converge.
+
+        Raises
+        ------
+        InputError : the mass has another shape, is negative, or is zero everywhere.
+        SingularError : the state is not stable along a motion without mass.
+        """
+        size = self.freedom.size
+        weight = np.ones(size) if mass is None else self.freedom.reduce_diagonal(self._checked_mass(mass))
+        root = np.sqrt(weight)
+        count = min(count, int(np.count_nonzero(root)))
+        factors, shift = self._positive_definite(weight)
+
+        def inverse(vector: Floats) -> Floats:
+            return root * factors.solve(root * vector)
+
+        start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root))))).T
+        values, rows = subspace_iteration(inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps)
+        shapes = np.array([factors.solve(root * row) for row in rows[:count]]).reshape(count, size)
+        shapes /= np.sqrt(np.einsum("ki,i,ki->k", shapes, weight, shapes))[:, None]
+        expanded = np.array([self.freedom.expand(shape) for shape in shapes]).reshape(count, *self.state.shape)
+        return Modes(1.0 / values[:count] - shift, expanded)
+
+    def _each(self, what: str, fields: Floats, apply: Callable[[Floats], Floats]) -> Floats:
+        """A function of reduced vectors applied to one field (N, 3) or to many (k, N, 3)."""
+        shape, free = self.state.shape, self.freedom
+        if fields.shape[-2:] != shape or fields.ndim not in (2, 3):
+            raise InputError(f"the {what} have the shape {fields.shape}: give {shape}, or (k, {shape[0]}, {shape[1]})")
+        results = [free.expand(apply(free.reduce(field))) for field in fields.reshape(-1, *shape)]
+        return np.array(results).reshape(fields.shape)
+
+    def _checked_mass(self, mass: Floats) -> Floats:
+        if mass.shape != self.state.shape:
+            raise InputError(f"the mass has the shape {mass.shape}: give {self.state.shape}")
+        if not (mass >= 0).all() or not mass.any():
+            raise InputError("the mass must not be negative, nor zero everywhere; leave it out for the modes of K")
+        return mass
+
+    def _positive_definite(self, weight: Floats) -> tuple[Factors, float]:
+        """Factors of K + shift W without negative eigenvalues, and the shift; K's own where it has none."""
+        if not self.negative_modes:
+            return self.factors, 0.0
+        diagonal = np.abs(self.values[self.pattern.assembly.diagonal])
+        shift = FIRST_SHIFT * float(diagonal.mean() / weight.mean())
+        for _ in range(MOST_SHIFTS):
+            factors = self._shifted(shift, weight)
+            if not factors.negative:
+                break
+            shift *= SHIFT_GROWTH
+        else:
+            raise SingularError("the state is not stable along a motion without mass: give mass to all that moves")
+        root = np.sqrt(weight)
+        start = np.random.default_rng(0).standard_normal((1, len(weight)))
+        value, _ = subspace_iteration(
+            lambda x: root * factors.solve(root * x), start, settled=1, tolerance=1e-2, most_sweeps=MOST_SWEEPS
+        )
+        near = BELOW * (shift - 1.0 / float(value[0]))
+        if near < shift and not (closer := self._shifted(near, weight)).negative:
+            return closer, near
+        return factors, shift
+
+    def _shifted(self, shift: float, weight: Floats) -> Factors:
+        values = self.values.copy()
+        values[self.pattern.assembly.diagonal] += shift * weight
+        return self.pattern.solver.factor(values)
+
+
+class TangentAssembly:
+    """Assembles the tangent stiffness of a problem at one state after another.
+
+    Its buffers serve for all states; what it returns is not touched again. The supports must not be on their way
+    (`Supports` with nodes still to move): prescribed motions are no part of K.
+
+    Parameters
+    ----------
+    problem : the structure; its elements may be given anew at each state, on the same blocks.
+    state : (N, 3) any state, for the pattern.
     """
 
     def __init__(self, problem: Problem, state: Floats) -> None:
-        self._stretch = problem.stretch
-        self.free = problem.constraint.freedom(state)
-        everywhere = np.arange(len(state))[:, None]  # as in `NewtonStep`, whose pattern serves here
-        self._blocks = (*(element.blocks for element in problem.elements), problem.stretch.blocks, everywhere)
-        self.pattern = pattern_of(problem, self._blocks, self.free)
+        self._problem = problem
+        self._blocks = problem.blocks(len(state))
+        self.pattern = problem.pattern_at(state)
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
-        self._scale = np.empty(0)
-        self.factorizations = 0
 
     def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Floats:
-        """(n, 3) gradient of the elements and of edges that carry the axial forces (e,) [N]; without loads."""
+        """(N, 3) gradient [N] of the elements and of edges that carry the axial forces (e,) [N]; without loads."""
         gradient = np.zeros_like(state)
         for element in elements:
             element.evaluate(state, gradient)
-        self._stretch.add_axial(state, forces, gradient)
+        self._problem.stretch.add_axial(state, forces, gradient)
         return gradient
 
-    def factor(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> int:
-        """Factorise the stiffness at a state (n, 3) with axial forces (e,) [N]; the number of its negative modes.
+    def values(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> tuple[Freedom, Floats]:
+        """The free directions, and the values (nnz,) of K in the order of the pattern.
+
+        Parameters
+        ----------
+        elements : with their source frames at, or near, the state.
+        state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
+        """
+        problem, unused = self._problem, np.zeros_like(state)
+        gradient = np.zeros_like(state) if problem.load is None else -problem.load
+        for element, hessians in zip(elements, self._hessians, strict=False):
+            element.evaluate(state, gradient, hessians)
+        problem.stretch.add_axial(state, forces, gradient)
+        problem.stretch.with_forces(forces).evaluate(state, unused, self._hessians[-2])
+        curvature = problem.constraint.curvature(state, gradient)
+        self._hessians[-1][:] = curvature if len(curvature) else 0.0
+        free = problem.constraint.freedom(state)
+        return free, self.pattern.assembly.assemble(self._hessians, self._blocks, free)
+
+    def tangent(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Tangent:
+        """The tangent at a state; parameters as for `values`.
 
         Raises
         ------
         SingularError : a pivot vanishes.
         """
-        self._data = self._values(elements, state, forces)
-        if not len(self._scale):  # modes are measured by the first stiffness's diagonal: metres and radians alike
-            self._scale = 1.0 / np.sqrt(np.abs(self._data[self.pattern.assembly.diagonal]))
-        self.factorizations += 1
-        return self.pattern.solver.factor(self._data)
-
-    def solve(self, load: Floats) -> Floats:
-        """(n, 3) displacements under forces (n, 3), by the last factors."""
-        return self.free.expand(self.pattern.solver.solve(self.free.reduce(load)))
-
-    def lowest(self, count: int, start: Floats | None = None) -> tuple[Floats, Floats]:
-        """The `count` lowest modes of the last stiffness, which is stable: values (k,) ascending and modes (k, dofs).
-
-        By orthogonal iteration with the inverse [Golub and Van Loan 2013, section 8.2.4]; a mode's square sum over the
-        scale is 1. The values are a little too large, never too small.
-        start : (k, dofs) modes of a state nearby, or None.
-        """
-        size, scale = self.free.size, self._scale
-        if start is None:  # no symmetry of the shell is one of this start
-            start = np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(count, size))[:, None]) * scale
-        scaled, largest = _orthonormal(start / scale), 0.0
-        for _ in range(MOST_ITERATIONS):
-            images = np.array([self.pattern.solver.solve(row / scale) for row in scaled]) / scale
-            inverse, turn = np.linalg.eigh(_products(scaled, images))
-            scaled = _orthonormal(np.einsum("ji,jk->ik", turn[:, ::-1], images))
-            if abs(largest - inverse[-1]) <= CLOSE * inverse[-1]:
-                break
-            largest = inverse[-1]
-        return 1.0 / inverse[::-1], scaled * scale
-
-    def change(self, elements: Sequence[Elements], state: Floats, forces: Floats, modes: Floats, step: float) -> Floats:
-        """(k, k) change of the last stiffness to that at the state given, over `step`, between modes (k, dofs)."""
-        data = (self._values(elements, state, forces) - self._data) / step
-        size, assembly = self.free.size, self.pattern.assembly
-        upper = csc_matrix((data, assembly.indices, assembly.indptr), shape=(size, size))
-        half = _products(modes, np.array([upper @ mode for mode in modes]))
-        return half + half.T - _products(modes, upper.diagonal() * modes)
-
-    def _values(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Floats:
-        unused = np.zeros_like(state)
-        for element, hessians in zip(elements, self._hessians, strict=False):
-            element.evaluate(state, unused, hessians)
-        self._stretch.with_forces(forces).evaluate(state, unused, self._hessians[-2])
-        return self.pattern.assembly.assemble(self._hessians, self._blocks, self.free)
+        free, values = self.values(elements, state, forces)
+        state, forces = state.copy(), forces.copy()
+        for array in (state, forces, values):
+            array.flags.writeable = False
+        return Tangent(state, forces, free, values, self.pattern, self.pattern.solver.factor(values))
 
 
-def _orthonormal(rows: Floats) -> Floats:
-    """By Gram and Schmidt, twice, the first row first."""
+def subspace_iteration(
+    apply: Callable[[Floats], Floats], start: Floats, *, settled: int, tolerance: float, most_sweeps: int
+) -> tuple[Floats, Floats]:
+    """The largest eigenvalues of a symmetric positive operator, and their directions, by subspace iteration with
+    Rayleigh and Ritz's values, which are a little too small, never too large [Golub and Van Loan 2013, 8.2.4].
+
+    Parameters
+    ----------
+    apply : the operator, on vectors (n,).
+    start : (m, n) vectors to begin with.
+    settled : so many of the largest eigenvalues must have settled.
+    tolerance : relative change of these in the last sweep.
+    most_sweeps : it ends after so many in any case.
+
+    Returns
+    -------
+    Values (m,) descending, and directions (m, n), orthogonal but not of unit length.
+    """
+    rows, before = start, np.full(len(start), np.inf)
+    values = before
+    for _ in range(most_sweeps):
+        rows = orthonormal(rows)
+        images = np.array([apply(row) for row in rows])
+        values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
+        values, rows = values[::-1], np.einsum("ji,jk->ik", turn[:, ::-1], images)
+        if (np.abs(before - values)[:settled] <= tolerance * values[:settled]).all():
+            break
+        before = values
+    return values, rows
+
+
+def orthonormal(rows: Floats) -> Floats:
+    """The rows (m, n), orthogonal to each other and of unit length, by Gram and Schmidt, twice, the first row first.
+
+    Vectors are few and long here: threads of a BLAS would cost more than they save.
+    """
     result = rows.copy()
     for k, row in enumerate(result):
         for _ in range(2):
             row -= np.einsum("i,ik->k", np.einsum("ik,k->i", result[:k], row), result[:k])
             row /= np.sqrt(np.einsum("k,k->", row, row))
     return result
-
-
-def _products(a: Floats, b: Floats) -> Floats:
-    """(k, k) inner products of rows; threads of a BLAS would cost more than they save."""
-    return np.asarray(np.einsum("ik,jk->ij", a, b))

@@ -1,4 +1,4 @@
-"""Regions of the plan: where a height field is defined, and the wall that stands under a target's rim."""
+"""Regions of the plan: where a height field is defined, and what a target's rim encloses."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -7,11 +7,11 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.validation import positive
+from rodshell.validation import numbers, positive
 
 
 class Domain(Protocol):
-    """A region of the plan, centred on the origin."""
+    """A region of the plan."""
 
     @property
     def half_extent(self) -> tuple[float, float]:
@@ -19,22 +19,49 @@ class Domain(Protocol):
         ...
 
     def holds(self, xy: Floats) -> Bools:
-        """(n,) whether the points (n, 2) [m] are inside or on the edge."""
+        """Whether points of the plan are inside or on the edge.
+
+        Parameters
+        ----------
+        xy : (n, 2) points [m].
+
+        Returns
+        -------
+        (n,) booleans.
+        """
         ...
 
     def distance(self, xy: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signed distance (n,) of the points (n, 2) [m], negative inside; its gradient and Hessian."""
+        """Signed distance to the edge, negative inside.
+
+        Parameters
+        ----------
+        xy : (n, 2) points [m].
+
+        Returns
+        -------
+        Distance (n,) [m], its gradient (n, 2) [-] and its Hessian (n, 2, 2) [1/m].
+        """
         ...
 
 
 @dataclass(frozen=True)
 class Disc:
-    """All points within `radius` [m] of the origin."""
+    """A disc around the origin of the plan.
+
+    Parameters
+    ----------
+    radius : [m].
+
+    Raises
+    ------
+    InputError : the radius is not a positive number.
+    """
 
     radius: float
 
     def __post_init__(self) -> None:
-        positive("domain radius", self.radius, "m")
+        object.__setattr__(self, "radius", positive("domain radius", self.radius, "m"))
 
     @property
     def half_extent(self) -> tuple[float, float]:
@@ -52,10 +79,23 @@ class Disc:
 
 @dataclass(frozen=True)
 class EllipseDomain:
-    """All points with (x/a)^2 + (y/b)^2 <= 1; half-axes `a`, `b` [m]."""
+    """The points with (x/a)^2 + (y/b)^2 <= 1.
+
+    Parameters
+    ----------
+    a, b : half-axes along x and y [m].
+
+    Raises
+    ------
+    InputError : a half-axis is not a positive number.
+    """
 
     a: float
     b: float
+
+    def __post_init__(self) -> None:
+        for axis in ("a", "b"):
+            object.__setattr__(self, axis, positive(f"domain {axis}", getattr(self, axis), "m"))
 
     @property
     def half_extent(self) -> tuple[float, float]:
@@ -68,7 +108,7 @@ class EllipseDomain:
         axes = np.array([self.a, self.b])
         # closest point: x_k = a_k^2 p_k / (a_k^2 + t) with sum (a_k p_k / (a_k^2 + t))^2 = 1;
         # in s = t + min(a)^2 the root is bracketed and the function convex, so Newton from the left end
-        # converges monotonically; off the axes by a hair: on the long one a closest point has a mirror image
+        # converges monotonically; a little off the axes: on the long one a closest point has a mirror image
         p = np.maximum(np.abs(xy), 1e-12 * axes)
         low = np.min(axes) ** 2
         shift = axes**2 - low
@@ -86,13 +126,22 @@ class EllipseDomain:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """All points with |x| <= width/2 and |y| <= depth/2; `size` = (width, depth) [m]."""
+    """A rectangle centred on the origin of the plan: |x| <= width/2 and |y| <= depth/2.
+
+    Parameters
+    ----------
+    size : width along x and depth along y [m].
+
+    Raises
+    ------
+    InputError : the size is not a pair of positive numbers.
+    """
 
     size: tuple[float, float]
 
     def __post_init__(self) -> None:
-        for side in self.size:
-            positive("domain size", side, "m")
+        size = numbers("domain size", self.size, "two lengths in m: width along x, depth along y", 2)
+        object.__setattr__(self, "size", tuple(positive("domain size", side, "m") for side in size))
 
     @property
     def half_extent(self) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Height formulas as people write them: "0.1 - 2*x^2 - y^2" becomes a function, without running any code."""
+"""Height formulas as people write them: "0.1 - 2*x^2 - y^2" is parsed into a function, without running any code."""
 
 import ast
 import operator
@@ -39,9 +39,9 @@ OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 ALLOWED = "x, y, numbers, pi, e, + - * / ^, parentheses and " + ", ".join(FUNCTIONS)
 
-FOREIGN = {"−": "-", "·": "*", "×": "*", "÷": "/", "²": "^2", "³": "^3", "=": "only what follows it"}
+FOREIGN = {"−": "-", "·": "*", "×": "*", "÷": "/", "²": "^2", "³": "^3", "=": "only the part after it"}
 LONGEST = 4000  # characters; Python's parser is safe with texts of this length
-DEEPEST = 100  # parentheses in each other
+DEEPEST = 100  # nested parentheses
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/^() ]|//|__")
 
 Slot = int
@@ -54,10 +54,10 @@ class Formula:
 
     Parameters
     ----------
-    text : as it was written.
+    text : the formula as it was written.
     constants : numbers in slots 2, 3, ...; slots 0 and 1 are x and y.
-    steps : a straight-line program; each is a function of one or two earlier slots, and its result takes the
-        next. Every distinct part of the formula comes once.
+    steps : a straight-line program: functions of one or two earlier slots, whose results go into the next slots. Equal
+        parts of the formula are evaluated once.
     """
 
     text: str
@@ -75,11 +75,15 @@ class Formula:
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a formula in x and y: numbers, + - * / ^ (or **), parentheses, pi, e and `FUNCTIONS`.
+    """Read a formula in x and y without running any code.
+
+    Parameters
+    ----------
+    text : numbers, x, y, pi, e, + - * / ^ (or **), parentheses and `FUNCTIONS`.
 
     Raises
     ------
-    InputError : anything else; one sentence that names the piece and lists what is allowed.
+    InputError : anything else; one sentence that names the wrong part and lists what is allowed.
     """
     if not isinstance(text, str):
         raise InputError(f"a formula must be text such as {shown('0.1 - 2*x^2 - y^2')}, not {shown(text)}")
@@ -91,12 +95,12 @@ def parse_formula(text: str) -> Formula:
     if foreign := _FOREIGN.search(source):
         raise _refusal(text, foreign[0], FOREIGN.get(foreign[0]))
     if _nesting(source) > DEEPEST:
-        raise InputError(f"formula {shown(text)}: more than {DEEPEST} parentheses in each other: write a simpler one")
+        raise InputError(f"formula {shown(text)}: more than {DEEPEST} nested parentheses: write a simpler one")
     return _Compiler(text, source).formula()
 
 
 class _Result(NamedTuple):
-    """An operand: what a step gives. The others are floats and the names "x" and "y"."""
+    """An operand that is the result of a step. Other operands are floats and the names "x" and "y"."""
 
     step: int
 
@@ -119,9 +123,9 @@ class _Compiler:
             self._step(operator.pos, result)
         constants = dict.fromkeys(a for step in self.steps for a in step[1:] if isinstance(a, float))
         operands: list[_Operand] = ["x", "y", *constants, *self.steps.values()]
-        place: dict[_Operand | None, Slot | None] = {None: None}
-        place |= {operand: slot for slot, operand in enumerate(operands)}
-        steps = tuple((function, place[a] or 0, place[b]) for function, a, b in self.steps)
+        slot_of: dict[_Operand | None, Slot | None] = {None: None}
+        slot_of |= {operand: slot for slot, operand in enumerate(operands)}
+        steps = tuple((function, slot_of[a] or 0, slot_of[b]) for function, a, b in self.steps)
         return Formula(self.text, tuple(constants), steps)
 
     def _parse(self) -> ast.expr:
@@ -192,7 +196,7 @@ class _Compiler:
         with np.errstate(all="ignore"):
             value = float(function(*numbers))
         if not isfinite(value):
-            raise self._wrong(node, "is no finite number: write a value that is")
+            raise self._wrong(node, "is not a finite number: change it")
         return value
 
     def _step(self, function: Callable[..., Any], a: _Operand, b: _Operand | None = None) -> _Result:
@@ -214,7 +218,7 @@ def _refusal(text: str, piece: str, meant: str | None = None) -> InputError:
 
 
 def _meant(node: ast.expr) -> str | None:
-    """The known name that looks most like an unknown one."""
+    """The known name that is most similar to an unknown one."""
     match node:
         case ast.Call(ast.Attribute(_, name) | ast.Name(name)) | ast.Attribute(_, name) | ast.Name(name):
             spelt = {"ln": "log"}.get(name, name.lower().replace("arc", "a"))
@@ -225,7 +229,7 @@ def _meant(node: ast.expr) -> str | None:
 def _number(literal: int | float) -> float:
     try:
         return float(literal)
-    except OverflowError:  # an integer past the largest float
+    except OverflowError:  # an integer larger than any float
         return inf
 
 

@@ -4,48 +4,45 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, dot, unit
-from rodshell.targets.filling import fill_openings
-from rodshell.targets.fitting import fit_field, patch_spacing
-from rodshell.targets.jagged import smooth_loop
-from rodshell.targets.meshsamples import mesh_samples
-from rodshell.targets.patches import PatchField
-from rodshell.targets.rim import Rim
+from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_field, mesh_samples
+from rodshell.targets.rim import Rim, smooth_loop
+from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Gap, Implicit, Target
 from rodshell.targets.trianglemesh import TriangleMesh, sound_mesh
+from rodshell.targets.wall_below_rim import WalledSurface, walled_surface
 from rodshell.units import length_text
-
-if TYPE_CHECKING:
-    from rodshell.targets.footing import Footing
+from rodshell.validation import array, number
 
 PAST = 0.6  # of the size: how far the surface is continued past an open rim
-LOST = 0.005  # of the size: a vertex this far off its smooth field is not followed by it
-ASKEW = 0.7  # cosine: nor is one whose normal differs this much from the field's
+OFF = 0.005  # of the size: where a vertex is this far off its smooth field, the field does not follow the mesh
+ASKEW = 0.7  # cosine: nor where the normals of vertex and field differ this much
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
-TIE = 1e-3  # of the size: points as high as the highest
+TIE = 1e-3  # of the size: points this close to the highest count as equally high
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Freeform(Target):
-    """A surface in triangles, open or closed, through which a smooth field is laid.
+    """A surface in triangles, open or closed, through which a smooth field is laid; make one with `Freeform.of`.
+
+    Two such targets are equal only if they are the same object.
 
     Parameters
     ----------
-    surface : one smooth piece, facing up; see `Freeform.of`.
-    base : z of a plane under which there is no shell [m], or None.
+    surface : one smooth piece, facing up.
+    base : z of a plane below which there is no shell [m], or None.
     curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
-    source : kind, file and options, as they stand in a case file.
-    repairs : what was done to the mesh, in sentences.
+    source : kind, file and options, as they are written in a case file.
+    repairs : what was changed in the mesh, in sentences.
     """
 
     surface: TriangleMesh
-    base_height: float | None = None
+    base: float | None = None
     curves: tuple[Floats, ...] = ()
     source: Mapping[str, object] = field(default_factory=dict)
     repairs: tuple[str, ...] = ()
@@ -61,18 +58,31 @@ class Freeform(Target):
         name: str = "the mesh",
         notes: tuple[str, ...] = (),
     ) -> "Freeform":
-        """From vertices (n, 3) [m] and triangles (m, 3), checked; it ends at its open boundary, curves and base.
+        """Make a target of a mesh; the shell ends at the mesh's open boundary, at curves and at a base plane.
 
-        notes : what was done to them before, in sentences.
+        Parameters
+        ----------
+        vertices : (n, 3) [m].
+        faces : (m, 3) indices of the vertices of each triangle.
+        base : z of a plane below which there is no shell [m], or None.
+        curves : closed polylines (n, 3) near the surface [m]: the first bounds the shell, further ones are openings.
+        source : kind, file and options, as they are written in a case file.
+        name : of the mesh, for messages.
+        notes : what was changed in the mesh before, in sentences.
 
         Raises
         ------
-        InputError : the mesh is no smooth surface, or it is closed and nothing says where the shell ends.
+        InputError : an argument is of the wrong kind; the mesh is not a smooth surface; or it is closed, and neither a
+            base nor a curve says where the shell ends.
         """
-        surface, repairs = sound_mesh(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.intp), name)
+        vertices = array("vertices", vertices, np.float64, None, 3)
+        faces = array("faces", faces, np.intp, None, 3)
+        base = None if base is None else number("target base", base, "m")
+        curves = tuple(array("a boundary curve", curve, np.float64, None, 3) for curve in curves)
+        surface, repairs = sound_mesh(vertices, faces, name)
         made = {"kind": "mesh", "vertices": len(vertices), "faces": len(faces)}
         target = Freeform(
-            surface=surface, base_height=base, curves=curves, source=dict(source or made),
+            surface=surface, base=base, curves=curves, source=dict(source or made),
             repairs=(*notes, *repairs),
         )  # fmt: skip
         target._require_an_end(name)
@@ -81,24 +91,24 @@ class Freeform(Target):
 
     @property
     def name(self) -> str:
-        """Of its file, without the folder, if it has one."""
+        """Name of its file without the folder, or its kind."""
         return Path(str(self.source.get("file", self.source.get("kind", "mesh")))).name
-
-    @property
-    def base(self) -> float | None:
-        return self.base_height
 
     @property
     def warnings(self) -> tuple[str, ...]:
         ends, moved = self._open_ends
         if not moved:
             return self.repairs
-        of = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else "the edge of the mesh is"
+        edges = f"{len(moved)} of the {len(ends)} edges of the mesh are" if len(ends) > 1 else "the edge of the mesh is"
         return (
             *self.repairs,
-            f"{of} jagged where faces were left out: the shell ends at a smooth curve, up to "
-            f"{length_text(max(moved))} from the vertices there; for another end give target.boundary",
+            f"{edges} jagged where faces are missing: the shell ends at a smooth curve, up to "
+            f"{length_text(max(moved))} from the vertices there; to end it elsewhere give target.boundary",
         )
+
+    def __repr__(self) -> str:
+        widths = " x ".join(f"{width:.3g}" for width in np.ptp(self.surface.vertices, axis=0))
+        return f"Freeform({self.name}: {len(self.surface.faces)} triangles, {widths} m)"
 
     def parameters(self) -> dict[str, object]:
         return dict(self.source)
@@ -115,14 +125,14 @@ class Freeform(Target):
         return 0.5 * float(np.ptp(self.surface.vertices, axis=0).max())
 
     @cached_property
-    def _fitted(self) -> tuple[PatchField, int]:
-        spacing = patch_spacing(float(self.surface.areas.sum()), len(self.surface.vertices))
+    def _fitted(self) -> tuple[SmoothField, int]:
+        spacing = cubic_spacing(float(self.surface.areas.sum()), len(self.surface.vertices))
         samples = fill_openings(self.surface, mesh_samples(self.surface, spacing), spacing)
         return fit_field(samples, spacing, past=PAST * self._extent, reach=self._extent)
 
     @property
-    def field(self) -> PatchField:
-        """The smooth field that stands for the surface."""
+    def field(self) -> SmoothField:
+        """The smooth implicit function that replaces the mesh."""
         return self._fitted[0]
 
     def implicit(self, x: Floats) -> Implicit:
@@ -132,13 +142,13 @@ class Freeform(Target):
         value, gradient, _ = self.field.implicit(x, second=False)
         return value, gradient
 
-    def carries(self, x: Floats) -> Bools:
-        """Inside the end, or where an opening was filled."""
+    def covers(self, x: Floats) -> Bools:
+        """Whether points `x` (n, 3) of the surface are inside the end, or where an opening was filled."""
         return (self.margin(x) > 0) | (self.field.nearest(x)[1] < self._fitted[1])
 
     @cached_property
     def rims(self) -> tuple[Rim, ...]:
-        """The open boundary, and the curves, as far as there are any."""
+        """The open boundary and the boundary curves, as far as there are any."""
         rims = []
         if self.surface.loops:
             rims.append(self._rim(self._open_ends[0]))
@@ -148,7 +158,7 @@ class Freeform(Target):
 
     @cached_property
     def _open_ends(self) -> tuple[list[Floats], list[float]]:
-        """The loops (n, 3) of the open boundary; and, of those that were jagged, how far they were smoothed [m]."""
+        """The loops (n, 3) of the open boundary; and how far those that were jagged were moved [m]."""
         ends, moved = list[Floats](), list[float]()
         for loop in self.surface.loops:
             x = self.surface.vertices[loop]
@@ -162,21 +172,21 @@ class Freeform(Target):
         return Rim.of(loops, self._settle, lambda x: unit(self.level(x)[1]))
 
     def _settle(self, x: Floats) -> Floats:
-        """As `retract`, for points that lie on the surface but for its rounding (the size needs the rims first)."""
+        """As `retract`, for points very close to the surface; it does not need the size, which depends on the rims."""
         for _ in range(3):
             value, gradient = self.level(x)
             x = x - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
         return x
 
     def margin(self, x: Floats) -> Floats:
-        """(n,) how far inside the nearest of base plane, open boundary and curves the points (n, 3) are [m]."""
+        """Distance (n,) [m] of the points `x` (n, 3) to the nearest of base plane, open boundary and curves."""
         margins = [rim.distance(x) for rim in self.rims]
-        if self.base_height is not None:
-            margins.append(x[:, 2] - self.base_height)
-        return np.min(margins, axis=0)
+        if self.base is not None:
+            margins.append(x[:, 2] - self.base)
+        return np.asarray(np.min(margins, axis=0))
 
     def section(self, z: float) -> Rim:
-        """The loops in which the plane at height `z` [m] cuts the smooth surface, counter-clockwise seen from above."""
+        """The loops in which the plane at height `z` [m] cuts the surface, counter-clockwise seen from above."""
 
         def onto(x: Floats) -> Floats:
             for _ in range(4):
@@ -190,19 +200,17 @@ class Freeform(Target):
         )
 
     @cached_property
-    def _footing(self) -> "Footing":
-        from rodshell.targets.footing import footing
-
-        return footing(self)
+    def _body(self) -> WalledSurface:
+        return walled_surface(self, self.surface, self.field, self.rims, self.section)
 
     def outside(self, x: Floats) -> Bools:
-        return self._footing.outside(x)
+        return self._body.outside(x)
 
     def contact(self, x: Floats) -> Gap:
-        return self._footing.contact(x)
+        return self._body.contact(x)
 
-    def height(self, xy: Floats) -> Floats:
-        """z (n,) of the uppermost surface over the plan points (n, 2) [m]; NaN where there is none."""
+    def height_at(self, xy: Floats) -> Floats:
+        """z (n,) [m] of the uppermost surface over the points `xy` (n, 2) of the plan [m]; NaN where there is none."""
         return np.array([self._height(*point) for point in np.asarray(xy, dtype=float).tolist()])
 
     def _height(self, x: float, y: float) -> float:
@@ -213,7 +221,7 @@ class Freeform(Target):
         if hit.any():
             z = float(((wedge * np.stack([a[:, 2], b[:, 2], c[:, 2]]))[:, hit].sum(axis=0) / total[hit]).max())
         else:
-            z = self._height_of_patch(x, y)
+            z = self._height_of_filling(x, y)
         point = np.array([[x, y, z]])
         for _ in range(20):  # from the facet to the smooth surface, straight up or down
             value, gradient, _ = self.implicit(point)
@@ -225,15 +233,15 @@ class Freeform(Target):
                 break
         return float(point[0, 2])
 
-    def _height_of_patch(self, x: float, y: float) -> float:
-        """z of the uppermost patch that fills an opening over a point of the plan, or NaN."""
+    def _height_of_filling(self, x: float, y: float) -> float:
+        """z of the uppermost cubic that fills an opening over a point of the plan, or NaN."""
         centres = self.field.centres[: self._fitted[1]]
         near = np.hypot(centres[:, 0] - x, centres[:, 1] - y) < self.field.spacing
         return float(centres[near, 2].max()) if near.any() else np.nan
 
     @cached_property
     def summit(self) -> tuple[float, float]:
-        """x, y of the highest point inside the end [m]; of the surface's middle where that lies on its edge.
+        """x, y of the highest point inside the end [m]; of the surface's middle where it is on the edge.
 
         Of equally high points, as on a barrel vault, the one nearest to the middle.
         """
@@ -267,21 +275,21 @@ class Freeform(Target):
         return x, y
 
     def _over(self, curve: Floats) -> Floats:
-        """A curve that was drawn in a level plane, such as a plan, projected vertically; any other as it is."""
+        """A curve drawn in a horizontal plane, such as a plan, projected onto the surface; any other as it is."""
         if np.ptp(curve[:, 2]) > 1e-6 * self._extent or self._off(curve) < ASIDE * self._extent:
             return curve
-        z = self.height(curve[:, :2])
+        z = self.height_at(curve[:, :2])
         if not np.isfinite(z).all():
             x, y, _ = curve[int(np.argmin(np.isfinite(z)))]
-            raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it within")
+            raise InputError(f"the boundary curve leaves the surface in plan near ({x:.4g}, {y:.4g}) m: draw it inside")
         return np.column_stack([curve[:, :2], z])
 
     def _off(self, curve: Floats) -> float:
-        """How far a curve lies off the surface's vertices and faces, at most [m]."""
+        """Largest distance of a curve from the surface [m]."""
         return float(np.nan_to_num(np.abs(self.implicit(curve).value), nan=np.inf).max())
 
     def _require_an_end(self, name: str) -> None:
-        if self.base_height is None and not self.surface.loops and not self.curves:
+        if self.base is None and not self.surface.loops and not self.curves:
             x = self.surface.vertices
             raise InputError(
                 f"{name} is closed: say where the shell ends, by a base plane between z = {x[:, 2].min():.4g} and "
@@ -290,28 +298,28 @@ class Freeform(Target):
         for curve in self.curves:
             off = self._off(self._over(curve))
             if not off < ASIDE * self._extent:
-                raise InputError(f"the boundary curve lies up to {off:.3g} m off {name}: draw it on the surface")
+                raise InputError(f"the boundary curve is up to {off:.3g} m away from {name}: draw it on the surface")
         if not (self.margin(self.surface.vertices) > 0).any():
             if len(np.unique(np.concatenate([[], *self.surface.loops]))) == len(self.surface.vertices):
                 raise InputError(
-                    f"no vertex of {name} lies inside its edge, at which creases of more than 40 degrees end it too: "
-                    "mesh it more finely, or round its creases"
+                    f"no vertex of {name} is inside its edge (creases of more than 40 degrees are edges too): mesh it "
+                    "more finely, or round its creases"
                 )
-            raise InputError(f"nothing of {name} lies inside its end: choose a lower base or another boundary")
+            raise InputError(f"no part of {name} is inside its boundary: choose a lower base or another boundary")
 
     def _require_a_good_fit(self, name: str) -> None:
-        """Where patches cannot follow the mesh, it is rough, or two sheets of it come too close."""
+        """Refuse a mesh that its smooth field does not follow: it is rough, or two sheets of it are too close."""
         x = self.surface.vertices
         value, gradient = self.level(x)
         cosine = dot(gradient, self.surface.normals) / np.linalg.norm(gradient, axis=1)
         off = np.where(cosine > ASKEW, np.abs(value), np.inf)
         k = int(np.argmax(np.where(np.isfinite(value), off, np.inf)))
-        if not off[k] < LOST * self._extent:
+        if not off[k] < OFF * self._extent:
             px, py, pz = x[k]
             how = f"vertices lie {abs(value[k]):.2g} m off it" if np.isfinite(off[k]) else "normals point elsewhere"
             raise InputError(
                 f"{name} cannot be followed by a smooth surface near ({px:.4g}, {py:.4g}, {pz:.4g}) m, where its "
-                f"{how}: smooth it, mesh it more finely there, or part sheets that touch or cross each other"
+                f"{how}: smooth it, mesh it more finely there, or separate sheets that touch or cross each other"
             )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from rodshell.arrays import Floats
 
 Part = Any
-"""A part of a jet: an array, a float where it is the same everywhere, or a jet again."""
+"""A part of a jet: an array, a float where it is constant, or a jet."""
 
 LN2, LN10 = float(np.log(2.0)), float(np.log(10.0))
 
@@ -17,10 +17,13 @@ LN2, LN10 = float(np.log(2.0)), float(np.log(10.0))
 class Jet:
     """A function of x and y at n points: value, gradient and Hessian through arithmetic and numpy functions.
 
-    A part that is the same everywhere stays a float, and 0.0 and 1.0 cost nothing: most parts of x, of y and
-    of what depends on one of them alone. Parts may be jets: a jet of jets holds higher derivatives.
+    A part that is constant stays a float, and 0.0 and 1.0 cost nothing: most parts of x, of y and of functions of one
+    of them alone. Parts may be jets: a jet of jets has higher derivatives. Operations without a derivative here
+    (comparisons, np.where, np.maximum, float()) are refused with a TypeError.
 
-    What has no derivative here (comparisons, np.where, np.maximum, float()) is refused with a TypeError.
+    Parameters
+    ----------
+    value, dx, dy, dxx, dxy, dyy : (n,) arrays, floats or jets.
     """
 
     __slots__ = ("dx", "dxx", "dxy", "dy", "dyy", "value")
@@ -38,7 +41,7 @@ class Jet:
 
     @staticmethod
     def variables(x: Part, y: Part) -> tuple["Jet", "Jet"]:
-        """x and y themselves, each (n,)."""
+        """The variables `x` and `y` (n,) as jets."""
         return Jet(x, dx=1.0), Jet(y, dy=1.0)
 
     def __add__(self, other: Any) -> "Jet":
@@ -63,10 +66,10 @@ class Jet:
     def __rtruediv__(self, other: Any) -> "Jet":
         return _divide(other, self)
 
-    def __pow__(self, other: Any) -> "Jet":
+    def __pow__(self, other: Any) -> Any:
         return _power(self, other)
 
-    def __rpow__(self, other: Any) -> "Jet":
+    def __rpow__(self, other: Any) -> Any:
         return _power(other, self)
 
     def __neg__(self) -> "Jet":
@@ -88,7 +91,7 @@ class Jet:
         raise TypeError(f"{getattr(function, '__name__', function)} has no derivative here")
 
     def _refuse(self, *_: Any) -> NoReturn:
-        raise TypeError("a jet is no plain array: only arithmetic and smooth numpy functions take it")
+        raise TypeError("a jet is not a plain array: use arithmetic and smooth numpy functions only")
 
     __array__ = __bool__ = __float__ = __int__ = __len__ = __iter__ = _refuse
     __lt__ = __le__ = __gt__ = __ge__ = _refuse
@@ -97,7 +100,7 @@ class Jet:
 
 
 def _times(a: Part, b: Part) -> Part:
-    """a b, for free where one is a plain 0 or 1: a part that is zero everywhere stays so."""
+    """a b, without arithmetic where one is a plain 0 or 1: a part that is zero everywhere stays so."""
     if a.__class__ is float:
         if a == 0.0:
             return 0.0
@@ -199,7 +202,7 @@ def _divide(a: Any, b: Any) -> Jet:
     return Jet(f, dx, dy, _over(dxx, g), _over(dxy, g), _over(dyy, g))
 
 
-def _power(a: Any, b: Any) -> Jet:
+def _power(a: Any, b: Any) -> Any:
     if b.__class__ is Jet:
         return _exp(_multiply(_log(a) if a.__class__ is Jet else np.log(a), b))
     u, c = a.value, b
@@ -340,19 +343,23 @@ RULES: dict[np.ufunc, Callable[..., Any]] = {
     np.cosh: _cosh,
     np.tanh: _tanh,
 }
-"""What numpy functions do to jets; any other is refused."""
+"""The derivatives of numpy functions; any other function is refused."""
 
 
 def differences(function: Callable[[Any, Any], Any], x: Floats, y: Floats, step: float) -> Jet:
-    """The jet of a function of plain arrays by central differences of fourth order, at points (n,).
+    """Differentiate a function of plain arrays by central differences of fourth order.
 
-    All 17 points of the stencil go into one call.
+    Parameters
+    ----------
+    function : z(x, y) of arrays; it is called once with all 17 points of the stencil.
+    x, y : (n,) points.
+    step : of the differences.
     """
-    one, two = np.array([[1], [-1]]), np.array([[2], [-2]])
+    near, far = np.array([[1], [-1]]), np.array([[2], [-2]])
     zero = np.zeros((2, 1))
     corner = np.array([[1], [1], [-1], [-1]]), np.array([[1], [-1], [1], [-1]])
-    across = np.concatenate([[[0]], one, two, zero, zero, corner[0], 2 * corner[0]]) * step
-    up = np.concatenate([[[0]], zero, zero, one, two, corner[1], 2 * corner[1]]) * step
+    across = np.concatenate([[[0]], near, far, zero, zero, corner[0], 2 * corner[0]]) * step
+    up = np.concatenate([[[0]], zero, zero, near, far, corner[1], 2 * corner[1]]) * step
     stencil = (x + across).ravel(), (y + up).ravel()
     f = np.broadcast_to(np.asarray(function(*stencil), dtype=float), stencil[0].shape).reshape(17, -1)
     along_x, along_y, cross, wide = f[1:5], f[5:9], f[9:13], f[13:17]

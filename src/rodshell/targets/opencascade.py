@@ -1,9 +1,9 @@
-"""A program of its own that reads a face of a STEP file by OpenCASCADE; see `step`.
+"""A separate program that reads a face of a STEP file with OpenCASCADE; see `nurbs_files.read_step`.
 
-It imports nothing of rodshell, and runs apart because OpenCASCADE can fall over a damaged file, and everything in its
-process with it. `python -P opencascade.py REQUEST RESULT`: REQUEST is JSON with `path`, `name` (of a face, or null) and
-how finely to sample, `grid`, `per_span`, `finest`, `along_edges`. RESULT is an npz file: `names`, JSON, a list for each
-face; and if one face is meant, `points` (k, l, 3) of its surface and `trims` (n, along_edges + 1, 3), curves that bound
+It imports nothing of rodshell, and runs in a process of its own because a damaged file can crash OpenCASCADE.
+Usage: `python -P opencascade.py REQUEST RESULT`. REQUEST is JSON with `path`, `name` (of a face, or null) and the
+resolution: `grid`, `per_span`, `finest`, `along_edges`. RESULT is an npz file with `names` (JSON, a list for each face)
+and, if one face matches, `points` (k, l, 3) of its surface and `trims` (n, along_edges + 1, 3), the curves that bound
 it, in millimetres.
 """
 
@@ -18,13 +18,13 @@ ON_BORDER = 1e-6  # of the range of a parameter
 
 
 def read(path: str) -> list[tuple[Any, list[str]]]:
-    """Every face, with its names and those of what it belongs to."""
+    """Every face of a file, with its names and those of the shells and solids that it belongs to."""
     from OCP.Message import Message
     from OCP.STEPControl import STEPControl_Reader
     from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
     from OCP.TopoDS import TopoDS
 
-    Message.DefaultMessenger_s().ChangePrinters().Clear()  # what a reader finds is not for the terminal
+    Message.DefaultMessenger_s().ChangePrinters().Clear()  # nothing on the terminal
     reader = STEPControl_Reader()
     reader.ReadFile(path)
     reader.TransferRoots()
@@ -33,22 +33,22 @@ def read(path: str) -> list[tuple[Any, list[str]]]:
         return []
     origin = reader.WS().TransferReader()
 
-    def own_name(part: Any) -> str:
+    def name_of(part: Any) -> str:
         entity = origin.EntityFromShapeResult(part, 1)
         text = entity.Name() if hasattr(entity, "Name") else None
         return text.ToCString() if text is not None else ""
 
-    owners = [(own_name(part), list(parts(part, TopAbs_FACE))) for kind in (TopAbs_SOLID, TopAbs_SHELL)
+    owners = [(name_of(part), list(parts(part, TopAbs_FACE))) for kind in (TopAbs_SOLID, TopAbs_SHELL)
               for part in parts(shape, kind)]  # fmt: skip
     found = []
     for face in parts(shape, TopAbs_FACE):
-        names = {own_name(face), *(owner for owner, faces in owners if any(face.IsSame(other) for other in faces))}
+        names = {name_of(face), *(owner for owner, faces in owners if any(face.IsSame(other) for other in faces))}
         found.append((TopoDS.Face(face), sorted(names - {"", "NONE"})))
     return found
 
 
 def parts(whole: Any, kind: Any) -> Iterator[Any]:
-    """What of a kind a shape is made of."""
+    """The parts of a shape that are of a `kind`, such as its faces."""
     from OCP.TopExp import TopExp_Explorer
 
     explorer = TopExp_Explorer(whole, kind)
@@ -58,7 +58,15 @@ def parts(whole: Any, kind: Any) -> Iterator[Any]:
 
 
 def points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
-    """(k, l, 3) points of a surface between the bounds of its parameters [mm]."""
+    """Points (k, l, 3) of a surface on a lattice of its parameters [mm].
+
+    Parameters
+    ----------
+    surface : an adaptor of OpenCASCADE.
+    grid : intervals each way, at least.
+    per_span : intervals for each span of the surface.
+    finest : intervals each way, at most.
+    """
     from OCP.GeomAbs import GeomAbs_CN
 
     sides = []
@@ -71,18 +79,20 @@ def points_of(surface: Any, grid: int, per_span: int, finest: int) -> Any:
 
 
 def coordinates(point: Any) -> tuple[float, float, float]:
+    """x, y, z of a point of OpenCASCADE."""
     return point.X(), point.Y(), point.Z()
 
 
 def edges(face: Any) -> list[Any]:
+    """The edges of a face."""
     from OCP.TopAbs import TopAbs_EDGE
     from OCP.TopoDS import TopoDS
 
     return [TopoDS.Edge(edge) for edge in parts(face, TopAbs_EDGE)]
 
 
-def is_whole(face: Any, surface: Any) -> bool:
-    """Whether the edges run along the bounds of the parameters: then nothing is trimmed."""
+def is_untrimmed(face: Any, surface: Any) -> bool:
+    """Whether all edges run along the bounds of the surface's parameters."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 
     low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
@@ -98,7 +108,7 @@ def is_whole(face: Any, surface: Any) -> bool:
 
 
 def trims_of(face: Any, along_edges: int) -> Any:
-    """(n, along_edges + 1, 3) curves at which a face ends [mm]; seams and the poles of spheres are none."""
+    """Curves (n, along_edges + 1, 3) at which a face ends [mm]; not its seams, nor the poles of spheres."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve
 
@@ -108,12 +118,12 @@ def trims_of(face: Any, along_edges: int) -> Any:
             continue
         curve = BRepAdaptor_Curve(edge)
         t = np.linspace(curve.FirstParameter(), curve.LastParameter(), along_edges + 1)
-        strokes.append([coordinates(curve.Value(one)) for one in t.tolist()])
+        strokes.append([coordinates(curve.Value(parameter)) for parameter in t.tolist()])
     return np.array(strokes).reshape(-1, along_edges + 1, 3)
 
 
 def main(request: dict[str, Any], result: str) -> None:
-    """Read, and write what was found."""
+    """Read the file, and write the result."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
 
     faces = read(request["path"])
@@ -122,8 +132,9 @@ def main(request: dict[str, Any], result: str) -> None:
     if len(wanted) == 1:
         surface = BRepAdaptor_Surface(wanted[0], True)
         found["points"] = points_of(surface, request["grid"], request["per_span"], request["finest"])
-        whole, along = is_whole(wanted[0], surface), request["along_edges"]
-        found["trims"] = np.empty((0, along + 1, 3)) if whole else trims_of(wanted[0], along)
+        along = request["along_edges"]
+        untrimmed = is_untrimmed(wanted[0], surface)
+        found["trims"] = np.empty((0, along + 1, 3)) if untrimmed else trims_of(wanted[0], along)
     np.savez(result, **found)
 
 

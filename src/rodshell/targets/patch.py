@@ -1,24 +1,125 @@
-"""A patch: the part of a target on given sides of its seams, itself a target that ends at them."""
+"""Patches: the parts into which seams cut a target, each itself a target that ends at them."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from reprlib import repr as short
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, Ints
+from rodshell.errors import InputError
 from rodshell.geometry.vectors import unit
-from rodshell.targets.seam import Seam
 from rodshell.targets.target import Gap, Implicit, Target
 
+BEYOND = 1e3  # lengths of an open seam by which its two ends are prolonged
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Patch(Target):
-    """The points of `whole` that lie to the left (side 1) or to the right (side -1) of each seam.
 
-    The surface goes on smoothly past a seam: there it is the rest of the whole.
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """A polyline in the plan along which a target is cut, straight down; make one with `Seam.of`.
+
+    An open seam is prolonged straight past both ends. Seams with the same points are equal.
 
     Parameters
     ----------
-    middle : x, y of a point well inside [m]: where the anchor is by default.
+    points : (n, 2) [m].
+    """
+
+    points: Floats
+
+    @staticmethod
+    def of(points: ArrayLike) -> "Seam":
+        """Make a seam of points.
+
+        Parameters
+        ----------
+        points : (n, 2), or (n, 3), whose z is ignored [m].
+
+        Raises
+        ------
+        InputError : fewer than two different points, or one that is not finite.
+        """
+        try:
+            given = np.asarray(points, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"a seam must be a list of points (x, y) in m, not {short(points)}") from None
+        if given.ndim != 2 or given.shape[1] not in (2, 3) or not np.isfinite(given).all():
+            raise InputError(f"a seam must be a list of finite points (x, y) in m, not of the shape {given.shape}")
+        plan = given[:, :2]
+        plan = plan[np.append(True, np.linalg.norm(np.diff(plan, axis=0), axis=1) > 0)]
+        if len(plan) < 2:
+            raise InputError("a seam needs at least two different points: it is a line across the plan")
+        return Seam(plan)
+
+    def __eq__(self, other: object) -> bool:
+        return np.array_equal(self.points, other.points) if isinstance(other, Seam) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(tuple, self.points.tolist())))
+
+    def __repr__(self) -> str:
+        ends = " to ".join(f"({x:g}, {y:g})" for x, y in self.points[[0, -1]].tolist())
+        return f"Seam({len(self.points)} points, {'closed' if self.closed else ends + ' m'})"
+
+    @property
+    def closed(self) -> bool:
+        """Whether the last point is the first again."""
+        return len(self.points) > 3 and bool(np.all(self.points[0] == self.points[-1]))
+
+    @cached_property
+    def _corners(self) -> Floats:
+        """The points; of an open seam the first and the last are moved far out."""
+        x = self.points.copy()
+        if not self.closed:
+            far = BEYOND * float(np.linalg.norm(np.ptp(x, axis=0)))
+            first, last = x[0] - x[1], x[-1] - x[-2]
+            x[0] += far * first / np.linalg.norm(first)
+            x[-1] += far * last / np.linalg.norm(last)
+        return x
+
+    def distance(self, x: Floats) -> Floats:
+        """Signed distance in plan, positive to the left of the seam's direction.
+
+        Parameters
+        ----------
+        x : (n, 2) or (n, 3) points [m].
+
+        Returns
+        -------
+        (n,) [m].
+        """
+        k, share, off = self._nearest(x)
+        edge = np.diff(self._corners, axis=0)
+        left = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
+        before = np.where((share <= 0.0) & ((k > 0) | self.closed), k - 1, k)
+        after = np.where((share >= 1.0) & ((k < len(edge) - 1) | self.closed), (k + 1) % len(edge), k)
+        side = left[before] + left[after]  # at a corner the mean of both sides decides
+        return np.asarray(np.copysign(np.linalg.norm(off, axis=1), np.einsum("ni,ni->n", off, side)))
+
+    def _nearest(self, x: Floats) -> tuple[Ints, Floats, Floats]:
+        """For each point (n, 2 or 3): the nearest edge, its fraction before the closest point, the way from there."""
+        start, edge = self._corners[:-1], np.diff(self._corners, axis=0)
+        off = x[:, None, :2] - start
+        share = np.clip(np.einsum("nki,ki->nk", off, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
+        off = off - share[..., None] * edge
+        k = np.argmin(np.einsum("nki,nki->nk", off, off), axis=1)
+        row = np.arange(len(x))
+        return k, share[row, k], off[row, k]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Patch(Target):
+    """A part of a target: the points on given sides of its seams.
+
+    Past a seam the surface is continued by the rest of the whole target.
+
+    Parameters
+    ----------
+    whole : the target.
+    seams : that bound the patch.
+    sides : for each seam 1 if the patch is on its left, -1 if it is on its right.
+    middle : x, y of a point well inside [m], the default of the anchor.
     """
 
     whole: Target
@@ -32,7 +133,7 @@ class Patch(Target):
 
     @property
     def size(self) -> float:
-        """That of the whole [m], so that the gaps of all patches are made relative alike."""
+        """That of the whole target [m], so that the gaps of all patches are related to one length."""
         return self.whole.size
 
     @property
@@ -46,13 +147,17 @@ class Patch(Target):
     def parameters(self) -> dict[str, object]:
         return self.whole.parameters()
 
+    def __repr__(self) -> str:
+        x, y = self.middle
+        return f"Patch(around ({x:.3g}, {y:.3g}) m, {len(self.seams)} seam{'s' * (len(self.seams) != 1)}, {self.whole})"
+
     def margin(self, x: Floats) -> Floats:
-        """(n,) how far inside the whole's end and the seams the points (n, 3) are [m]."""
+        """Distance (n,) [m] of the points `x` (n, 3) to the whole target's end and the seams, positive inside."""
         apart = [side * seam.distance(x) for seam, side in zip(self.seams, self.sides, strict=True)]
         return np.asarray(np.min([self.whole.margin(x), *apart], axis=0))
 
     def on_seam(self, x: Floats, seam: int) -> Floats:
-        """The point (3,) of the surface and of a seam nearest to a point (3,) near both, by Newton."""
+        """The point (3,) [m] both of the surface and of a seam that is closest to `x` (3,), a point near both."""
         for _ in range(12):
             value, gradient = self.level(x[None])
             rows = np.vstack([gradient, self._aside(x, seam)])
@@ -64,17 +169,17 @@ class Patch(Target):
         return x
 
     def across(self, x: Floats, seam: int) -> Floats:
-        """(3,) unit tangent of the surface at right angles to a seam, at a point (3,) of both."""
+        """Unit tangent (3,) of the surface at right angles to a seam, at a point `x` (3,) of both."""
         normal = unit(self.level(x[None])[1])[0]
         return unit(self._aside(x, seam) - (self._aside(x, seam) @ normal) * normal)
 
     def _aside(self, x: Floats, seam: int) -> Floats:
-        """(3,) gradient of the distance from a seam, by differences: the seam's pieces are straight."""
+        """Gradient (3,) of the distance from a seam, by differences: the seam's pieces are straight."""
         h, apart = 1e-6 * self.size, self.seams[seam].distance
         return np.asarray((apart(x + h * np.eye(3)) - apart(x - h * np.eye(3))) / (2 * h))
 
-    def carries(self, x: Floats) -> Bools:
-        return self.whole.carries(x)
+    def covers(self, x: Floats) -> Bools:
+        return self.whole.covers(x)
 
     def implicit(self, x: Floats) -> Implicit:
         return self.whole.implicit(x)
@@ -82,8 +187,8 @@ class Patch(Target):
     def level(self, x: Floats) -> tuple[Floats, Floats]:
         return self.whole.level(x)
 
-    def height(self, xy: Floats) -> Floats:
-        return self.whole.height(xy)
+    def height_at(self, xy: Floats) -> Floats:
+        return self.whole.height_at(xy)
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
         return self.whole.retract(x, steps)

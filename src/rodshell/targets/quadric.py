@@ -11,29 +11,29 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.targets.domain import Disc, Domain, EllipseDomain
-from rodshell.targets.standing import Standing
 from rodshell.targets.target import Implicit
+from rodshell.targets.wall_below_rim import WalledTarget
 from rodshell.validation import number, positive
 
 
-@dataclass(frozen=True)
-class _Quadric(Standing):
+@dataclass(frozen=True, eq=False)
+class _Quadric(WalledTarget):
     """F = scale (sum_k w_k x_k^2 + slope z - 1), centred on the origin, cut at the base plane."""
 
     @property
     @abstractmethod
     def weights(self) -> tuple[float, float, float]:
-        """w_k [1/m2]"""
+        """The three w_k [1/m2]."""
 
     @property
     def slope(self) -> float:
-        """[1/m]"""
+        """Of the term in z [1/m]."""
         return 0.0
 
     @property
     @abstractmethod
     def scale(self) -> float:
-        """[m], chosen so that the gradient at the top has length 1."""
+        """Scale [m], such that the gradient at the top has length 1."""
 
     @property
     def summit(self) -> tuple[float, float]:
@@ -48,10 +48,10 @@ class _Quadric(Standing):
 
     @cached_property
     def _form(self) -> tuple[Floats, float, float]:
-        """Weights and slope times the scale, and the scale: the march asks for them thousands of times."""
+        """Weights and slope times the scale, and the scale; kept, as the march evaluates them thousands of times."""
         return self.scale * np.array(self.weights), self.scale * self.slope, self.scale
 
-    def height(self, xy: Floats) -> Floats:
+    def height_at(self, xy: Floats) -> Floats:
         w = self.weights
         rest = 1.0 - w[0] * xy[:, 0] ** 2 - w[1] * xy[:, 1] ** 2
         if w[2] == 0.0:
@@ -84,12 +84,21 @@ def _implicit(x, weights, slope, scale):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Hemisphere(_Quadric):
-    """x^2 + y^2 + z^2 = radius^2, z >= 0 [HQK Eq 13a]; `radius` [m]."""
+    """x^2 + y^2 + z^2 = radius^2, z >= 0 [HQK Eq 13a].
+
+    Parameters
+    ----------
+    radius : [m].
+
+    Raises
+    ------
+    InputError : the radius is not a positive number.
+    """
 
     radius: float
 
     def __post_init__(self) -> None:
-        positive("target radius", self.radius, "m")
+        object.__setattr__(self, "radius", positive("target radius", self.radius, "m"))
 
     @property
     def name(self) -> str:
@@ -118,19 +127,27 @@ class Hemisphere(_Quadric):
 
 @dataclass(frozen=True)
 class Cap(Hemisphere):
-    """The part of a sphere of the given `radius` [m] above z = `base` [m], its centre being z = 0."""
+    """The part of a sphere around the origin that lies above a base plane.
 
-    base_height: float = 0.0
+    Parameters
+    ----------
+    radius : of the sphere [m].
+    base : z of the base plane [m]; default 0, which makes a hemisphere.
 
-    def __init__(self, radius: float, base: float) -> None:
-        object.__setattr__(self, "radius", radius)
-        object.__setattr__(self, "base_height", base)
-        positive("target radius", radius, "m")
-        number("target base", base, "m")
-        if not abs(base) < radius:
+    Raises
+    ------
+    InputError : the radius is not a positive number, or the base plane does not cut the sphere.
+    """
+
+    base: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "base", number("target base", self.base, "m"))
+        if not abs(self.base) < self.radius:
             raise InputError(
-                f"the cap's base plane z = {base} m must cut the sphere of radius {radius} m: "
-                f"give a base between {-radius} and {radius} m"
+                f"the cap's base plane z = {self.base} m must cut the sphere of radius {self.radius} m: "
+                f"give a base between {-self.radius} and {self.radius} m"
             )
 
     @property
@@ -139,33 +156,37 @@ class Cap(Hemisphere):
 
     @property
     def plan(self) -> Domain:
-        return Disc(sqrt(self.radius**2 - self.base_height**2))
-
-    @property
-    def base(self) -> float:
-        return self.base_height
+        return Disc(sqrt(self.radius**2 - self.base**2))
 
     @property
     def size(self) -> float:
-        """Half the width of the shell in plan [m]: the equator's, where the cap reaches below it."""
-        return self.radius if self.base_height < 0 else max(self.plan.half_extent)
+        """Half the width of the shell in plan [m]; that of the equator, where the cap reaches below it."""
+        return self.radius if self.base < 0 else max(self.plan.half_extent)
 
     def parameters(self) -> dict[str, object]:
-        return {"kind": "cap", "radius": self.radius, "base": self.base_height}
+        return {"kind": "cap", "radius": self.radius, "base": self.base}
 
 
 @dataclass(frozen=True)
 class Paraboloid(_Quadric):
-    """(x^2 + y^2) / radius^2 + z / height = 1, z >= 0 [HQK Eq 13b]; `radius`, `peak` (its height) [m]."""
+    """(x^2 + y^2) / radius^2 + z / height = 1, z >= 0 [HQK Eq 13b].
+
+    Parameters
+    ----------
+    radius : of the rim [m].
+    height : of the top above the rim [m].
+
+    Raises
+    ------
+    InputError : radius or height is not a positive number.
+    """
 
     radius: float
-    peak: float
+    height: float
 
-    def __init__(self, radius: float, height: float) -> None:
-        object.__setattr__(self, "radius", radius)
-        object.__setattr__(self, "peak", height)
-        positive("target radius", radius, "m")
-        positive("target height", height, "m")
+    def __post_init__(self) -> None:
+        for name in ("radius", "height"):
+            object.__setattr__(self, name, positive(f"target {name}", getattr(self, name), "m"))
 
     @property
     def name(self) -> str:
@@ -186,19 +207,28 @@ class Paraboloid(_Quadric):
 
     @property
     def slope(self) -> float:
-        return 1.0 / self.peak
+        return 1.0 / self.height
 
     @property
     def scale(self) -> float:
-        return self.peak
+        return self.height
 
     def parameters(self) -> dict[str, object]:
-        return {"kind": "paraboloid", "radius": self.radius, "height": self.peak}
+        return {"kind": "paraboloid", "radius": self.radius, "height": self.height}
 
 
 @dataclass(frozen=True)
 class Ellipsoid(_Quadric):
-    """(x/a)^2 + (y/b)^2 + (z/c)^2 = 1, z >= 0 [HQK Eq 13c]; half-axes `a`, `b`, `c` [m]."""
+    """(x/a)^2 + (y/b)^2 + (z/c)^2 = 1, z >= 0 [HQK Eq 13c].
+
+    Parameters
+    ----------
+    a, b, c : half-axes along x, y and z [m].
+
+    Raises
+    ------
+    InputError : a half-axis is not a positive number.
+    """
 
     a: float
     b: float
@@ -206,7 +236,7 @@ class Ellipsoid(_Quadric):
 
     def __post_init__(self) -> None:
         for axis in "abc":
-            positive(f"target {axis}", getattr(self, axis), "m")
+            object.__setattr__(self, axis, positive(f"target {axis}", getattr(self, axis), "m"))
 
     @property
     def name(self) -> str:

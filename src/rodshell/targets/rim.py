@@ -1,4 +1,4 @@
-"""Closed curves on a surface, between what is the shell and what is not."""
+"""Closed curves on a surface, between what is the shell and what is not; jagged edges of meshes are smoothed."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.geometry.vectors import cross, dot, unit
 
@@ -16,14 +16,21 @@ CORNER = 0.5  # cosine of 60 degrees between edges of a loop: it is not rounded 
 POINTS = 1500  # on each loop
 IN_A_BALL = 32  # of these
 
+# jagged edges
+SHARP = 0.35  # [rad], 20 degrees: an edge between two such turns to opposite sides is a jog
+FEWEST = 4  # successive jogs that make an edge jagged: a real corner or notch has fewer
+RUN = 2.5  # times sqrt(n): edges between successive jogs; a lattice cut along a circle of n edges has 1.1 sqrt(n)
+MOST, RMS = 1.0, 0.35  # edge lengths by which a vertex may be moved; steps of a lattice deviate by 0.29 rms
+HALVINGS = 20
+
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """Closed polylines on a surface, fine enough to be taken for smooth curves.
+    """Closed polylines on a surface, fine enough to replace smooth curves; make one with `Rim.of`.
 
     Parameters
     ----------
-    points : (n, 3) of all loops in a row [m].
+    points : (n, 3) points of all loops, one loop after the other [m].
     inward : (n, 3) unit vectors in the surface, across the edge from each point to the next, towards the shell.
     after : (n,) index of the next point of the loop.
     """
@@ -34,7 +41,14 @@ class Rim:
 
     @staticmethod
     def of(loops: Sequence[Floats], onto: Callable[[Floats], Floats], normal: Callable[[Floats], Floats]) -> "Rim":
-        """Loops (n, 3), the shell on the left seen from outside; `onto` puts points on the surface."""
+        """Refine loops into a rim, by cubics between corners.
+
+        Parameters
+        ----------
+        loops : closed polylines (n, 3) with the shell on their left, seen from outside [m].
+        onto : moves points (n, 3) onto the surface.
+        normal : outward unit normals (n, 3) of the surface at points.
+        """
         points, edges, after, count = list[Floats](), list[Floats](), list[Ints](), 0
         for loop in loops:
             x = onto(_rounded(loop))
@@ -46,8 +60,12 @@ class Rim:
         x, along = np.vstack(points), np.vstack(edges)
         return Rim(x, unit(cross(normal(x + 0.5 * along), along)), np.concatenate(after))
 
+    def __repr__(self) -> str:
+        return f"Rim({len(self.points)} points in {self.loops} loop{'s' * (self.loops != 1)})"
+
     @property
     def loops(self) -> int:
+        """Number of loops."""
         return int(np.count_nonzero(self.after <= np.arange(len(self.after))))
 
     @cached_property
@@ -58,7 +76,7 @@ class Rim:
 
     @cached_property
     def _balls(self) -> tuple[Ints, Floats, Floats]:
-        """Balls around a few points in a row each: where these begin (k + 1,), centres (k, 3) and radii (k,) [m]."""
+        """Balls, each around a run of points: where the runs begin (k + 1,), centres (k, 3) and radii (k,) [m]."""
         start = np.append(np.arange(0, len(self.points), IN_A_BALL), len(self.points))
         parts = [self.points[a:b] for a, b in pairwise(start.tolist())]
         centres = np.array([part.mean(axis=0) for part in parts])
@@ -66,34 +84,43 @@ class Rim:
         return start, centres, np.array(radii)
 
     def distance(self, x: Floats) -> Floats:
-        """Signed distance (n,) of points near the surface to the nearest loop [m], positive inside."""
+        """Signed distance (n,) [m] of points `x` (n, 3) near the surface to the nearest loop, positive inside."""
         result = np.empty(len(x))
         _distance(x, self.points, self.inward, self.after, self._before, *self._balls, result)
         return result
 
     def feet(self, x: Floats) -> tuple[Ints, Floats]:
-        """The edge (n,) nearest to each point (n, 3), and the share (n,) of it that lies before the nearest point."""
+        """The closest points of the rim, as `at` takes them.
+
+        Parameters
+        ----------
+        x : (n, 3) points [m].
+
+        Returns
+        -------
+        Index (n,) of the nearest edge, and the fraction (n,) of it before the closest point.
+        """
         edge, share = np.empty(len(x), dtype=np.intp), np.empty(len(x))
         _feet(x, self.points, self.after, self._before, *self._balls, edge, share)
         return edge, share
 
     def at(self, edge: Ints, share: Floats) -> Floats:
-        """Points (n, 3) on the edges [m]."""
+        """Points (n, 3) [m] on the edges (n,), at fractions `share` (n,) of their lengths."""
         first = self.points[edge]
         return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
 
 
 @njit(cache=True, error_model="numpy")
 def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
-    """From the nearest edge; beside a corner both edges count."""
+    """Distances from the nearest edge; from the mean of both edges where a corner is nearest."""
     edge = 0
     for n in range(len(x)):
         edge, along = _nearest(x, n, points, after, before, start, centres, radii, edge)
         ex, ey, ez = _edge(points, edge, after[edge])
         ix, iy, iz = inward[edge]
         if along <= 0.0 or along >= 1.0:
-            beside = before[edge] if along <= 0.0 else after[edge]
-            ix, iy, iz = ix + inward[beside, 0], iy + inward[beside, 1], iz + inward[beside, 2]
+            other = before[edge] if along <= 0.0 else after[edge]
+            ix, iy, iz = ix + inward[other, 0], iy + inward[other, 1], iz + inward[other, 2]
         ox, oy, oz = (
             x[n, 0] - along * ex - points[edge, 0],
             x[n, 1] - along * ey - points[edge, 1],
@@ -112,8 +139,8 @@ def _feet(x, points, after, before, start, centres, radii, edges, shares):  # ty
 
 @njit(cache=True, error_model="numpy")
 def _nearest(x, n, points, after, before, start, centres, radii, guess):  # type: ignore[no-untyped-def]
-    """That edge of those two that meet in the point nearest to the n-th which is nearer, and the share of it that lies
-    before the foot. Where the `guess` is near, most balls are too far away to be looked into."""
+    """The nearer of the two edges that meet in the rim's point nearest to the n-th point, and the fraction of it before
+    the closest point. With a near `guess` most balls are too far away to be searched."""
     px, py, pz = x[n, 0], x[n, 1], x[n, 2]
     nearest, least = guess, _square(px, py, pz, points, guess)
     far = np.sqrt(least)
@@ -166,3 +193,87 @@ def _piece(points: Floats, pieces: int) -> Floats:
     if len(points) < 4:
         return np.column_stack([np.interp(fine, s, points[:, k]) for k in range(3)])
     return on_curve(s, points, fine)
+
+
+def smooth_loop(loop: Floats, normals: Floats) -> Floats | None:
+    """Smooth the jagged parts of a mesh's edge, such as missing faces leave.
+
+    The result is a smoothing spline with third differences [Eilers and Marx 1996], which hardly shrink a circle. It is
+    the smoothest whose vertices move by at most an edge length, and in the mean by what the steps of a lattice explain.
+    Vertices outside of jagged parts do not move.
+
+    Parameters
+    ----------
+    loop : (n, 3) closed polyline [m].
+    normals : (n, 3) of the surface there.
+
+    Returns
+    -------
+    (n, 3) the smoothed loop, or None if no part is jagged.
+    """
+    free = _jagged(loop, normals)
+    if not free.any():
+        return None
+    length = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    edge = np.max([np.roll(length, k) for k in (-1, 0, 1, 2)], axis=0)[:, None]  # the longest nearby
+    low, high, best = -4.0, 10.0, loop  # powers of ten
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        tried = _splined(loop, edge, free, 10**middle)
+        off = np.linalg.norm((tried - loop) / edge, axis=1)[free]
+        if off.max() <= MOST and np.sqrt(np.mean(off**2)) <= RMS:
+            low, best = middle, tried
+        else:
+            high = middle
+    return best
+
+
+def _jagged(loop: Floats, normals: Floats) -> Bools:
+    """(n,) which vertices are in jagged parts: rows of jogs at short distances."""
+    count = len(loop)
+    ahead = np.roll(loop, -1, axis=0) - loop
+    before = np.roll(ahead, 1, axis=0)
+    turn = np.arctan2(dot(cross(before, ahead), normals), dot(before, ahead))
+    after = np.roll(turn, -1)
+    jogs = np.flatnonzero((turn * after < 0) & (np.minimum(np.abs(turn), np.abs(after)) > SHARP))
+    result = np.zeros(count, dtype=bool)
+    for row in _rows(jogs, count):
+        if len(row) >= FEWEST:
+            result[np.arange(row[0], row[-1] + 2) % count] = True
+    return result
+
+
+def _rows(jogs: Ints, count: int) -> list[Ints]:
+    """The jogs of a closed loop in rows with short gaps; indices of the last may be larger than `count`."""
+    if len(jogs) == 0:
+        return []
+    gaps = np.diff(jogs, append=jogs[0] + count)
+    long = np.flatnonzero(gaps > RUN * np.sqrt(count))
+    if len(long) == 0:
+        return [np.append(jogs, jogs[0] + count)]
+    first = long[-1] + 1  # a row begins after a long gap
+    turned = np.concatenate([jogs[first:], jogs[:first] + count])
+    return np.split(turned, np.flatnonzero(np.diff(turned) > RUN * np.sqrt(count)) + 1)
+
+
+def _splined(loop: Floats, edge: Floats, free: Bools, weight: float) -> Floats:
+    """The z (n, 3) that minimise |(z - loop) / edge|^2 + weight |third differences of z around the loop / edge|^2,
+    those that are not free kept."""
+    from scipy.sparse import coo_matrix, diags_array
+    from scipy.sparse.linalg import spsolve
+
+    count = len(loop)
+    rows = np.arange(count)
+    third = coo_matrix(
+        (
+            np.concatenate([np.full(count, factor) for factor in (-1.0, 3.0, -3.0, 1.0)]),
+            (np.tile(rows, 4), np.concatenate([(rows + k) % count for k in range(4)])),
+        )
+    ).tocsr()
+    third = diags_array(2 / (np.roll(edge[:, 0], -1) + np.roll(edge[:, 0], -2))) @ third
+    keep = diags_array(1 / edge[:, 0] ** 2)
+    system = (keep + weight * (third.T @ third)).tocsc()
+    result = loop.copy()
+    right = (keep @ loop - system[:, ~free] @ loop[~free])[free]
+    result[free] = spsolve(system[free][:, free].tocsc(), right)
+    return result

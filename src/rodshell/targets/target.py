@@ -4,18 +4,24 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
+from numba import njit
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
-from rodshell.targets.closest import newton_to_closest, shape_operators
 
-NEARLY = 1e-8  # of the size: Newton's step leaves the square of what was missing, which is then less than round-off
+NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
 
 
 class Implicit(NamedTuple):
-    """F (n,), its gradient (n, 3) and Hessian (n, 3, 3); F > 0 outside, and |grad F| is of order 1."""
+    """An implicit function F at n points; F > 0 outside, and |grad F| is of order 1.
+
+    Parameters
+    ----------
+    value : (n,) F [m].
+    gradient : (n, 3) [-].
+    hessian : (n, 3, 3) [1/m].
+    """
 
     value: Floats
     gradient: Floats
@@ -23,9 +29,13 @@ class Implicit(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Signed distance (n,) to a surface [m], its gradient, the outward normal (n, 3), and Hessian (n, 3, 3).
+    """Signed distance of n points to a surface.
 
-    On the surface the Hessian is the shape operator: 1/R in every tangent direction of a sphere.
+    Parameters
+    ----------
+    distance : (n,) positive outside [m].
+    normal : (n, 3) its gradient, the outward unit normal.
+    hessian : (n, 3, 3) [1/m]; on the surface the shape operator: 1/R in every tangent direction of a sphere.
     """
 
     distance: Floats
@@ -33,65 +43,95 @@ class Gap(NamedTuple):
     hessian: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Target(ABC):
-    """A surface F(x) = 0 that ends somewhere.
+    """A surface F(x) = 0 that ends at a base plane, a rim or the edge of its plan.
 
-    The surface itself is continued smoothly past that end: the net is marched there, and a rod is cut where
-    it crosses.
+    The surface is continued smoothly past that end: the net is marched there, and rods are cut where they cross the
+    end. Lengths are in m, z is up.
     """
 
     @property
     @abstractmethod
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Kind of the target, or the name of its file."""
 
     @property
     @abstractmethod
     def size(self) -> float:
-        """Half the largest width of the shell [m]: the length by which gaps are made relative."""
+        """Half the largest width of the shell [m], the length to which gaps are related."""
 
     @property
     def base(self) -> float | None:
-        """z of the base plane [m]; None where the target ends elsewhere."""
+        """z of the base plane [m]; None for a target that does not end at one."""
         return None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences that a user should read about the target itself."""
+        """What the user should know about the target itself, in sentences."""
         return ()
 
     @abstractmethod
     def implicit(self, x: Floats) -> Implicit:
-        """The implicit function at the points (n, 3) [m], also past the end."""
+        """Evaluate the implicit function, also past the end.
+
+        Parameters
+        ----------
+        x : (n, 3) points [m].
+        """
 
     def level(self, x: Floats) -> tuple[Floats, Floats]:
-        """F (n,) and its gradient (n, 3) alone, where second derivatives would cost more."""
+        """F (n,) [m] and its gradient (n, 3) at the points `x` (n, 3) [m], without second derivatives."""
         value, gradient, _ = self.implicit(x)
         return value, gradient
 
     @abstractmethod
-    def height(self, xy: Floats) -> Floats:
-        """z (n,) of the (upper) surface over the plan points (n, 2) [m]; NaN where there is none."""
+    def height_at(self, xy: Floats) -> Floats:
+        """Height of the surface over points of the plan; that of the uppermost part where there are several.
+
+        Parameters
+        ----------
+        xy : (n, 2) points of the plan [m].
+
+        Returns
+        -------
+        (n,) z [m]; NaN where there is no surface.
+        """
 
     @property
     @abstractmethod
     def summit(self) -> tuple[float, float]:
-        """x, y of the highest point inside the end [m]: where the anchor is by default."""
+        """x, y of the highest point inside the end [m], the default of the anchor."""
 
     @abstractmethod
     def parameters(self) -> dict[str, object]:
-        """The target's kind and numbers in SI, as they stand in a case file."""
+        """The target's kind and numbers in SI, as they are written in a case file."""
 
     @abstractmethod
     def margin(self, x: Floats) -> Floats:
-        """(n,) how far inside the end the points (n, 3) are [m]; the shell is cut where this vanishes."""
+        """Distance to the end, positive inside; the shell is cut where it is 0.
 
-    def carries(self, x: Floats) -> Bools:
-        """(n,) whether a net may start at the points (n, 3) of the surface: inside the end, or in an opening."""
+        Parameters
+        ----------
+        x : (n, 3) points on or near the surface [m].
+
+        Returns
+        -------
+        (n,) [m].
+        """
+
+    def covers(self, x: Floats) -> Bools:
+        """Whether a net can start at the points `x` (n, 3) of the surface: inside the end, or in a filled opening."""
         return self.margin(x) > 0
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
-        """Points (n, 3) moved onto the surface along its gradient (near the closest point for small gaps)."""
+        """Move points onto the surface along its gradient, which for small gaps leads close to the closest points.
+
+        Parameters
+        ----------
+        x : (n, 3) points [m].
+        steps : of Newton's method, at most.
+        """
         for _ in range(steps):
             value, gradient = self.level(x)
             x = x - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
@@ -100,19 +140,22 @@ class Target(ABC):
         return x
 
     def on_surface(self, x: Floats) -> Gap:
-        """Normal and shape operator at points (n, 3) that lie on the surface; the distance is taken as 0."""
+        """Normal and shape operator at points `x` (n, 3) [m] that lie on the surface; the distance is taken as 0."""
         _, gradient, hessian = self.implicit(x)
         normal, shape = np.empty_like(gradient), np.empty_like(hessian)
         shape_operators(gradient, hessian, normal, shape)
         return Gap(np.zeros(len(x)), normal, shape)
 
     def closest(self, x: Floats) -> Floats:
-        """Closest points (n, 3) of the continued surface [m]; a local minimum beyond a centre of curvature."""
+        """Closest points (n, 3) [m] of the continued surface to `x` (n, 3) [m].
+
+        For points beyond a centre of curvature it is a local minimum of the distance.
+        """
         return self._closest(x)[0]
 
     def _closest(self, x: Floats) -> tuple[Floats, Floats]:
-        """Closest points (n, 3), and the gradient there but for an error like theirs before the last step."""
-        with np.errstate(all="ignore"):  # NaN, far out where the surface has no continuation
+        """Closest points (n, 3), and the gradient there, as accurate as they were before the last step."""
+        with np.errstate(all="ignore"):  # NaN far away, where the surface has no continuation
             y, gradient = self.retract(x, 1), np.empty_like(x)
             left = np.arange(len(x))
             for _ in range(12):
@@ -127,7 +170,7 @@ class Target(ABC):
             return y, gradient
 
     def _newton_to_closest(self, x: Floats, y: Floats, damping: Floats | None = None) -> tuple[Floats, Bools, Floats]:
-        """One step (n, 3) of Newton from y towards the points closest to x, whether the distance is convex at y, and
+        """One step (n, 3) of Newton from y towards the points closest to x; whether the distance is convex at y, and
         the gradient there."""
         step, convex = np.empty_like(x), np.empty(len(x), dtype=bool)
         at = self.implicit(y)
@@ -135,7 +178,7 @@ class Target(ABC):
         return step, convex, at.gradient
 
     def _descend_to_closest(self, x: Floats) -> Floats:
-        """The same with steps that are damped until they lead closer: for points beyond a centre of curvature."""
+        """Closest points with damped steps that always lead closer: for points beyond a centre of curvature."""
         y = self.retract(x, 20)
         damping = np.ones(len(x))
         for _ in range(60):
@@ -146,55 +189,80 @@ class Target(ABC):
             damping = np.where(nearer, 0.1 * damping, 4.0 * damping + 0.1)
             if np.all(~nearer & (damping > 1e3)):
                 break
-        for _ in range(2):  # comparing distances finds a minimum to half the digits only
+        for _ in range(2):  # a comparison of distances finds a minimum only to half the digits
             step, convex, _ = self._newton_to_closest(x, y)
             near = convex & (np.linalg.norm(step, axis=1) < 1e-3 * self.size)
             y[near] += step[near]
         return y
 
     def distance(self, x: Floats) -> Floats:
-        """Signed distance (n,) of the points (n, 3) to the continued surface, positive outside [m]."""
+        """Signed distance (n,) [m] of the points `x` (n, 3) [m] to the continued surface, positive outside."""
         y, gradient = self._closest(x)
         away = x - y
-        return np.copysign(np.linalg.norm(away, axis=1), np.einsum("ij,ij->i", away, gradient))
+        return np.asarray(np.copysign(np.linalg.norm(away, axis=1), np.einsum("ij,ij->i", away, gradient)))
 
     def gap(self, x: Floats) -> Gap:
-        """As `distance`, with its gradient and Hessian."""
+        """Signed distance of the points `x` (n, 3) [m] to the continued surface, with gradient and Hessian."""
         y = self.closest(x)
         _, n, shape = self.on_surface(y)
         distance = np.einsum("ij,ij->i", x - y, n)
         return Gap(distance, n, offset_shape(shape, distance))
 
     def outside(self, x: Floats) -> Bools:
-        """(n,) points that are outside the body of `contact` as far as signs alone tell; of others it knows."""
+        """(n,) whether signs alone show that the points `x` (n, 3) [m] are outside the body of `contact`.
+
+        A quick test: other points may be outside too.
+        """
         return np.zeros(len(x), dtype=bool)
 
     def contact(self, x: Floats) -> Gap:
-        """Signed distance (n,) to the body that a falling grid meets.
+        """Signed distance to the body on which a grid falls: the surface and a wall below its rim.
+
+        Parameters
+        ----------
+        x : (n, 3) points [m].
 
         Raises
         ------
-        InputError : the target is no such body.
+        InputError : this target has no such body.
         """
         raise InputError(f'a grid cannot fall on a target of kind "{self.name}": use drape method "bound"')
 
     def lift(self, xy: Floats) -> Floats:
-        """Points (n, 3) of the surface over the plan points (n, 2).
+        """Lift points of the plan onto the surface.
+
+        Parameters
+        ----------
+        xy : (n, 2) points of the plan [m].
+
+        Returns
+        -------
+        (n, 3) points of the surface [m].
 
         Raises
         ------
         InputError : there is no surface over a point.
         """
-        z = self.height(xy)
+        z = self.height_at(xy)
         if not np.isfinite(z).all():
             x, y = xy[int(np.argmin(np.isfinite(z)))]
             raise InputError(f"the target has no point over ({x:g}, {y:g}) m: choose one inside its rim")
         return np.column_stack([xy, z])
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
-    """Hessians (n, 3, 3) of the distance at points `distance` (n,) away from a surface: S (I + d S)^-1."""
+    """Hessians of the distance at points away from a surface, S (I + d S)^-1.
+
+    Parameters
+    ----------
+    shape : (n, 3, 3) shape operators S at the closest points [1/m].
+    distance : (n,) signed distances d of the points [m].
+
+    Returns
+    -------
+    (n, 3, 3) [1/m].
+    """
     result, a, adjugate = np.empty_like(shape), np.empty((3, 3)), np.empty((3, 3))
     for m in range(len(shape)):
         for i in range(3):
@@ -212,3 +280,81 @@ def offset_shape(shape: Floats, distance: Floats) -> Floats:
                     total += shape[m, i, k] * adjugate[k, j]
                 result[m, i, j] = total / volume
     return result
+
+
+@njit(cache=True, error_model="numpy")
+def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  # type: ignore[no-untyped-def]
+    """One step of Newton towards the closest points: y + t F'(y) = x, F(y) = 0.
+
+    Across the tangent plane the step leads to F = 0; within it, it solves B step = x - y, B = (1 + damping) + t F''.
+    At a centre of curvature B is singular within the plane, and the step has no part there.
+
+    Parameters
+    ----------
+    x, y : (n, 3) points, and estimates of the points closest to them [m].
+    value, gradient, hessian : F at y, see `Implicit`.
+    damping : (n,) 0 for Newton's step, larger for shorter steps.
+    step : (n, 3) output, the steps [m].
+    convex : (n,) output, whether the distance is convex at y.
+    """
+    for m in range(len(x)):
+        gx, gy, gz = gradient[m]
+        steep = np.sqrt(gx * gx + gy * gy + gz * gz)
+        nx, ny, nz = gx / steep, gy / steep, gz / steep
+        dx, dy, dz = x[m, 0] - y[m, 0], x[m, 1] - y[m, 1], x[m, 2] - y[m, 2]
+        t = (dx * nx + dy * ny + dz * nz) / steep
+        # two tangents [Duff et al. 2017, Building an orthonormal basis, revisited]
+        sign = 1.0 if nz >= 0.0 else -1.0
+        a = -1.0 / (sign + nz)
+        b = nx * ny * a
+        px, py, pz = 1.0 + sign * nx * nx * a, sign * b, -sign * nx
+        qx, qy, qz = b, sign + ny * ny * a, -ny
+        h = hessian[m]
+        hpx, hpy, hpz = _times(h, px, py, pz)
+        hqx, hqy, hqz = _times(h, qx, qy, qz)
+        stiff = 1.0 + damping[m]
+        pp = stiff + t * (px * hpx + py * hpy + pz * hpz)
+        pq = t * (px * hqx + py * hqy + pz * hqz)
+        qq = stiff + t * (qx * hqx + qy * hqy + qz * hqz)
+        out = -value[m] / steep
+        right_p = px * dx + py * dy + pz * dz - out * t * (nx * hpx + ny * hpy + nz * hpz)
+        right_q = qx * dx + qy * dy + qz * dz - out * t * (nx * hqx + ny * hqy + nz * hqz)
+        det = pp * qq - pq * pq
+        convex[m] = det > 0.0 and pp + qq > 0.0
+        along_p, along_q = (qq * right_p - pq * right_q) / det, (pp * right_q - pq * right_p) / det
+        if det == 0.0:
+            along_p = along_q = 0.0
+        step[m, 0] = out * nx + along_p * px + along_q * qx
+        step[m, 1] = out * ny + along_p * py + along_q * qy
+        step[m, 2] = out * nz + along_p * pz + along_q * qz
+
+
+@njit(cache=True)
+def _times(h, x, y, z):  # type: ignore[no-untyped-def]
+    return (
+        h[0, 0] * x + h[0, 1] * y + h[0, 2] * z,
+        h[1, 0] * x + h[1, 1] * y + h[1, 2] * z,
+        h[2, 0] * x + h[2, 1] * y + h[2, 2] * z,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def shape_operators(gradient, hessian, normal, shape):  # type: ignore[no-untyped-def]
+    """Unit normals n, and shape operators P F'' P / |F'| with P = 1 - n n.
+
+    Parameters
+    ----------
+    gradient, hessian : (m, 3), (m, 3, 3) of F at points of the surface.
+    normal, shape : (m, 3), (m, 3, 3) output.
+    """
+    for m in range(len(gradient)):
+        gx, gy, gz = gradient[m]
+        steep = np.sqrt(gx * gx + gy * gy + gz * gz)
+        n, h = normal[m], hessian[m]
+        n[0], n[1], n[2] = gx / steep, gy / steep, gz / steep
+        hx, hy, hz = _times(h, n[0], n[1], n[2])
+        twice = n[0] * hx + n[1] * hy + n[2] * hz
+        hn = hx - 0.5 * twice * n[0], hy - 0.5 * twice * n[1], hz - 0.5 * twice * n[2]
+        for i in range(3):
+            for j in range(3):
+                shape[m, i, j] = (h[i, j] - hn[i] * n[j] - n[i] * hn[j]) / steep

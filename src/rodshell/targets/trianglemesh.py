@@ -1,53 +1,61 @@
-"""A triangle mesh as a surface: welded, oriented alike, in one smooth piece; or one sentence why it is none."""
+"""A triangle mesh as a surface: vertices merged, faces oriented alike, in one smooth piece; unsuitable ones refused."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, degrees, radians
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rodshell.arrays import Bools, Floats, Ints
+from rodshell.arrays import Bools, Floats, Ints, Longs
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, dot
 
-CREASE = 40.0  # degrees between faces: there a smooth piece ends
-WELD = 1e-6  # of the largest extent: vertices this close are one; single precision has 1e-7
+CREASE = 40.0  # degrees between faces: a smooth piece ends there
+WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7
 MOST_FACES = 3_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """Vertices (n, 3) [m] and faces (m, 3) in counter-clockwise order seen from outside. Make one with `sound_mesh`."""
+    """A mesh of triangles; make one with `sound_mesh`.
+
+    Parameters
+    ----------
+    vertices : (n, 3) [m].
+    faces : (m, 3) indices of vertices, in counter-clockwise order seen from outside.
+    """
 
     vertices: Floats
     faces: Ints
 
+    def __repr__(self) -> str:
+        return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
+
     @cached_property
     def doubled(self) -> Floats:
-        """(m, 3) normals of the faces, as long as twice their area [m2]."""
+        """(m, 3) outward normals of the faces, with a length of twice their area [m2]."""
         a, b, c = self.vertices[self.faces.T]
         return cross(b - a, c - a)
 
     @cached_property
     def areas(self) -> Floats:
-        """(m,) [m2]"""
-        return 0.5 * np.linalg.norm(self.doubled, axis=1)
+        """(m,) areas of the faces [m2]."""
+        return np.asarray(0.5 * np.linalg.norm(self.doubled, axis=1))
 
     @cached_property
     def normals(self) -> Floats:
-        """(n, 3) unit normals of the vertices, exact where these lie on a sphere [Max 1999, Weights for normals]."""
+        """(n, 3) unit normals of the vertices, exact on a sphere [Max 1999, Weights for normals]."""
         result = np.zeros_like(self.vertices)
         for k in range(3):
             here, after, before = (self.faces[:, (k + i) % 3] for i in range(3))
             p, q = self.vertices[after] - self.vertices[here], self.vertices[before] - self.vertices[here]
             scale = np.maximum(dot(p, p) * dot(q, q), 1e-300)
             np.add.at(result, here, self.doubled / scale[:, None])
-        return result / np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None]
+        return np.asarray(result / np.maximum(np.linalg.norm(result, axis=1), 1e-300)[:, None])
 
     @cached_property
     def loops(self) -> list[Ints]:
-        """The open boundary: vertices of each closed loop in turn, the surface on the left seen from outside."""
+        """The open boundary: vertices of each closed loop, the longest first; the surface is on their left."""
         a, b = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         count = _edge_counts(a, b, len(self.vertices))
         after = dict(zip(a[count == 1].tolist(), b[count == 1].tolist(), strict=True))
@@ -62,7 +70,7 @@ class TriangleMesh:
         return sorted(loops, key=lambda loop: -self.length(loop))
 
     def section(self, z: float) -> list[Floats]:
-        """Closed polylines (n, 3) in which the plane at height `z` [m] cuts the surface."""
+        """Closed polylines (n, 3) [m] in which the plane at height `z` [m] cuts the surface."""
         above = self.vertices[:, 2] > z
         cut = above[self.faces].any(axis=1) & ~above[self.faces].all(axis=1)
         a, b = self.faces[cut], np.roll(self.faces[cut], -1, axis=1)
@@ -71,39 +79,49 @@ class TriangleMesh:
         first, kind = unique_rows(ends.astype(np.int64))
         low, high = self.vertices[ends[first].T]
         points = low + ((z - low[:, 2]) / (high[:, 2] - low[:, 2]))[:, None] * (high - low)
-        beside: list[list[int]] = [[] for _ in points]
-        for one, other in kind.reshape(-1, 2).tolist():
-            beside[one].append(other)
-            beside[other].append(one)
+        neighbours: list[list[int]] = [[] for _ in points]
+        for first_end, second_end in kind.reshape(-1, 2).tolist():
+            neighbours[first_end].append(second_end)
+            neighbours[second_end].append(first_end)
         loops, left = list[Floats](), set(range(len(points)))
         while left:
             loop = [left.pop()]
-            while onward := [k for k in beside[loop[-1]] if k in left]:
+            while onward := [k for k in neighbours[loop[-1]] if k in left]:
                 loop.append(onward[0])
                 left.remove(onward[0])
             loops.append(points[loop])
         return loops
 
     def length(self, loop: Ints) -> float:
-        """Of a closed loop of vertices [m]."""
+        """Length of a closed loop of vertices [m]."""
         x = self.vertices[loop]
         return float(np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1).sum())
 
     def only(self, faces: Bools) -> "TriangleMesh":
-        """The part that consists of these faces (m,)."""
+        """The part of the mesh that consists of the faces marked in `faces` (m,)."""
         used, renumbered = np.unique(self.faces[faces], return_inverse=True)
         return TriangleMesh(self.vertices[used], renumbered.reshape(-1, 3).astype(np.intp))
 
 
 def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, list[str]]:
-    """The smooth surface that a mesh stands for, facing up; and sentences about what was repaired.
+    """Check and repair a mesh.
 
     Normals may point either way. Creases end the surface: of a half ball with its floor, or of a shell with a
     thickness, the piece that covers most of the plan is taken.
 
+    Parameters
+    ----------
+    vertices : (n, 3) [m].
+    faces : (m, 3) indices of vertices.
+    name : of the mesh, for messages.
+
+    Returns
+    -------
+    The smooth surface that the mesh represents, facing up; and what was repaired, in sentences.
+
     Raises
     ------
-    InputError : empty, not finite, not manifold, in several pieces, one-sided, creased; names the place.
+    InputError : the mesh is empty, not finite, not manifold, one-sided, creased or in several pieces; names the place.
     """
     _require_numbers(vertices, faces, name)
     mesh, repairs = _welded(vertices, faces, name), list[str]()
@@ -112,13 +130,13 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
     if pieces.max() > 0:
         shares = np.sort(np.bincount(pieces, mesh.areas))[::-1] / mesh.areas.sum()
         raise InputError(
-            f"{name} holds {pieces.max() + 1} separate pieces (the largest two have {100 * shares[0]:.0f} and "
+            f"{name} has {pieces.max() + 1} separate pieces (the largest two have {100 * shares[0]:.0f} and "
             f"{100 * shares[1]:.0f} % of the area): keep one, or join them"
         )
     turned = neighbours.turned(len(mesh.faces), name, mesh)
     if turned.any() and not turned.all():
         fewer = min(int(turned.sum()), int((~turned).sum()))
-        repairs.append(f"{fewer} of {len(turned)} faces were turned over to face as the others")
+        repairs.append(f"{fewer} of {len(turned)} faces were reversed to face the same side as the others")
     mesh = TriangleMesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
     if not len(mesh.loops) and _volume(mesh) < 0:
         mesh = TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
@@ -127,40 +145,52 @@ def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, 
 
 def _require_numbers(vertices: Floats, faces: Ints, name: str) -> None:
     if len(faces) == 0 or len(vertices) == 0:
-        raise InputError(f"{name} holds no faces: export the surface as a mesh of triangles")
+        raise InputError(f"{name} has no faces: export the surface as a mesh of triangles")
     if len(faces) > MOST_FACES:
         raise InputError(f"{name} has {len(faces)} faces: reduce it to {MOST_FACES} or fewer")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(f"{name} is damaged: a face names vertex {int(faces.max())} of {len(vertices)}")
+        raise InputError(
+            f"{name} is damaged: a face refers to vertex {int(faces.max() if faces.min() >= 0 else faces.min())} of "
+            f"{len(vertices)}: export it again"
+        )
     bad = ~np.isfinite(vertices[faces]).all(axis=(1, 2))
     if bad.any():
-        raise InputError(f"{name} has {int(bad.sum())} faces with coordinates that are no numbers: export it anew")
+        raise InputError(f"{name} has {int(bad.sum())} faces with coordinates that are not finite: export it again")
     if np.abs(vertices[faces]).max() > 1e100:
-        raise InputError(f"{name} has coordinates up to {np.abs(vertices[faces]).max():.1g}: export it anew")
+        raise InputError(f"{name} has coordinates up to {np.abs(vertices[faces]).max():.1g}: export it again")
 
 
 def _welded(vertices: Floats, faces: Ints, name: str) -> TriangleMesh:
-    """Equal vertices made one; faces without three different vertices, and faces given twice, left out."""
+    """Merge equal vertices; remove faces without three different vertices, and duplicate faces."""
     used = np.unique(faces)
     extent = float(np.ptp(vertices[used], axis=0).max())
     if not extent > 0:
-        raise InputError(f"{name} has no extent: all its vertices coincide")
+        raise InputError(f"{name} has no extent, all its vertices coincide: export it again")
     rounded = np.round((vertices[used] - vertices[used].min(axis=0)) / (WELD * extent)).astype(np.int64)
-    first, place = unique_rows(rounded)
+    first, kind = unique_rows(rounded)
     number = np.zeros(len(vertices), dtype=np.intp)
-    number[used] = place
+    number[used] = kind
     faces = number[faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     once, _ = unique_rows(np.sort(faces, axis=1))
     mesh = TriangleMesh(vertices[used][first], faces[np.sort(once)])
     if len(mesh.faces) == 0 or mesh.areas.sum() < 1e-9 * extent**2:
-        raise InputError(f"{name} has no area: all its faces are degenerate")
+        raise InputError(f"{name} has no area, all its faces are degenerate: export it again")
     return mesh
 
 
-def unique_rows(rows: NDArray[np.int64]) -> tuple[Ints, Ints]:
-    """Of rows (n, k) of integers from 0 on: the first of each kind (m,), and of which kind each is (n,)."""
+def unique_rows(rows: Longs) -> tuple[Ints, Ints]:
+    """Find equal rows.
+
+    Parameters
+    ----------
+    rows : (n, k) integers from 0 on.
+
+    Returns
+    -------
+    Index (m,) of the first row of each kind; and the kind (n,) of each row.
+    """
     key, kinds = np.zeros(len(rows), dtype=np.int64), 1
     for column in rows.T:
         more = int(column.max(initial=0)) + 1
@@ -173,15 +203,22 @@ def unique_rows(rows: NDArray[np.int64]) -> tuple[Ints, Ints]:
 
 
 def _edge_counts(a: Ints, b: Ints, vertices: int) -> Ints:
-    """(k,) how many faces have the edge between a and b."""
+    """Number (k,) of faces at each edge between the vertices a and b."""
     key = np.minimum(a, b).astype(np.int64) * vertices + np.maximum(a, b)
-    _, place, count = np.unique(key, return_inverse=True, return_counts=True)
-    return np.asarray(count[place.reshape(-1)], dtype=np.intp)
+    _, kind, count = np.unique(key, return_inverse=True, return_counts=True)
+    return np.asarray(count[kind.reshape(-1)], dtype=np.intp)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Neighbours:
-    """Pairs of faces (e, 2) that share an edge (e, 2), and whether they run along it in the same direction (e,)."""
+    """Neighbouring faces.
+
+    Parameters
+    ----------
+    faces : (e, 2) pairs of faces that share an edge.
+    edges : (e, 2) vertices of that edge.
+    against : (e,) whether both faces run along it in the same direction, and so face opposite sides.
+    """
 
     faces: Ints
     edges: Ints
@@ -195,7 +232,9 @@ class _Neighbours:
         same = (np.diff(low[order]) == 0) & (np.diff(high[order]) == 0)
         if (same[:-1] & same[1:]).any():
             k = order[np.flatnonzero(same[:-1] & same[1:])[0]]
-            raise InputError(f"{name} is not manifold: three faces or more share the edge near {place(mesh, a[k])}")
+            raise InputError(
+                f"{name} is not manifold: three faces or more share the edge near {place(mesh, a[k])}: remove one"
+            )
         first, second = order[:-1][same], order[1:][same]
         rim = np.ones(len(a), dtype=bool)
         rim[first] = rim[second] = False
@@ -203,13 +242,12 @@ class _Neighbours:
         if (ends > 2).any():
             where = place(mesh, int(np.argmax(ends)))
             raise InputError(
-                f"{name} is not manifold: two parts of it touch in the single point {where}: add or leave out a face "
-                "there"
+                f"{name} is not manifold: two parts of it touch in the single point {where}: add or remove a face there"
             )
         return _Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
 
     def pieces(self, keep: Bools, faces: int) -> Ints:
-        """(m,) number of the piece that each face belongs to, when only the edges `keep` join faces."""
+        """Number (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
 
@@ -217,7 +255,7 @@ class _Neighbours:
         return np.asarray(connected_components(coo_matrix((np.ones(len(i)), (i, j)), (faces, faces)), False)[1])
 
     def turned(self, faces: int, name: str, mesh: TriangleMesh) -> Bools:
-        """(m,) faces that run against the first one."""
+        """(m,) which faces are oriented against the first one."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import breadth_first_order
 
@@ -235,7 +273,7 @@ class _Neighbours:
         wrong = (result[i] ^ result[j]) != self.against
         if wrong.any():
             where = place(mesh, int(self.edges[np.argmax(wrong), 0]))
-            raise InputError(f"{name} has only one side, as a Moebius strip has (seen near {where}): cut it")
+            raise InputError(f"{name} has only one side, as a Moebius strip has (found near {where}): cut it")
         return result
 
 
@@ -278,5 +316,6 @@ def _smooth_piece(
 
 
 def place(mesh: TriangleMesh, vertex: int) -> str:
+    """Coordinates of a vertex as text."""
     x, y, z = mesh.vertices[vertex]
     return f"({x:.4g}, {y:.4g}, {z:.4g}) m"

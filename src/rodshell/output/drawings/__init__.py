@@ -1,5 +1,7 @@
 """The drawing set: each drawing at 1:1 for DXF and SVG, and all of them on sheets of paper for the PDF."""
 
+from functools import cache
+
 from rodshell.output.drawing import TEXT, Drawing
 from rodshell.output.drawings.flat import FlatPlan, flat_drawing, per_sheet, strips_drawing
 from rodshell.output.drawings.sheets import (
@@ -38,13 +40,15 @@ def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[fl
     results = archive.results
     paper = PAPERS[results.drawings.paper if results.drawings else "A3"]
 
+    @cache  # the same text sizes are tried for one sheet and for its parts
     def flat(text: float) -> Drawing:
         return flat_drawing(plan, text)
 
     whole = fitted(flat, paper)
     sheets = [whole, *parts(flat, paper, whole, true_size=True)]
     sheets += _strips(plan, paper)
-    for name, make in _of_the_shell(archive, plan).items():
+    for name, compose in _of_the_shell(archive, plan).items():
+        make = cache(compose)
         whole = fitted(make, paper)
         sheets += [whole, *parts(make, paper, whole)]
         if name == "supports":

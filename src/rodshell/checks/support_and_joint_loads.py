@@ -1,0 +1,207 @@
+"""What supports and joints carry: reactions and their balance; the forces and moments between crossing rods.
+
+*Reactions.* The gradient of the elastic energy at a held end is the force of its support. A clamp acts on the ghost
+node past the end too: its force there is the clamp's moment about the end. No part of this sees the balance, so the
+sums check it: they vanish only if every free node is in equilibrium.
+
+*Joint loads.* The force on a rod at a joint is what balances the rod's own stretch, bending and twist there; the moment
+about the joint is that of the joint's energy: of the forces on the nodes next to it and of the torques on the edges'
+twist angles. Both are resultants, whatever the joint is made of.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.formfinding.layers import joint_normals, joint_tangents
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.joints.crossings import RodNodes
+from rodshell.joints.linkers import LinkerBend
+from rodshell.model import Shell
+from rodshell.rods.elements import Elements
+from rodshell.solve.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """Forces and moments of the supports on both ends of each rod in turn.
+
+    Parameters
+    ----------
+    points : (2m, 3) where they act [m].
+    forces : (2m, 3) [N].
+    moments : (2m, 3), each about its own point [N m]; zero where the ends are pinned.
+    """
+
+    points: Floats
+    forces: Floats
+    moments: Floats
+
+    @property
+    def sum_of_forces(self) -> Floats:
+        """(3,) [N]"""
+        return np.asarray(self.forces.sum(axis=0))
+
+    @property
+    def about_middle(self) -> Floats:
+        """(2m, 3) moments about the middle of all points [N m]."""
+        return np.asarray(np.cross(self.points - self.points.mean(axis=0), self.forces) + self.moments)
+
+    @property
+    def sum_of_moments(self) -> Floats:
+        """(3,) about the middle of all points [N m]."""
+        return np.asarray(self.about_middle.sum(axis=0))
+
+    @property
+    def force_imbalance(self) -> float:
+        """Size of the sum of forces over the largest force."""
+        return _share(self.sum_of_forces, self.forces)
+
+    @property
+    def moment_imbalance(self) -> float:
+        """Size of the sum of moments over the largest moment about the middle."""
+        return _share(self.sum_of_moments, self.about_middle)
+
+
+def reactions(shell: Shell, found: Equilibrium) -> Reactions:
+    """Reactions of a shell without loads whose ends are held.
+
+    Parameters
+    ----------
+    shell : with its source frames at the equilibrium.
+    found : the equilibrium; its gradient at the held ends is what the supports exert.
+    """
+    state, gradient = found.state, found.gradient
+    points = state[shell.ends]
+    forces, moments = gradient[shell.ends], np.zeros_like(points)
+    if len(shell.ghosts):
+        at_ghosts = gradient[shell.ghosts]
+        forces = forces + at_ghosts
+        moments = np.cross(state[shell.ghosts] - points, at_ghosts)
+    return Reactions(points, forces, moments)
+
+
+def _share(total: Floats, parts: Floats) -> float:
+    largest = float(np.linalg.norm(parts, axis=1).max(initial=0.0))
+    return float(np.linalg.norm(total)) / largest if largest > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class JointLoads:
+    """Of each of the grid's c crossings, in its order.
+
+    Parameters
+    ----------
+    normals : (c, 3) unit normals of the two rods, on the side that was up in the flat grid.
+    forces : (c, 2, 3) on its first and its second rod [N]. Where two rods meet they are opposite; where more meet,
+        each is what all the others do together.
+    moments : (c, 3) on the second rod about the joint [N m].
+    flat_angles, angles : (c,) from the first rod's direction to the second's about the normal, flat and now [rad].
+    """
+
+    normals: Floats
+    forces: Floats
+    moments: Floats
+    flat_angles: Floats
+    angles: Floats
+
+    @property
+    def scissor(self) -> Floats:
+        """(c,) by how much the angle between the two rods has grown, whichever of them is the first [rad]."""
+        return np.asarray(np.abs(self.angles) - np.abs(self.flat_angles))
+
+    @property
+    def normal_forces(self) -> Floats:
+        """(c,) by which the second rod is pushed along the normal [N]."""
+        return np.asarray(dot(self.forces[:, 1], self.normals))
+
+    @property
+    def shear_moments(self) -> Floats:
+        """(c,) about the normal: against scissoring [N m]."""
+        return np.asarray(dot(self.moments, self.normals))
+
+    @property
+    def out_of_plane_moments(self) -> Floats:
+        """(c,) size of the moment about the axes in the joint's plane [N m]."""
+        return np.asarray(np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1))
+
+
+def joint_loads(shell: Shell, state: Floats) -> JointLoads:
+    """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric."""
+    mesh, positions = shell.mesh, shell.positions(state)
+    met = RodNodes(mesh, shell.node_blocks, shell.first_angle).at_crossings
+    normals = joint_normals(mesh, positions)
+    between, moments = _between(shell, state, met)
+    forces = _on_places(shell, state)[met] + between
+    return JointLoads(
+        normals, forces, moments, _angles(joint_tangents(mesh, mesh.flat), joint_normals(mesh, mesh.flat)),
+        _angles(joint_tangents(mesh, positions), normals),
+    )  # fmt: skip
+
+
+def _angles(tangents: Floats, normals: Floats) -> Floats:
+    a, b = unit(tangents[:, 0]), unit(tangents[:, 1])
+    return np.arctan2(dot(normals, cross(a, b)), dot(a, b))
+
+
+def _rows(elements: Elements, state: Floats) -> Floats:
+    """(m, k, 3) gradient of each element by its own blocks."""
+    m, k = elements.blocks.shape
+    alone = replace(elements, blocks=np.arange(m * k).reshape(m, k))  # type: ignore[type-var]
+    gradient = np.zeros((m * k, 3))
+    alone.evaluate(np.ascontiguousarray(state[elements.blocks].reshape(-1, 3)), gradient)
+    return gradient.reshape(m, k, 3)
+
+
+def _on_places(shell: Shell, state: Floats) -> Floats:
+    """(k, 3) gradient of each rod's own energy by each entry of `rod_nodes` [N]."""
+    mesh = shell.mesh
+    rods = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+    key = rods * len(shell.like) + shell.node_blocks
+    order = np.argsort(key)
+    result = np.zeros((len(key), 3))
+    clamps = np.repeat(np.arange(len(mesh.rod_start)), 2)
+    for element in (shell.stretch, *shell.within):
+        if isinstance(element, LinkerBend):
+            continue
+        of_rods = mesh.edge_rods if element is shell.stretch else mesh.bend_rods
+        of_rods = np.append(of_rods, clamps[: len(element.blocks) - len(of_rods)])
+        rows = _rows(element, state)
+        for column in range(element.blocks.shape[1]):
+            blocks = element.blocks[:, column]
+            nodes = blocks < shell.node_count
+            at = order[np.searchsorted(key[order], (of_rods * len(shell.like) + blocks)[nodes])]
+            np.add.at(result, at, rows[nodes, column])
+    return result
+
+
+def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:
+    """Of the joints' energies: minus their forces on the nodes next to each joint, by crossing and rod (c, 2, 3) [N],
+    and their moment about the joint on the second rod (c, 3) [N m]."""
+    mesh, first = shell.mesh, shell.first_angle
+    count = len(mesh.grid.rods)
+    pair = np.sort(mesh.grid.crossings.rods, axis=1) @ [count, 1]
+    order = np.argsort(pair)
+    forces, moments = np.zeros((len(pair), 2, 3)), np.zeros((len(pair), 3))
+    elements = [element for element in shell.elements if isinstance(element, LinkerBend) or element in shell.between]
+    for element in elements:
+        angles = [c for c in range(element.blocks.shape[1]) if (element.blocks[:, c] >= first).all()]
+        if not angles or len(element.blocks) == 0:
+            continue
+        rows, edges = _rows(element, state), element.blocks[:, angles] - first
+        rods = mesh.edge_rods[edges]
+        extreme = np.column_stack([rods.min(axis=1), rods.max(axis=1)])
+        crossing = order[np.searchsorted(pair[order], extreme @ [count, 1])]
+        for column, edge, rod in zip(angles, edges.T, rods.T, strict=True):
+            side = (mesh.grid.crossings.rods[crossing, 1] == rod).astype(np.intp)
+            joint = shell.node_blocks[met[crossing, side]]
+            ends = shell.stretch.blocks[edge]
+            outer = np.where(ends[:, 0] == joint, ends[:, 1], ends[:, 0])
+            at = (element.blocks == outer[:, None]).argmax(axis=1)
+            pull = rows[np.arange(len(rows)), at]
+            tangent = unit(state[ends[:, 1]] - state[ends[:, 0]])
+            torque = np.cross(pull, state[outer] - state[joint]) - rows[:, column, :1] * tangent
+            np.subtract.at(forces, (crossing, side), pull)
+            np.add.at(moments, crossing, np.where(side[:, None] == 1, torque, 0.0))
+    return forces, moments

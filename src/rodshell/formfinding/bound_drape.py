@@ -1,0 +1,264 @@
+"""The bound drape: march the net, then bind the elastic grid to the target (docs/theory.md, The bound drape).
+
+Every node slides on the target without friction, rods do not stretch, and bending alone decides what the net
+leaves open: the shape of each span between its joints. No load and no stretch stiffness enter, so that the
+result does not depend on scale or material. The axes and the anchor are held, as the net holds them.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import degrees
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.contact.static import BoundToTarget
+from rodshell.formfinding.draped import Draped, DrapeFigures
+from rodshell.formfinding.end_correction import corrected_ends
+from rodshell.formfinding.layers import thickness_warnings
+from rodshell.formfinding.methods import Bound
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.section_limits import strong_bending
+from rodshell.geometry.vectors import dot
+from rodshell.joints import Joint
+from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
+from rodshell.layout.flatgrid import whole_rods
+from rodshell.layout.mesh import nodes_along
+from rodshell.model import Shell
+from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.nets.apron import with_apron
+from rodshell.rods.section import GivenSection, Rod
+from rodshell.rods.stretch import Stretch
+from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
+from rodshell.solve.path import going_on
+from rodshell.solve.problem import Problem
+from rodshell.solve.report import SolveReport
+from rodshell.targets import Target
+
+CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
+WARN_ANGLE = 25.0  # degrees
+MOST_SOLVES = 3  # of a drape in layers; the second leaves strains of 1e-8
+PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces settle by 0.05 a step at 200 rods
+
+
+def bound_drape(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    anchor: tuple[float, float] | None = None,
+    warm_start: Draped | None = None,
+    joint: Joint | None = None,
+    progress: Progress = silent,
+) -> Draped:
+    """Drape a layout over a target by its net; see `drape`.
+
+    Parameters
+    ----------
+    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+    warm_start : a grid draped before, near whose net the new one is looked for.
+    joint : whose eccentricity lays the rods in two layers, and which may hold rods against rolling.
+
+    Raises
+    ------
+    NetLimitError : no net covers the target from this anchor and heading.
+    """
+    progress("net", "marching", 0.0)
+    eccentricity = joint.eccentricity if joint else 0.0
+    near = warm_start.net if warm_start else None
+    net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity)
+    grid = with_apron(net, CLEARANCE * layout.edge)
+    cuts = [list[FlatRod]() for _ in grid.rods]
+    for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
+        cuts[whole].append(piece)
+    mesh = mesh_grid(grid, layout.edge, marks=[[s for cut in pieces for s in (cut.start, cut.end)] for pieces in cuts])
+    start = np.empty((mesh.node_count, 3))
+    for k, line in enumerate(grid.rods):
+        start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
+    rod_within = _within_surface(rod)
+    shell, corrected = Shell.of(mesh, rod_within), corrected_ends(target, mesh, start)
+    problem = Problem(
+        elements=shell.elements,
+        stretch=_penalty(shell.stretch, rod_within, target),
+        constraint=_bind(target, mesh, start),
+        length=target.size,
+        inextensible=True,
+        flat_coordinates=shell.flat_coordinates,
+    )
+    found = _in_layers(
+        problem, target, mesh, corrected, eccentricity,
+        progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
+    )  # fmt: skip
+    on_target = _nodes_on_target(mesh, cuts)
+    pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
+    warnings = [*target.warnings, *net.warnings]
+    touching = np.zeros(mesh.node_count, dtype=bool)
+    touching[on_target] = True
+    edges, bends = (np.asarray(touching[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
+    strong = strong_bending(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
+    if strong is not None:
+        warnings += strong.warnings
+    if not eccentricity:
+        warnings += thickness_warnings(target, mesh, found.state, edges, rod, min(layout.spacing))
+    if found.report.negative_modes:
+        warnings.append(
+            f"the drape is not a minimum of the bound grid's energy ({found.report.negative_modes} negative modes): "
+            "use a smaller spacing"
+        )
+    if not (found.report.stable or found.report.reason):
+        warnings += _tightest_bend(target, layout, found.state[on_target])
+    if degrees(net.min_angle) < WARN_ANGLE:
+        x, y, z = net.min_angle_at
+        warnings.append(
+            f"the families meet at only {degrees(net.min_angle):.1f} degrees near ({x:.4g}, {y:.4g}, {z:.4g}) m: "
+            "the joints there nearly close; another anchor or heading, a smaller part or a seam may open them"
+        )
+    figures = DrapeFigures(
+        max_gap=float(np.abs(target.distance(found.state[on_target])).max()),
+        contact_pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
+        min_angle=net.min_angle,
+        min_angle_at=net.min_angle_at,
+        net_deviation=_net_deviation(target, mesh, cuts, found.state),
+        strong_bending=strong,
+    )
+    return Draped(
+        method=Bound(),
+        target=target,
+        layout=layout,
+        rod=rod,
+        anchor=anchor,
+        eccentricity=eccentricity,
+        mesh=mesh,
+        positions=found.state,
+        rods=tuple(line for line in net.rods if not line.virtual),
+        levels=(found.report,),
+        figures=figures,
+        net=net,
+        warnings=tuple(warnings),
+    )
+
+
+def _within_surface(rod: Rod) -> Rod:
+    """The rod with EI2 in all directions.
+
+    Out of the surface the rods bend as it bends; free is only the bend within it, towards m2, the first director being
+    the normal. So the twist angles are left out, as for a round rod.
+    """
+    within = rod.bend_stiffnesses[1]
+    return Rod(GivenSection(rod.stretch_stiffness, within, within, rod.twist_stiffness))
+
+
+def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
+    """Edges whose stiffness only has to outweigh bending, which grows with the square of the size over the edge."""
+    weight = max(LEAST_PENALTY, PENALTY * (target.size / float(np.median(stretch.rest_lengths))) ** 2)
+    stiffness = weight * rod.bend_stiffness / target.size**2
+    return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
+
+
+def _in_layers(
+    problem: Problem,
+    target: Target,
+    mesh: GridMesh,
+    start: Floats,
+    eccentricity: float,
+    progress: Callable[[int, float], None],
+) -> Equilibrium:
+    """Equilibrium on the target of rods that keep their lengths in their own layers.
+
+    Solved again where sideways motion turned edges towards another curvature, which changes their lengths there.
+    """
+    state, forces, reports = start, np.zeros(len(mesh.edges)), list[SolveReport]()
+    while True:
+        if eccentricity:
+            lengths = _between_layers(target, mesh, state, eccentricity)
+            problem = replace(problem, stretch=replace(problem.stretch, rest_lengths=lengths))
+        found = find_equilibrium(problem, state, forces, progress=progress)
+        state, forces = found.state, found.forces
+        reports.append(found.report)
+        strain = 0.0
+        if eccentricity:
+            strain = float(np.abs(_between_layers(target, mesh, state, eccentricity) / lengths - 1.0).max())
+        if strain < STRAIN_TOLERANCE or not found.report.converged or len(reports) == MOST_SOLVES:
+            return replace(found, report=found.report.after(*reports[:-1]))
+        problem = going_on(problem, found)
+
+
+def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentricity: float) -> Floats:
+    """(e,) rest lengths on the target of edges whose rods lie in two layers, near `positions` (n, 3) [m].
+
+    By how much the layers' chords are longer or shorter depends on the target's curvature along them.
+    """
+    above = 0.5 * eccentricity * np.array([1.0 if rod.family == "v" else -1.0 for rod in mesh.grid.rods])
+    normal, (a, b) = target.on_surface(positions).normal, mesh.edges.T
+    chord = positions[b] - positions[a]
+    in_layer = chord + above[mesh.edge_rods, None] * (normal[b] - normal[a])
+    return np.asarray(mesh.edge_lengths * np.sqrt(dot(chord, chord) / dot(in_layer, in_layer)))
+
+
+def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
+    """All nodes on the target; those of the two axes are held on their lines, and the anchor at its point."""
+    count = np.full(mesh.node_count, 2, dtype=np.intp)
+    guides = np.tile([1.0, 0.0, 0.0], (mesh.node_count, 1))
+    guides[np.abs(target.on_surface(start).normal[:, 0]) > 0.7] = [0.0, 1.0, 0.0]
+    for k, line in enumerate(mesh.grid.rods):
+        if line.offset == 0.0:
+            nodes = mesh.nodes_of(k)
+            count[nodes] -= 1
+            guides[nodes] = np.gradient(start[nodes], axis=0)
+    return BoundToTarget(target, count, guides)
+
+
+def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> Ints:
+    """Nodes between the ends of the rods: all but the apron's."""
+    whole = np.repeat(np.arange(len(cuts)), [len(pieces) for pieces in cuts])
+    _, _, nodes = nodes_along(mesh, [cut for pieces in cuts for cut in pieces], whole)
+    between = np.zeros(mesh.node_count, dtype=bool)
+    between[nodes] = True
+    return np.flatnonzero(between)
+
+
+def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[str]:
+    """A warning where the target curves too sharply for the spacing, which stops a bound drape that has a net."""
+    curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
+    k = int(np.argmax(curvature))
+    radius, (x, y, z) = 1.0 / curvature[k], np.where(np.abs(points[k]) < 1e-6 * target.size, 0.0, points[k])
+    if radius > 2 * max(layout.spacing):
+        return []
+    return [
+        f"near ({x:.4g}, {y:.4g}, {z:.4g}) m the target's radius of curvature is {radius:.3g} m, the spacing "
+        f"{max(layout.spacing):.3g} m: use a spacing below half of that radius"
+    ]
+
+
+def _net_deviation(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
+    """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
+    windows, offsets = list[Ints](), list[Floats]()
+    for k, pieces in enumerate(cuts):
+        s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
+        for end in (end for cut in pieces if not cut.virtual for end in (cut.start, cut.end)):
+            first = min(max(int(np.searchsorted(s, end)) - 1, 0), max(len(s) - 3, 0))
+            three = np.minimum(first + np.arange(3), len(s) - 1)
+            windows.append(nodes[three])
+            offsets.append(s[three] - end)
+    x = np.array(offsets).T
+    f = target.margin(positions[np.concatenate(windows)]).reshape(-1, 3).T
+    slope = (f[1] - f[0]) / (x[1] - x[0])  # Newton's parabola through three nodes
+    bend = np.zeros_like(slope)
+    bent = x[2] > x[1]
+    bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
+    ahead = (f[0] - x[0] * slope + x[0] * x[1] * bend) / ((x[0] + x[1]) * bend - slope)
+    return np.asarray(ahead.reshape(-1, 2) * [-1.0, 1.0])
+
+
+def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
+    """Key figures of a net for the result file: its error [m], and its smallest angle and where that is [m].
+
+    Parameters
+    ----------
+    net : a marched net.
+    """
+    return {
+        "error_estimate": net.error_estimate,
+        "min_angle_deg": degrees(net.min_angle),
+        "min_angle_at": list(net.min_angle_at),
+    }

@@ -1,0 +1,264 @@
+"""The fall drape, which is the paper's: the grid falls on the target in time and comes to rest there [HQK section 3].
+
+Implicit Euler, the rods tied by the coupling, contact by modified masses (`contact.modified_mass`). Nothing is
+anchored: without friction the draped state is unstable sideways, and it is reached because the fall is symmetric, or
+because touching nodes that are stopped at each step creep. How fast it would slide off is part of the result.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.contact.modified_mass import ModifiedMass, Touching
+from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
+from rodshell.formfinding.draped import Draped, DrapeFigures, smallest_joint_angle
+from rodshell.formfinding.initial_placement import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
+from rodshell.formfinding.layers import middle_surface
+from rodshell.formfinding.methods import Fall
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
+from rodshell.geometry.vectors import dot
+from rodshell.joints import Joint
+from rodshell.layout import GridLayout, mesh_grid
+from rodshell.model import Shell
+from rodshell.rods.section import Rod
+from rodshell.solve.forces import Damping, GravityForce
+from rodshell.solve.implicit_euler import ContactEuler, Motion
+from rodshell.solve.linear_stability import NO_NODES, REMEDY, ExplicitTies, step_limit
+from rodshell.solve.newton_matrix import narrow_or_dissected
+from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.simulate import End, Sample, TimeSeries, simulate
+from rodshell.targets import Target
+
+STILL = 1e-7  # kinetic energy, of weight times size
+BALANCED = 1e-3  # out-of-balance force on a node, of the weight of the heaviest
+USUAL_STEP = 0.01  # [s] on a target of 0.2 m; times go with the square root of lengths
+USUAL_DURATION = 6.0
+USUAL_SIZE = 0.2  # [m]
+OF_LIMIT = 0.9  # share of the stability limit of explicit ties, whatever touches, that is taken as time step
+UNSTABLE = -1e-3  # [1/s2]: the free turn about the vertical has 0 up to round-off
+CHECKS = 10  # steps between two checks whether it is at rest
+LIMITS = 4  # such checks between two of the step limit
+
+
+def fall_drape(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    fall: Fall,
+    *,
+    anchor: tuple[float, float] | None = None,
+    joint: Joint | None = None,
+    progress: Progress = silent,
+) -> Draped:
+    """Let a layout fall on a target in time; see `drape`.
+
+    Parameters
+    ----------
+    fall : height, time stepping, coupling, impacts, friction and drag.
+    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
+
+    Raises
+    ------
+    InputError : the anchor lies outside the target.
+    StabilityError : the time step is beyond the stability limit of explicit ties, at the start or after landing.
+    ConvergenceError : the first step fails, however small. A later one ends the fall, which is then not at rest.
+    """
+    top = anchor_point(target, anchor)
+    grid = initial_grid(target, layout, anchor)
+    mesh = mesh_grid(grid, layout.edge, marks=middle_marks(grid))
+    shell = Shell.of(mesh, rod, joint=joint, coupling=fall.coupling)
+    simulation = _FallSimulation(target, shell, fall, progress)
+    series = simulation.run(placed_over(shell.mesh, layout, top + [0.0, 0.0, fall.height]))
+    rest, report = simulation.outcome(series)
+    assert series.last is not None
+    positions = middle_surface(mesh, shell.mesh, shell.positions(series.last.state))
+    if not report.reason and lost_contact(mesh, positions, layout, top, target):
+        report = replace(report, status=Status.LOST_CONTACT)
+    angle, where = smallest_joint_angle(mesh, positions, target.margin(positions) > 0)
+    figures = DrapeFigures(
+        max_gap=float(max(0.0, -target.contact(positions).distance.min())),
+        contact_pulls=simulation.contact_pulls(series.last),
+        min_angle=angle,
+        min_angle_at=where,
+    )
+    return Draped(
+        method=fall,
+        target=target,
+        layout=layout,
+        rod=rod,
+        anchor=anchor,
+        eccentricity=joint.eccentricity if joint else 0.0,
+        mesh=mesh,
+        positions=positions,
+        rods=grid.rods,
+        levels=(report,),
+        figures=figures,
+        rest=rest,
+        warnings=_warnings(rest, series, simulation),
+    )
+
+
+class _FallSimulation:
+    """A fall, with the checks that are made during it and at its end."""
+
+    def __init__(self, target: Target, shell: Shell, fall: Fall, progress: Progress) -> None:
+        massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # also the linkers' nodes, which fall and land
+        every = len(massive) == len(shell.like)  # a slice is faster
+        pull = GravityForce(slice(None) if every else massive, (0.0, 0.0, -fall.acceleration))
+        self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
+        self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
+        self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)
+        self._heaviest = float(-self.load[:, 2].min())
+        self._weight = float(-self.load[:, 2].sum())
+        self._law = ModifiedMass(target, massive, fall.stopped, fall.friction)
+        self.stepper = ContactEuler(self._law, narrow_or_dissected(shell.flat_coordinates))
+        self._ties: ExplicitTies | None = None
+        self._slowness = float(np.sqrt(target.size / USUAL_SIZE))
+        self._out_of_time = ""
+        self._energies = list[tuple[float, float]]()  # times [s] and kinetic energies [J]
+
+    def run(self, positions: Floats) -> TimeSeries:
+        """The fall from these positions (n, 3) of the shell's nodes [m]."""
+        fall = self.fall
+        normals = np.tile([0.0, 0.0, 1.0], (len(positions), 1)) if self.shell.angles else None
+        state = self.shell.state(positions, normals=normals)
+        step = fall.time_step or min(USUAL_STEP * self._slowness, self._safe_step(state))
+        duration = fall.duration or USUAL_DURATION * self._slowness
+        self._step, self._duration = step, duration
+        never = int(np.ceil(duration / step)) + 1
+        try:
+            return simulate(
+                self.motion,
+                state,
+                until=duration,
+                step=step,
+                every=fall.every if fall.stream else never,
+                stream=fall.stream,
+                stepper=self.stepper,
+                stop=self._stop_check(),
+            )
+        except ConvergenceError as error:
+            if self.stepper.last is None:  # not one step was taken
+                raise
+            return error.report  # type: ignore[return-value]
+
+    def _safe_step(self, state: Floats) -> float:
+        """A step [s] below the stability limit of explicit ties, whatever touches: without rods, all nodes stopped.
+
+        Rods under compression, whose stiffness is negative, can lower the limit temporarily: the margin allows for it.
+        """
+        alone = replace(self.motion, elements=())
+        return OF_LIMIT * step_limit(alone, state, stopped=self._stopped(np.arange(len(state))))
+
+    def _stopped(self, touching: Ints) -> Ints:
+        """The touching nodes that lose their whole velocity at each step."""
+        return touching if self._law.stops_all else NO_NODES
+
+    def _refuse_unstable(self, moment: Sample) -> None:
+        """Raise StabilityError where the step is beyond the limit of explicit ties with the nodes that touch now."""
+        free = self.touching.freedom(moment.state)
+        if self._ties is None:
+            self._ties = ExplicitTies(moment.motion, free)
+        self._ties.look(moment.motion, moment.state, free, self._stopped(self.touching.nodes))
+        if self._ties.grows(self._step):
+            raise StabilityError(
+                f"explicit ties are unstable at a time step of {self._step:.4g} s once the grid has landed: at t = "
+                f"{moment.time:.3g} s, {len(self.touching.nodes)} nodes touching, the limit is "
+                f"{self._ties.limit():.4g} s: {REMEDY}"
+            )
+
+    def _stop_check(self) -> Callable[[Sample], bool]:
+        """Called after each step: reports progress, and from time to time checks whether the grid is at rest."""
+        count = 0
+
+        def stop(moment: Sample) -> bool:
+            nonlocal count
+            count += 1
+            if count % CHECKS:
+                return False
+            if self.fall.time_step and moment.motion.explicit and count % (LIMITS * CHECKS) == 0:
+                self._refuse_unstable(moment)
+            energy, force = self.activity(moment)
+            self._energies.append((moment.time, energy))
+            where = f"falling, {100 * moment.time / self._duration:.0f} % of {self._duration:.3g} s"
+            try:
+                self._progress("drape", f"{where}, kinetic energy {energy:.1e} J", force)
+            except OutOfTimeError as error:
+                self._out_of_time = str(error)
+                return True
+            return self.fall.settle and self.rests(energy, force)
+
+        return stop
+
+    @property
+    def touching(self) -> Touching:
+        assert self.stepper.last is not None
+        return self.stepper.last  # type: ignore[return-value]
+
+    def activity(self, moment: Sample) -> tuple[float, float]:
+        """Kinetic energy [J] and largest out-of-balance force [N]."""
+        energy = moment.motion.kinetic_energy(moment.velocity)
+        return energy, unbalanced_force(moment.motion, moment.state, self.load, self.touching)
+
+    def rests(self, energy: float, force: float) -> bool:
+        """Whether this kinetic energy [J] and out-of-balance force [N] count as rest."""
+        return energy < STILL * self._weight * self.target.size and force < BALANCED * self._heaviest
+
+    def advice(self, rest: Rest) -> str:
+        """A drag and a duration that would bring the grid to rest, from the kinetic energy and its decay."""
+        usual, still = USUAL_DURATION * self._slowness, STILL * self._weight * self.target.size
+        force = rest.force_residual / (BALANCED * self._heaviest)
+        return rest_advice(self._energies, still, force, usual, self.fall.drag)
+
+    def contact_pulls(self, last: Sample) -> int:
+        """Number of touching nodes that the target would have to pull."""
+        push = out_of_balance(last.motion, last.state, self.load)[self.touching.nodes]
+        return int(np.count_nonzero(dot(push, self.touching.normals) < 0))
+
+    def outcome(self, series: TimeSeries) -> tuple[Rest, SolveReport]:
+        """How the fall ended."""
+        last, done = series.last, series.report
+        assert last is not None
+        assert done is not None
+        energy, force = self.activity(last)
+        resting = self.rests(energy, force)
+        growth = lowest_modes(last.motion, last.state, self.load, self.touching, self.target) if resting else ()
+        gap = joint_gap(self.shell, last.state)
+        rest = Rest(resting, last.time, energy, force, gap, growth, done.steps, done.refused_steps)
+        strain = float(np.abs(self.shell.stretch.strains(last.state)).max())
+        status = Status.OUT_OF_TIME if self._out_of_time else Status.MOVING
+        report = SolveReport(
+            Status.CONVERGED if resting else status,
+            self.shell.freedom().size,
+            done.iterations,
+            done.factorizations,
+            done.seconds,
+            force,
+            strain,
+            sum(s < UNSTABLE for s in growth),
+            "" if resting else self._out_of_time,
+        )
+        return rest, report
+
+
+def _warnings(rest: Rest, series: TimeSeries, simulation: _FallSimulation) -> tuple[str, ...]:
+    if series.report is not None and series.report.end is End.STALLED:
+        return (
+            f"the fall ended at t = {rest.time:.4g} s, where no time step converged, however small "
+            f"({series.report.reason}); use a shorter edge, or softer or shared joints",
+        )
+    if not rest.at_rest:
+        return (
+            f"the grid is NOT AT REST after {rest.time:.3g} s: kinetic energy {rest.kinetic_energy:.1e} J, "
+            f"out-of-balance force {rest.force_residual:.1e} N; give it {simulation.advice(rest)}",
+        )
+    if rest.fastest_growth:
+        count = sum(s < UNSTABLE for s in rest.growth)
+        return (
+            f"at rest, but without friction unstable sideways: {count} modes or more grow, the fastest as "
+            f"exp({rest.fastest_growth:.2g} t / s); it was reached by symmetry, or by the stopping of touching nodes",
+        )
+    return ()

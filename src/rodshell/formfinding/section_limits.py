@@ -1,0 +1,153 @@
+"""What a rod's section allows: targets too flat to bend it, nets that bend it about its strong axis, and its rotation.
+
+A lath whose joints keep it from rolling bends about its strong axis, too: lying flat by the geodesic curvature of its
+line, on edge by the surface's. Like any strip it then buckles sideways between two joints where that moment exceeds
+pi/a sqrt(EI GJ), EI being the smaller stiffness and a the joints' distance [Timoshenko and Gere, Theory of Elastic
+Stability, chapter 6, pure bending of a strip]. Where joints let it roll, it turns to its weak axis when it is released.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+
+from rodshell.arrays import Bools, Floats
+from rodshell.formfinding.layers import node_normals
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.layout import GridMesh
+from rodshell.model import Shell
+from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.section import Rod
+from rodshell.targets import Target
+from rodshell.units import length_text
+
+PLANE = 1e-6  # of the extent: what files of single precision leave of a plane
+BEYOND = 0.1  # of the rods' length beyond the moment at which they buckle: below it shells settle near their targets
+
+
+def rise(points: Floats) -> float:
+    """Extent of the points (n, 3) across the plane that fits them best [m]."""
+    centred = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    return float(np.ptp(centred @ axes[:, 0]))
+
+
+def least_rise(rod: Rod) -> float:
+    """The rise up to which rods are pressed together instead of being bent [m]: twice their radius of gyration.
+
+    The ends of a rod that lies on n half waves of the rise s over the length L come together by (pi n s / 2 L)^2 of L;
+    a straight rod, held at its ends and at the nodes of these waves, buckles when that exceeds (pi n i / L)^2, with
+    i^2 = EI / EA [Euler]: at s = 2 i, whatever n and L are.
+    """
+    return 2 * sqrt(min(rod.bend_stiffnesses) / rod.stretch_stiffness)
+
+
+def is_flat(points: Floats, rod: Rod) -> bool:
+    """Whether a shell with these nodes (n, 3) [m] is too flat to bend its rods, so that nothing pops up."""
+    return rise(points) <= least_rise(rod)
+
+
+def flat_warnings(points: Floats, rod: Rod) -> tuple[str, ...]:
+    """A warning where a shell with these nodes (n, 3) [m] is too flat to bend its rods."""
+    if not is_flat(points, rod):
+        return ()
+    height, least = rise(points), length_text(least_rise(rod))
+    plane = height <= PLANE * float(np.ptp(points, axis=0).max())
+    what = "is a plane" if plane else f"rises by {length_text(height)} only"
+    return (
+        f"the target is flat, nothing pops up: it {what}, and up to a rise of {least}, twice their radius of gyration, "
+        "the rods are pressed together and do not bend",
+    )
+
+
+@dataclass(frozen=True)
+class StrongBending:
+    """How the rods of a net bend about their strong axis.
+
+    Parameters
+    ----------
+    ratio : of the larger bending stiffness to the smaller [-].
+    flat : whether they lie flat, the strong axis being the surface's normal; else they stand on edge.
+    curvature : about the strong axis, where the moment is largest [1/m].
+    moment : the largest moment that it takes, over that at which a rod buckles sideways between its joints [-].
+    beyond : share of the rods' length where the moment is beyond that [-].
+    """
+
+    ratio: float
+    flat: bool
+    curvature: float
+    moment: float
+    beyond: float
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A warning where rods would buckle on a large part of their length."""
+        if self.beyond <= BEYOND:
+            return ()
+        directions, stiffnesses = ["within the surface", "out of it"], ["EI2", "EI1"]
+        if not self.flat:
+            directions, stiffnesses = ["out of the surface", "within it"], ["EI1", "EI2"]
+        return (
+            f"the rods are {self.ratio:.3g} times as stiff {directions[0]} as {directions[1]} "
+            f"({'/'.join(stiffnesses)}), and the target bends them that way down to a radius of "
+            f"{length_text(1.0 / self.curvature)}: up to {self.moment:.3g} times the moment at which they buckle "
+            f"sideways between joints, and beyond it on {100 * self.beyond:.0f} % of their length; use rods with a "
+            "less pronounced strong axis (rod.section), a smaller spacing or a flatter target",
+        )
+
+
+def strong_bending(target: Target, mesh: GridMesh, positions: Floats, bends: Bools, rod: Rod) -> StrongBending | None:
+    """How rods that cannot roll at their joints bend about their strong axis; None where both axes are alike.
+
+    Parameters
+    ----------
+    positions : (n, 3) of the mesh's nodes, on the target [m].
+    bends : (b,) which bends of the mesh lie on the target.
+    """
+    stiffnesses = rod.bend_stiffnesses
+    weak, strong = sorted(stiffnesses)
+    if weak == strong or not bends.any():
+        return None
+    flat = stiffnesses[1] == strong
+    before, here, after = (positions[mesh.bends[bends, k]] for k in range(3))
+    towards = target.on_surface(here).normal
+    if flat:
+        towards = unit(cross(towards, after - before))
+    length = mesh.voronoi_lengths[bends]
+    curvature = np.abs(dot(unit(after - here) - unit(here - before), towards)) / length
+    critical = pi * sqrt(weak * rod.twist_stiffness)  # times 1 / a: the moment at which a strip buckles
+    moment = strong * curvature * _joint_distances(mesh)[mesh.bend_rods[bends]] / critical
+    worst = int(np.argmax(moment))
+    beyond = float(length[moment > 1.0].sum() / length.sum())
+    return StrongBending(strong / weak, flat, float(curvature[worst]), float(moment[worst]), beyond)
+
+
+def section_rotation(shell: Shell, state: Floats) -> Floats | None:
+    """(b,) angle by which each bend's section is turned about the rod's axis out of the shell's normal [rad].
+
+    From 0 to pi/2, between the rod's first material director and the normal, both seen along the rod; None where rods
+    have no directors, because they bend alike in all directions.
+
+    Parameters
+    ----------
+    state : (N, 3) of the shell, with the source frames there.
+    """
+    mesh = shell.mesh
+    frames = next((element for element in shell.within if isinstance(element, BendTwist)), None)
+    if frames is None or not shell.angles:
+        return None
+    bends = slice(len(mesh.bends))
+    tangents, m1 = frames.source_tangents[bends, 0], frames.material_directors(state)[bends, 0]
+    normals = node_normals(mesh, shell.positions(state))[mesh.bends[:, 1]]
+    seen = unit(normals - dot(normals, tangents)[:, None] * tangents)
+    return np.asarray(np.arccos(np.clip(np.abs(dot(m1, seen)), 0.0, 1.0)))
+
+
+def _joint_distances(mesh: GridMesh) -> Floats:
+    """(m,) median distance of neighbouring joints of each rod [m]; 0 of a rod that has only one."""
+    crossings, result = mesh.grid.crossings, np.zeros(len(mesh.grid.rods))
+    for rod in range(len(result)):
+        gaps = np.diff(np.sort(crossings.at[crossings.rods == rod]))
+        if len(gaps):
+            result[rod] = np.median(gaps)
+    return result

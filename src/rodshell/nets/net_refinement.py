@@ -1,0 +1,313 @@
+"""A net from one that is similar: Newton's method for all nodes together.
+
+The march evaluates the target at a few points at a time, from node to node. Where a similar net is known, from a
+coarser march or from an earlier form, the target is evaluated once at all nodes, and the march is repeated on its local
+models there. That is Newton's method for the whole net, whose matrix is triangular in the order of the march: two or
+three rounds, whatever the number of nodes. The equations, and so the net, are those of `compass`.
+"""
+
+import numba as nb
+import numpy as np
+
+from rodshell.arrays import Bools, Floats
+from rodshell.geometry.curves import resampled
+from rodshell.geometry.vectors import cross, unit
+from rodshell.nets.compass import (
+    NEWTON_STEPS,
+    ON_SURFACE,
+    SMALLEST_SINE,
+    TOLERANCE,
+    Heights,
+    Layer,
+    Net,
+    axes,
+    compass_step,
+    fill_quadrants,
+    lay_axes,
+    layered_step,
+    less,
+)
+from rodshell.targets import Implicit, Target
+
+ROUNDS = 6
+CONVERGED = 2e-5  # of the target's size: motion in a round; the remaining error is its third power
+EXACT = 1e-13  # of the step, on a local model
+CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
+BEYOND = 2.5  # steps of the known net by which a guess may be outside it
+
+
+def march_near(
+    target: Target,
+    u: Floats,
+    v: Floats,
+    anchor: Floats,
+    heading: Floats,
+    near: Net,
+    *,
+    coarser: Net | None = None,
+    wanted: Bools | None = None,
+    heights: Heights = ON_SURFACE,
+) -> Net:
+    """March a net as `march` does, starting from a similar one; a bad start costs time, not accuracy.
+
+    Parameters
+    ----------
+    target, u, v, anchor, heading, heights : see `march`.
+    near : the similar net.
+    coarser : the same net as `near` in longer steps, from which the start is extrapolated.
+    wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
+    """
+    guess = near if coarser is None else _extrapolated(near, coarser, u, v)
+    net = Net(u, v, interpolated(guess, u, v), heights=heights)
+    if not _refine_axes(target, net, anchor, heading):
+        lay_axes(target, net, anchor, heading)
+    _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted)
+    fill_quadrants(target, net, wanted)
+    return net
+
+
+def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
+    """Extrapolate the nodes of `near` to the steps of the lines u and v: errors go with the square of the step."""
+    wanted, once, twice = (
+        (along[-1] - along[0]) * (across[-1] - across[0]) / ((len(along) - 1) * (len(across) - 1))
+        for along, across in ((u, v), (near.u, near.v), (coarser.u, coarser.v))
+    )
+    if twice <= CLEARLY * once:
+        return near
+    change = near.points - interpolated(coarser, near.u, near.v)
+    change[np.isnan(change)] = 0.0
+    return Net(near.u, near.v, near.points + (once - wanted) / (twice - once) * change)
+
+
+def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
+    """Interpolate a net by local cubics both ways, which also extrapolate a little past its last nodes.
+
+    Parameters
+    ----------
+    net : that is known.
+    u, v : (nu,), (nv,) material coordinates wanted [m].
+
+    Returns
+    -------
+    (nu, nv, 3) points [m]; NaN further away.
+    """
+    i0, j0 = net.origin
+    return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
+
+
+def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
+    """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
+    i0, j0 = net.origin
+    along, back, across, aback = axes(target, anchor, heading)
+    normal = cross(along, across)
+    net.points[i0, j0] = anchor
+    arms = (
+        (net.points[i0 + 1 :, j0], np.diff(net.u[i0:]), along),
+        (net.points[:i0, j0][::-1], np.diff(-net.u[i0::-1]), back),
+        (net.points[i0, j0 + 1 :], np.diff(net.v[j0:]), across),
+        (net.points[i0, :j0][::-1], np.diff(-net.v[j0::-1]), aback),
+    )
+    points = np.concatenate([arm for arm, _, _ in arms])
+    steps = np.concatenate([step for _, step, _ in arms])
+    stops = np.cumsum([0, *(len(arm) for arm, _, _ in arms)])
+    layers = _layers_of_axes(target, net.heights, stops[2], stops[4]) if net.heights != ON_SURFACE else ()
+    starts = [anchor] * 4
+    if layers and np.isfinite(points).all():
+        starts = [layer.of(anchor[None])[0] for layer, _ in layers for _ in range(2)]
+        points = np.concatenate([layer.of(points[part]) for layer, part in layers])
+    moved = np.inf if np.isfinite(points).all() else np.nan
+    for _ in range(ROUNDS):
+        if not moved >= CONVERGED * target.size:
+            break
+        if layers:
+            parts = [layer.implicit(points[part]) for layer, part in layers]
+            model = Implicit(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+        else:
+            model = target.implicit(points)
+        moved = 0.0
+        for k, (_, _, direction) in enumerate(arms):
+            here = slice(stops[k], stops[k + 1])
+            moved += _geodesic(starts[k], direction, normal, steps[here], points[here], *(part[here] for part in model))
+    if not moved < CONVERGED * target.size:
+        return False
+    if layers:
+        points = np.concatenate([layer.below(points[part]) for layer, part in layers])
+    for k, (arm, _, _) in enumerate(arms):
+        arm[:] = points[stops[k] : stops[k + 1]]
+    return True
+
+
+def _layers_of_axes(target: Target, heights: Heights, middle: int, stop: int) -> tuple[tuple[Layer, slice], ...]:
+    """The layer of each axis, and which of the nodes of both axes are its own."""
+    return (Layer(target, heights[0]), slice(0, middle)), (Layer(target, heights[1]), slice(middle, stop))
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _geodesic(start, direction, normal, steps, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
+    """Move the `points` of one arm of `compass.geodesics`, on second order models there; return by how much, or NaN."""
+    point, tangent, normal, moved = start.copy(), direction.copy(), normal.copy(), 0.0
+    flat, chord, swing, away, slope = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for s in range(len(steps)):
+        h = steps[s]
+        out = tangent[0] * normal[0] + tangent[1] * normal[1] + tangent[2] * normal[2]
+        for k in range(3):
+            flat[k] = tangent[k] - out * normal[k]
+        flat /= np.sqrt(flat[0] ** 2 + flat[1] ** 2 + flat[2] ** 2)
+        turn, change = 0.0, np.inf
+        for _ in range(NEWTON_STEPS):
+            cos, sin = np.cos(turn), np.sin(turn)
+            for k in range(3):
+                chord[k] = cos * flat[k] + sin * normal[k]
+                swing[k] = cos * normal[k] - sin * flat[k]
+                away[k] = point[k] + h * chord[k] - points[s, k]
+            level, rate = value[s], 0.0
+            for k in range(3):
+                bent = hessian[s, k, 0] * away[0] + hessian[s, k, 1] * away[1] + hessian[s, k, 2] * away[2]
+                level += (gradient[s, k] + 0.5 * bent) * away[k]
+                slope[k] = gradient[s, k] + bent
+                rate += slope[k] * swing[k]
+            change = level / (h * rate)
+            if not abs(change) >= EXACT:
+                break
+            turn -= change
+        if not (abs(turn) < 1.2 and abs(change) < 1e-9):
+            return np.nan
+        for k in range(3):
+            moved = max(moved, abs(away[k]))
+            points[s, k] = point[k] = point[k] + h * chord[k]
+            tangent[k] = chord[k]
+        normal = slope / np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+    return moved
+
+
+def _refine(target: Target, net: Net, wanted: Bools) -> None:
+    """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for nodes that do not
+    converge. A round evaluates the target only where the last one moved a node: elsewhere its model is still good."""
+    i0, j0 = net.origin
+    models, row = np.empty_like(net.points), np.empty(wanted.shape, dtype=np.intp)
+    value, gradient, hessian = target.implicit(_chosen(net.points, wanted, i0, j0, models, row))
+    moved, new = np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
+    layered = net.heights != ON_SURFACE
+    normals = np.zeros_like(net.points) if layered else np.empty((0, 0, 3))
+    if layered:
+        normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others follow in order
+    for _ in range(ROUNDS):
+        _sweep(
+            net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved
+        )
+        new = moved >= CONVERGED * target.size
+        if not new.any():
+            return
+        models[new], rows = net.points[new], row[new]
+        value[rows], gradient[rows], hessian[rows] = target.implicit(models[new])
+    _forget(net.points, moved >= CONVERGED * target.size, i0, j0)
+
+
+@nb.njit(cache=True)
+def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def]
+    """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
+    `row` (nu, nv) is the index of each in the result, -1 for the others; `models` (nu, nv, 3) is a copy of all."""
+    chosen, count = np.empty((row.size, 3)), 0
+    for i in range(row.shape[0]):
+        for j in range(row.shape[1]):
+            guessed = (wanted[i, j] or i == i0 or j == j0) and not np.isnan(points[i, j, 0])
+            row[i, j] = count if guessed else -1
+            for k in range(3):
+                if not guessed:
+                    points[i, j, k] = np.nan
+                models[i, j, k] = chosen[count, k] = points[i, j, k]
+            count += guessed
+    return chosen[:count]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _sweep(  # type: ignore[no-untyped-def]
+    points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
+):
+    """March the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), whose values, gradients and
+    Hessians are in the rows `row` (nu, nv), -1 where there is none; `moved` (nu, nv) returns the distance from them.
+    Nodes whose models and neighbours are not `new` (nu, nv) do not move.
+
+    `normals` (nu, nv, 3) of the surface at the points are updated if rods are at `heights` above it; empty otherwise.
+    """
+    layered = len(normals) > 0
+    for quadrant in range(4):
+        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
+        i_stop, j_stop = (len(u) if i_side > 0 else -1), (len(v) if j_side > 0 else -1)
+        for i in range(i0 + i_side, i_stop, i_side):
+            p = i - i_side
+            for j in range(j0 + j_side, j_stop, j_side):
+                q = j - j_side
+                new[i, j] |= new[i, q] | new[p, j] | new[p, q]
+                if not new[i, j]:
+                    continue
+                moved[i, j], r = np.nan, row[i, j]
+                if r < 0:
+                    continue
+                a, b, d, here = _at(points, i, q), _at(points, p, j), _at(points, p, q), _at(models, i, j)
+                away = less(d, _at(models, p, q))  # guess: as far from its model as its neighbours are from theirs
+                away = less(_plus(less(a, _at(models, i, q)), less(b, _at(models, p, j))), away)
+                from_a, from_b = abs(v[j] - v[q]), abs(u[i] - u[p])
+                if layered:
+                    a, b = _raised(a, heights[1], normals, i, q), _raised(b, heights[0], normals, p, j)
+                change, sine, tries = np.inf, 0.0, 0
+                while change > TOLERANCE and tries < NEWTON_STEPS:
+                    now = _plus(here, away)
+                    level, slope = _model(r, away, value, gradient, hessian)
+                    if layered:
+                        step, sine = layered_step(now, a, b, slope, hessian[r], heights, from_a, from_b, level)
+                    else:
+                        x, y = less(now, a), less(now, b)
+                        step, sine = compass_step(x, y, x, y, slope, from_a, from_b, level)
+                    away = less(away, step)
+                    change = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
+                    tries += 1
+                if change <= TOLERANCE and sine * i_side * j_side > SMALLEST_SINE:
+                    moved[i, j] = max(abs(away[0]), abs(away[1]), abs(away[2]))
+                    points[i, j, 0], points[i, j, 1], points[i, j, 2] = _plus(here, away)
+                    if layered:
+                        _, g = _model(r, away, value, gradient, hessian)
+                        steep = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+                        for k in range(3):
+                            normals[i, j, k] = g[k] / steep
+                else:
+                    points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
+
+
+@nb.njit(cache=True)
+def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
+    """Value and gradient of the second order model r, at a distance `away` from its point."""
+    x, y, z = away
+    bx = hessian[r, 0, 0] * x + hessian[r, 0, 1] * y + hessian[r, 0, 2] * z
+    by = hessian[r, 1, 0] * x + hessian[r, 1, 1] * y + hessian[r, 1, 2] * z
+    bz = hessian[r, 2, 0] * x + hessian[r, 2, 1] * y + hessian[r, 2, 2] * z
+    gx, gy, gz = gradient[r, 0], gradient[r, 1], gradient[r, 2]
+    level = value[r] + (gx + 0.5 * bx) * x + (gy + 0.5 * by) * y + (gz + 0.5 * bz) * z
+    return level, (gx + bx, gy + by, gz + bz)
+
+
+@nb.njit(cache=True)
+def _raised(point, height, normals, i, j):  # type: ignore[no-untyped-def]
+    return (
+        point[0] + height * normals[i, j, 0],
+        point[1] + height * normals[i, j, 1],
+        point[2] + height * normals[i, j, 2],
+    )
+
+
+@nb.njit(cache=True)
+def _at(points, i, j):  # type: ignore[no-untyped-def]
+    return points[i, j, 0], points[i, j, 1], points[i, j, 2]
+
+
+@nb.njit(cache=True)
+def _plus(a, b):  # type: ignore[no-untyped-def]
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _forget(points: Floats, unconverged: Bools, i0: int, j0: int) -> None:
+    """NaN for every node that did not converge, and for all that depend on it: those beyond it in its quadrant."""
+    for rows in (slice(i0, None), slice(i0, None, -1)):
+        for columns in (slice(j0, None), slice(j0, None, -1)):
+            lost = np.logical_or.accumulate(unconverged[rows, columns], axis=0)
+            points[rows, columns][np.logical_or.accumulate(lost, axis=1)] = np.nan

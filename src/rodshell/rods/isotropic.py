@@ -1,0 +1,254 @@
+"""Isotropic, naturally straight rods: equal stiffness in both directions makes the material frames drop out of bending.
+
+    E = 1/(2l) [EI |kb|^2 + GJ (tau - n)^2],   |kb| = 2 tan(phi/2),   |kb|^2 = 4 (1 - c) / (1 + c),   c = te.tf
+
+`IsotropicBend` is the first term alone [HQK Eq 1b], (2 EI/l) (1 - c) / (1 + c), a function of the turning angle. The
+twist of such a rod is zero in equilibrium unless something holds its angles, so that it needs no twist angles.
+
+`IsotropicBendTwist` is both terms [HQK Eq 1b, 1c]. Its bending is not softened by twist, as that of `BendTwist` is,
+whose averaged curvature has the length |kb| cos(tau/2) (ERRATA E2). The twist tau = theta_f - theta_e + m_ref needs no
+directors either: since the source, m_ref has grown by the angle that a frame turns by when it is transported around
+the loop of the tangents and their sources, te -> se -> sf -> tf -> te, which is the solid angle of that loop: of two
+triangles, each by
+
+    tan(solid / 2) = a.(b x c) / (1 + a.b + b.c + c.a)   [Van Oosterom and Strackee 1983].
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numba as nb
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.geometry.vectors import unit
+from rodshell.records import brief
+from rodshell.rods.bend_twist import BendTwist, spread
+from rodshell.rods.elements import NO_HESSIANS
+
+
+@dataclass(frozen=True, eq=False)
+class IsotropicBend:
+    """Bends between consecutive edges of rods without twist angles [HQK Eq 1b].
+
+    Parameters
+    ----------
+    blocks : (b, 3) nodes: previous, middle, next.
+    stiffness : (b,) EI over the Voronoi length of the rest state [N m].
+    """
+
+    blocks: Ints
+    stiffness: Floats
+
+    __repr__ = brief
+
+    def curvatures(self, state: Floats) -> Floats:
+        """(b,) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-].
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
+        x = state[self.blocks]
+        before, after = unit(x[:, 1] - x[:, 0]), unit(x[:, 2] - x[:, 1])
+        # unit vectors at an angle phi differ by 2 sin(phi/2) and add up to 2 cos(phi/2)
+        return np.asarray(2 * np.linalg.norm(after - before, axis=1) / np.linalg.norm(after + before, axis=1))
+
+    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        return float(_isotropic_bend(state, self.blocks, self.stiffness, gradient, hessians))
+
+    def refreshed(self, state: Floats) -> Self:
+        """The same: there are no source frames."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class IsotropicBendTwist(BendTwist):
+    """As `BendTwist`, with EI1 = EI2 = `bend_stiffness[:, 0]` and no natural curvature."""
+
+    __repr__ = brief
+
+    def relaxed(self, state: Floats) -> Self:
+        """The same elements with the twist of `state` as their natural twist: these rods are naturally straight."""
+        return replace(self, natural_twist=self.strains(state)[:, 2].copy())
+
+    def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        return float(
+            _isotropic_bend_twist(
+                state,
+                self.blocks,
+                self.bend_stiffness,
+                self.twist_stiffness,
+                self.natural_twist,
+                self.source_tangents,
+                self.source_twist,
+                gradient,
+                hessians,
+            )
+        )
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no-untyped-def]
+    """Stencil (x_0, x_1, x_2) [m]; energies [J]. e = x_1 - x_0, f = x_2 - x_1; s, t their unit vectors."""
+    wanted = hessians.shape[0] > 0
+    hee, hef, hff = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    ge, gf, s, t = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    energy = 0.0
+    for m in range(bends.shape[0]):
+        i0, i1, i2 = bends[m, 0], bends[m, 1], bends[m, 2]
+        le2, lf2 = 0.0, 0.0
+        for k in range(3):
+            s[k] = x[i1, k] - x[i0, k]
+            t[k] = x[i2, k] - x[i1, k]
+            le2 += s[k] * s[k]
+            lf2 += t[k] * t[k]
+        le, lf = np.sqrt(le2), np.sqrt(lf2)
+        per_e, per_f = 1.0 / le, 1.0 / lf
+        c, apart = 0.0, 0.0
+        for k in range(3):
+            s[k] /= le
+            t[k] /= lf
+            c += s[k] * t[k]
+        for k in range(3):
+            apart += (s[k] - t[k]) ** 2  # 2 (1 - c) without cancellation
+        plus = 1.0 + c
+        scale = 2.0 * stiffness[m]
+        energy += scale * 0.5 * apart / plus
+        first = -2.0 * scale / (plus * plus)  # dE/dc
+        second = 4.0 * scale / (plus * plus * plus)  # d2E/dc2
+        for k in range(3):
+            ge[k] = (t[k] - c * s[k]) * per_e
+            gf[k] = (s[k] - c * t[k]) * per_f
+            gradient[i0, k] -= first * ge[k]
+            gradient[i1, k] += first * (ge[k] - gf[k])
+            gradient[i2, k] += first * gf[k]
+        if wanted:
+            per_e2, per_f2, per_ef = per_e * per_e, per_f * per_f, per_e * per_f
+            for i in range(3):
+                for j in range(3):
+                    delta = 1.0 if i == j else 0.0
+                    cee = -(t[i] * s[j] + s[i] * t[j] + c * delta - 3.0 * c * s[i] * s[j]) * per_e2
+                    cff = -(s[i] * t[j] + t[i] * s[j] + c * delta - 3.0 * c * t[i] * t[j]) * per_f2
+                    cef = (delta - s[i] * s[j] - t[i] * t[j] + c * s[i] * t[j]) * per_ef
+                    hee[i, j] = first * cee + second * ge[i] * ge[j]
+                    hff[i, j] = first * cff + second * gf[i] * gf[j]
+                    hef[i, j] = first * cef + second * ge[i] * gf[j]
+            for i in range(3):
+                for j in range(3):
+                    hessians[m, i, j] = hee[i, j]
+                    hessians[m, i, j + 3] = hef[i, j] - hee[i, j]
+                    hessians[m, i, j + 6] = -hef[i, j]
+                    hessians[m, i + 3, j] = hef[j, i] - hee[i, j]
+                    hessians[m, i + 3, j + 3] = hee[i, j] - hef[i, j] - hef[j, i] + hff[i, j]
+                    hessians[m, i + 3, j + 6] = hef[i, j] - hff[i, j]
+                    hessians[m, i + 6, j] = -hef[j, i]
+                    hessians[m, i + 6, j + 3] = hef[j, i] - hff[i, j]
+                    hessians[m, i + 6, j + 6] = hff[i, j]
+    return energy
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _isotropic_bend_twist(x, stencils, bend, twist, natural_twist, sources, source_twist, gradient, hessians):  # type: ignore[no-untyped-def]
+    """Stencil (x_0, theta_e, x_1, theta_f, x_2) [m, rad]; energies [J].
+
+    Derivatives by the edges e and f: of c, of tau, and of E; `spin` is w of `bend_twist`, times |e|.
+    """
+    wanted = hessians.shape[0] > 0
+    te, tf, mid, binormal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    spin_e, spin_f, half_e, half_f = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    ce, cf, ue, uf = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    we, wf, be, bf, turned = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
+    hee, hef, hff = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    energy = 0.0
+    for b in range(stencils.shape[0]):
+        i0, ie, i1, jf, i2 = stencils[b, 0], stencils[b, 1], stencils[b, 2], stencils[b, 3], stencils[b, 4]
+        le, lf = 0.0, 0.0
+        for k in range(3):
+            te[k], tf[k] = x[i1, k] - x[i0, k], x[i2, k] - x[i1, k]
+            le += te[k] * te[k]
+            lf += tf[k] * tf[k]
+        le, lf = 1.0 / np.sqrt(le), 1.0 / np.sqrt(lf)  # from here on 1 / length
+        c, apart, both_e, both_f, across, between = 0.0, 0.0, 1.0, 1.0, 0.0, 0.0
+        for k in range(3):
+            te[k] *= le
+            tf[k] *= lf
+            c += te[k] * tf[k]
+            both_e += sources[b, 0, k] * te[k]
+            both_f += sources[b, 1, k] * tf[k]
+            across += te[k] * sources[b, 1, k]
+            between += sources[b, 0, k] * sources[b, 1, k]
+            apart += (te[k] - tf[k]) ** 2  # 2 (1 - c) without cancellation
+        plus = 1.0 + c
+        per_plus, per_e, per_f = 1.0 / plus, 1.0 / both_e, 1.0 / both_f
+        volume_s, volume_t = 0.0, 0.0  # te.(se x sf) and te.(sf x tf)
+        for k in range(3):
+            k1, k2 = (k + 1) % 3, (k + 2) % 3
+            se1, se2, sf1, sf2 = sources[b, 0, k1], sources[b, 0, k2], sources[b, 1, k1], sources[b, 1, k2]
+            volume_s += te[k] * (se1 * sf2 - se2 * sf1)
+            volume_t += te[k] * (sf1 * tf[k2] - sf2 * tf[k1])
+            spin_e[k] = (se1 * te[k2] - se2 * te[k1]) * per_e
+            spin_f[k] = (sf1 * tf[k2] - sf2 * tf[k1]) * per_f
+            binormal[k] = (te[k1] * tf[k2] - te[k2] * tf[k1]) * per_plus  # kb/2
+        sum_s, sum_t = both_e + between + across, both_f + c + across
+        solid = 2.0 * np.arctan2(volume_s * sum_t + volume_t * sum_s, sum_s * sum_t - volume_s * volume_t)
+        solid -= 2.0 * np.pi * np.floor(solid / (2.0 * np.pi) + 0.5)
+        off = source_twist[b] + solid + x[jf, 0] - x[ie, 0] - natural_twist[b]
+        torque = twist[b] * off
+        scale = 2.0 * bend[b, 0]
+        first = -2.0 * scale * per_plus * per_plus  # dE/dc
+        energy += 0.5 * (scale * apart * per_plus + torque * off)
+        for k in range(3):
+            ce[k], cf[k] = (tf[k] - c * te[k]) * le, (te[k] - c * tf[k]) * lf
+            ue[k], uf[k] = (binormal[k] + spin_e[k]) * le, (binormal[k] - spin_f[k]) * lf
+            ge, gf = first * ce[k] + torque * ue[k], first * cf[k] + torque * uf[k]
+            gradient[i0, k] -= ge
+            gradient[i1, k] += ge - gf
+            gradient[i2, k] += gf
+        gradient[ie, 0] -= torque
+        gradient[jf, 0] += torque
+        if not wanted:
+            continue
+
+        # d2E = E'' dc dc + E' d2c + GJ/l dtau dtau + torque d2tau
+        second, g = -2.0 * first * per_plus, twist[b]
+        pull, push = 0.5 * torque * le * le, 0.5 * torque * lf * lf
+        for k in range(3):
+            mid[k] = (te[k] + tf[k]) * per_plus
+            half_e[k] = te[k] + (sources[b, 0, k] + te[k]) * per_e
+            half_f[k] = tf[k] + (sources[b, 1, k] + tf[k]) * per_f
+            we[k], wf[k] = te[k] + mid[k], tf[k] + mid[k]
+            turned[k, k] = 0.0
+        fe, ff, ef = first * le * le, first * lf * lf, first * le * lf
+        cross = torque * le * lf * per_plus
+        for k in range(3):
+            k1, k2 = (k + 1) % 3, (k + 2) % 3
+            turned[k, k1], turned[k1, k] = -cross * te[k2], cross * te[k2]
+        bend_ef = torque * le * lf
+        for i in range(3):
+            for j in range(i + 1):
+                diagonal = c if i == j else 0.0
+                value = fe * (3.0 * c * te[i] * te[j] - tf[i] * te[j] - te[i] * tf[j] - diagonal)
+                value += second * ce[i] * ce[j] + g * ue[i] * ue[j]
+                value -= pull * (
+                    binormal[i] * we[j] + we[i] * binormal[j] + spin_e[i] * half_e[j] + half_e[i] * spin_e[j]
+                )
+                hee[i, j] = hee[j, i] = value
+                value = ff * (3.0 * c * tf[i] * tf[j] - tf[i] * te[j] - te[i] * tf[j] - diagonal)
+                value += second * cf[i] * cf[j] + g * uf[i] * uf[j]
+                value -= push * (
+                    binormal[i] * wf[j] + wf[i] * binormal[j] - spin_f[i] * half_f[j] - half_f[i] * spin_f[j]
+                )
+                hff[i, j] = hff[j, i] = value
+            for j in range(3):
+                delta = 1.0 if i == j else 0.0
+                value = ef * (delta - te[i] * te[j] - tf[i] * tf[j] + c * te[i] * tf[j])
+                value += second * ce[i] * cf[j] + g * ue[i] * uf[j] + turned[i, j]
+                hef[i, j] = value - bend_ef * binormal[i] * mid[j]
+        for k in range(3):
+            be[k], bf[k] = g * ue[k], g * uf[k]
+            ce[k], cf[k] = -be[k], -bf[k]
+        spread(hee, hef, hff, ce, be, cf, bf, g, -g, g, hessians[b])
+    return energy

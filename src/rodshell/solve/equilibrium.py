@@ -1,0 +1,212 @@
+"""Static equilibrium by Newton's method with the axial forces as unknowns.
+
+Stiff edges make the plain Newton method crawl: the geometric stiffness of an axial force EA eps evaluated at
+a strain that is not yet equilibrated is wild. Here each edge carries its force N as an unknown, updated with
+the linearised strain; the same iteration serves elastic edges (N = EA eps at the end) and inextensible ones
+(eps = 0 at the end, EA being a penalty that any size serves). On a curved constraint it is the SQP method on
+a manifold: steps in the tangent directions, the constraint's curvature in the Hessian, a retraction after.
+
+The steps are those of `newton_step`.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from rodshell.arrays import Floats
+from rodshell.errors import OutOfTimeError
+from rodshell.rods.elements import Elements
+from rodshell.solve.newton_step import NewtonStep, TooManyModesError
+from rodshell.solve.problem import Problem
+from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.sparse_ldl import SingularError
+from rodshell.solve.tangent import Tangent, TangentAssembly
+
+Progress = Callable[[int, float], None]
+
+STRAIN_TOLERANCE = 2e-6
+REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
+MOST_ITERATIONS = 60
+LONGEST_SLIDE = 120  # iterations off a saddle
+NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """How a solve ended: a state with its axial forces.
+
+    Parameters
+    ----------
+    problem : what was solved, the source frames of its elements being at the state (its twist angles belong to them),
+        with the pattern that serves the next solve of this structure.
+    state : (n, 3) [m, at twist angles rad].
+    forces : (e,) axial forces [N].
+    gradient : (n, 3) of energy and load, without constraint forces [N].
+    report : figures of the solve.
+    mode : (n, 3) where the state is not stable, the direction of the most negative curvature, its largest displacement
+        being 1; else None.
+    """
+
+    problem: Problem
+    state: Floats
+    forces: Floats
+    gradient: Floats
+    report: SolveReport
+    mode: Floats | None = None
+
+    @property
+    def elements(self) -> tuple[Elements, ...]:
+        """Every energy but the stretch, with its source frames at the state."""
+        return self.problem.elements
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy less the work of the load [J]."""
+        return self.problem.potential(self.state)
+
+    @cached_property
+    def tangent(self) -> Tangent:
+        """The tangent stiffness at this state, which is factorised when it is first asked for.
+
+        Raises
+        ------
+        SingularError : some motion has no stiffness.
+        """
+        return TangentAssembly(self.problem, self.state).tangent(self.elements, self.state, self.forces)
+
+
+def find_equilibrium(
+    problem: Problem,
+    state: Floats,
+    forces: Floats,
+    *,
+    descend: bool = False,
+    limit_steps: bool = False,
+    most_modes: int | None = None,
+    most_iterations: int = MOST_ITERATIONS,
+    progress: Progress | None = None,
+) -> Equilibrium:
+    """Equilibrium near a state.
+
+    Never raises for a solve that does not converge: the report's status says so, and the last state comes with it.
+
+    Parameters
+    ----------
+    problem : the source frames of its elements being at, or near, the state.
+    state : (n, 3) first guess [m, at twist angles rad].
+    forces : (e,) first guess of the axial forces [N].
+    descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
+    limit_steps : for a start from afar: take only a part of steps that were too long. Not on a path, whose own steps
+        are shortened instead.
+    most_modes : where the start has more negative modes, it is given up at once (BUCKLED); None: never.
+    most_iterations : chord steps in a row count as one.
+    progress : called with the number and the length of each step, over the characteristic length; an OutOfTimeError
+        that it raises ends the solve with that status.
+    """
+    begin = time.perf_counter()
+    step = NewtonStep(problem, state, limit_steps=limit_steps, most_modes=most_modes)
+    status, steps, reason = Status.STALLED, list[float](), ""
+    while step.iterations + step.counts <= most_iterations:
+        counted = step.counts
+        try:
+            moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
+        except TooManyModesError:
+            status = Status.BUCKLED
+            break
+        except SingularError:
+            status = Status.DIVERGED
+            break
+        if not (np.isfinite(moved) and np.isfinite(forces_next).all()):
+            status = Status.DIVERGED
+            break
+        state, forces = state_next, forces_next
+        if progress is not None and counted:
+            try:
+                progress(step.iterations, moved / problem.length)
+            except OutOfTimeError as late:
+                reason = str(late)
+        if step.settled and mismatch < STRAIN_TOLERANCE:
+            status = Status.CONVERGED
+            break
+        if reason:
+            status = Status.OUT_OF_TIME
+            break
+        steps.append(moved)
+        if _repeats(steps):
+            break
+        step.refresh(state)
+    gradient = step.gradient(state, forces)
+    residual = problem.constraint.freedom(state).reduce(gradient)
+    report = SolveReport(
+        status=status,
+        dofs=step.dofs,
+        iterations=step.iterations,
+        factorizations=step.factorizations,
+        seconds=time.perf_counter() - begin,
+        force_residual=float(np.abs(residual).max(initial=0.0)),
+        max_strain=float(np.abs(problem.stretch.strains(state)).max()),
+        negative_modes=step.negative_modes,
+        reason=reason if status is Status.OUT_OF_TIME else "",
+    )
+    mode = step.lowest_mode() if status is Status.CONVERGED and step.negative_modes else None
+    step.refresh(state)
+    solved = replace(problem, elements=step.elements, pattern=step.pattern)
+    return Equilibrium(solved, state, forces, gradient, report, mode)
+
+
+def _repeats(steps: list[float]) -> bool:
+    """Whether the last `REPEATED` steps are as long as those two before: back and forth between two states."""
+    last = np.array(steps[-REPEATED - 2 :])
+    return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+
+
+def find_stable(
+    problem: Problem,
+    state: Floats,
+    forces: Floats,
+    *,
+    limit_steps: bool = False,
+    most_modes: int | None = None,
+    most_iterations: int = MOST_ITERATIONS,
+    progress: Progress | None = None,
+) -> Equilibrium:
+    """As `find_equilibrium`; where that ends on a saddle, slide off along its mode, to either side in turn.
+
+    Parameters are those of `find_equilibrium`.
+
+    Returns
+    -------
+    The stable equilibrium; the saddle, with its negative modes counted, where neither side leads to one. The report
+    counts the work of all solves.
+    """
+    first = find_equilibrium(
+        problem,
+        state,
+        forces,
+        limit_steps=limit_steps,
+        most_modes=most_modes,
+        most_iterations=most_iterations,
+        progress=progress,
+    )
+    tries = [first]
+    if first.mode is not None:
+        for side in (1.0, -1.0):
+            start = first.state + side * NUDGE * problem.length * first.mode
+            tries.append(
+                find_equilibrium(
+                    first.problem,
+                    start,
+                    first.forces,
+                    descend=True,
+                    most_iterations=min(2 * most_iterations, LONGEST_SLIDE),
+                    progress=progress,
+                )
+            )
+            if tries[-1].report.stable or tries[-1].report.status is Status.OUT_OF_TIME:
+                break
+    last = tries[-1].report
+    best = tries[-1] if last.stable or last.status is Status.OUT_OF_TIME else first
+    return replace(best, report=best.report.after(*(tried.report for tried in tries if tried is not best)))

@@ -1,0 +1,327 @@
+"""Sparse symmetric indefinite systems: LDL^T without pivoting, the analysis of a pattern apart from the factors.
+
+Two solvers have one interface (`LinearSolver`): `Qdldl`, ordered by approximate minimum degree, for small systems of
+any pattern; and `Multifrontal`, for the matrices of large grids. A solver is what follows from the pattern alone: it
+never changes and serves any number of matrices. Each factorisation gives `Factors` of its own.
+
+In a multifrontal factorisation the columns of the factor fall into *supernodes* with one row structure. Each has a
+dense *front*: its own columns, summed with the update matrices of its children in the elimination tree; its pivots are
+eliminated, what remains is the update matrix for its parent (Duff and Reid 1983). Dense work on contiguous blocks
+(`dense`), the order of elimination from where the unknowns lie (`ordering`), the symbolic phase once per pattern
+(`symbolic`).
+"""
+
+import os
+from threading import Thread
+from typing import NamedTuple, Protocol
+
+import numba as nb
+import numpy as np
+import qdldl
+from scipy.sparse import csc_matrix
+
+from rodshell.arrays import Floats, Longs
+from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
+from rodshell.solve.ordering import dissect
+from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
+
+ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
+MOST_THREADS = 4  # the last part is one thread's work
+
+
+class SingularError(ArithmeticError):
+    """A pivot of the factorisation is zero: nothing holds some motion."""
+
+
+class Factors(Protocol):
+    """The factors of one matrix. They never change, unless their memory is given to another factorisation."""
+
+    @property
+    def negative(self) -> int:
+        """Number of negative pivots, which is that of negative eigenvalues (Sylvester's law of inertia)."""
+        ...
+
+    def solve(self, right: Floats) -> Floats:
+        """Solution (n,) for a right-hand side (n,), with one step of iterative refinement where it is not accurate."""
+        ...
+
+
+class LinearSolver(Protocol):
+    """Factorises matrices of one pattern, upper triangle in compressed columns."""
+
+    def factor(self, data: Floats, *, reuse: Factors | None = None) -> Factors:
+        """The factors of the matrix with the values `data`, which they keep: it must not be changed afterwards.
+
+        Parameters
+        ----------
+        data : (nnz,) values of the upper triangle, in the order of the pattern.
+        reuse : factors by the same solver that are not needed any more: the new ones take over their memory, and
+            solving with the old ones is an error from then on.
+
+        Raises
+        ------
+        SingularError : a pivot vanishes or is not finite.
+        """
+        ...
+
+
+class Qdldl:
+    """LDL^T by QDLDL, ordered by approximate minimum degree.
+
+    Parameters
+    ----------
+    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
+    """
+
+    def __init__(self, indptr: Longs, indices: Longs) -> None:
+        self._indptr, self._indices = indptr, indices
+
+    def factor(self, data: Floats, *, reuse: Factors | None = None) -> "QdldlFactors":
+        size = len(self._indptr) - 1
+        matrix = csc_matrix((data, self._indices, self._indptr), shape=(size, size))
+        solver = reuse.given_away() if isinstance(reuse, QdldlFactors) else None
+        try:
+            if solver is None:
+                solver = qdldl.Solver(matrix, upper=True)
+            else:
+                solver.update(matrix, upper=True)
+        except RuntimeError as error:
+            raise SingularError(str(error)) from error
+        pivots = np.asarray(solver.factors()[1])
+        if not np.isfinite(pivots).all():
+            raise SingularError("the factorisation is not finite")
+        if not pivots.all():  # QDLDL's update does not say so, and leaves the pivots after it as they were
+            raise SingularError("a pivot of the factorisation is zero")
+        return QdldlFactors(matrix, solver, int(np.count_nonzero(pivots < 0)))
+
+
+class QdldlFactors:
+    """Factors by QDLDL (see `Factors`)."""
+
+    def __init__(self, matrix: csc_matrix, solver: qdldl.Solver, negative: int) -> None:
+        self._matrix, self.negative = matrix, negative
+        self._solver: qdldl.Solver | None = solver
+
+    def given_away(self) -> "qdldl.Solver | None":
+        """The solver, for other factors; these cannot be used any more."""
+        solver, self._solver = self._solver, None
+        return solver
+
+    def solve(self, right: Floats) -> Floats:
+        assert self._solver is not None, GIVEN_AWAY
+        x = np.asarray(self._solver.solve(right))
+        residual = right - self._matrix @ x - self._matrix.T @ x + self._matrix.diagonal() * x
+        return np.asarray(x + self._solver.solve(residual))
+
+
+GIVEN_AWAY = "the memory of these factors was given to another factorisation"
+
+
+class _Scratch(NamedTuple):
+    """Memory for one factorisation at a time; nothing in it is needed afterwards."""
+
+    threads: list[tuple[Floats, Floats]]  # of each thread: a front's pivot rows, and the dense kernels' workspace
+    stacks: Floats  # update matrices
+
+
+class Multifrontal:
+    """Multifrontal LDL^T of matrices of one pattern.
+
+    Parameters
+    ----------
+    indptr, indices : the pattern, upper triangle in compressed columns, every diagonal present.
+    coordinates : (n, d) where each unknown lies, for nested dissection; None orders by approximate minimum degree.
+    """
+
+    def __init__(self, indptr: Longs, indices: Longs, coordinates: Floats | None = None) -> None:
+        self.indptr, self.indices = indptr, indices
+        size = len(indptr) - 1
+        begin = np.arange(size + 1) if coordinates is None else _block_begins(coordinates)
+        blocks = blocks_of(indptr, indices, begin)
+        order = _minimum_degree(indptr, indices) if coordinates is None else _dissected(coordinates, blocks)
+        self.plan = plan_of(indptr, indices, blocks, order)
+        self._spare = list[_Scratch]()  # scratch memory that no factorisation is using
+
+    @property
+    def fill(self) -> int:
+        """Stored values of the factor, with the padding of its rows."""
+        return int(self.plan.panel_start[-1])
+
+    def factor(self, data: Floats, *, reuse: Factors | None = None) -> "MultifrontalFactors":
+        memory = reuse.given_away() if isinstance(reuse, MultifrontalFactors) else None
+        panels, pivots = memory or (room(self.fill), np.empty(len(self.indptr) - 1))
+        scratch = self._spare.pop() if self._spare else self._new_scratch()
+        regular = _eliminate_parts(self.plan, data, scratch, panels, pivots)
+        self._spare.append(scratch)
+        if not regular:
+            raise SingularError("a pivot of the factorisation vanishes")
+        return MultifrontalFactors(self, data, panels, pivots)
+
+    def _new_scratch(self) -> _Scratch:
+        plan = self.plan
+        threads_memory = [(room(plan.largest_panel), workspace(plan.largest_front)) for _ in range(threads())]
+        return _Scratch(threads_memory, room(plan.stack_size))
+
+
+class MultifrontalFactors:
+    """Factors by `Multifrontal` (see `Factors`)."""
+
+    def __init__(self, solver: Multifrontal, data: Floats, panels: Floats, pivots: Floats) -> None:
+        self._solver, self._data = solver, data
+        self._memory: tuple[Floats, Floats] | None = (panels, pivots)
+        self.negative = int(np.count_nonzero(pivots < 0))
+
+    def given_away(self) -> tuple[Floats, Floats] | None:
+        """The memory, for other factors; these cannot be used any more."""
+        memory, self._memory = self._memory, None
+        return memory
+
+    def solve(self, right: Floats) -> Floats:
+        x = self._substitute(right)
+        residual, size = _residual(self._solver.indptr, self._solver.indices, self._data, x, right)
+        if np.abs(residual).max(initial=0.0) > ACCURATE * size:
+            x += self._substitute(residual)
+        return x
+
+    def _substitute(self, right: Floats) -> Floats:
+        assert self._memory is not None, GIVEN_AWAY
+        plan = self._solver.plan
+        x = right[plan.order]
+        row, aside = room(plan.largest_front), room(2 * plan.largest_front)
+        _solve(x, plan.first, plan.row_start, plan.rows, plan.panel_start, *self._memory, row, aside)
+        result = np.empty_like(x)
+        result[plan.order] = x
+        return result
+
+
+def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats) -> bool:
+    """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on the
+    threads. False where a pivot vanishes or is not finite."""
+    starts = plan.part_start
+    separate, regular = iter(range(len(starts) - 2)), [True]
+
+    def eliminate(part: int, memory: tuple[Floats, Floats]) -> bool:
+        return bool(
+            _numeric(
+                plan.parts[starts[part] : starts[part + 1]], data, plan.first, plan.row_start,
+                plan.child_start, plan.children, plan.run_start, plan.runs,
+                plan.entry_start, plan.entry_source, plan.entry_place,
+                plan.panel_start, plan.update_start, scratch.stacks, *memory, panels, pivots,
+            )
+        )  # fmt: skip
+
+    def work(memory: tuple[Floats, Floats]) -> None:
+        for part in separate:
+            regular.append(eliminate(part, memory))
+
+    others = [Thread(target=work, args=(memory,)) for memory in scratch.threads[1 : len(starts) - 2]]
+    for thread in others:
+        thread.start()
+    work(scratch.threads[0])
+    for thread in others:
+        thread.join()
+    return all(regular) and eliminate(len(starts) - 2, scratch.threads[0])
+
+
+def threads() -> int:
+    """Threads of a factorisation: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
+    return min(int(nb.config.NUMBA_NUM_THREADS), os.cpu_count() or 1, MOST_THREADS)
+
+
+def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:
+    """Blocks in the order of a nested dissection of their coordinates."""
+    return dissect(coordinates[blocks.begin[:-1]], blocks.start, blocks.neighbours)
+
+
+def _block_begins(coordinates: Floats) -> Longs:
+    """Where blocks begin: unknowns in a row that lie at one place, such as the directions of a node; and their end."""
+    other = (coordinates[1:] != coordinates[:-1]).any(axis=1)
+    return np.concatenate([[0], 1 + np.flatnonzero(other), [len(coordinates)]])
+
+
+def _minimum_degree(indptr: Longs, indices: Longs) -> Longs:
+    """The AMD order, as QDLDL finds it."""
+    size = len(indptr) - 1
+    data = np.full(len(indices), 1e-3 / max(1, size))
+    data[indptr[1:] - 1] = 1.0
+    solver = qdldl.Solver(csc_matrix((data, indices, indptr), shape=(size, size)), upper=True)
+    return np.asarray(solver.factors()[2], dtype=np.int64)
+
+
+@nb.njit(cache=True, error_model="numpy", nogil=True)
+def _numeric(  # type: ignore[no-untyped-def]
+    part, data, first, row_start, child_start, children, run_start, runs, entry_start, entry_source, entry_place,
+    panel_start, update_start, stacks, unscaled, work, panels, pivots,
+):  # fmt: skip
+    """Eliminate the supernodes of a `part`, front by front; False where a pivot vanishes or is not finite.
+
+    A front of `size` rows and `width` pivots is kept as its pivots' rows (width, padded), in `unscaled` while it is
+    eliminated, then divided by the pivots in `panels`; and as its update matrix, upper triangle, in `stacks`.
+    """
+    for s in part:
+        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        stride = padded(size)
+        rows = unscaled[: width * stride].reshape(width, stride)
+        rows[:] = 0.0
+        for e in range(entry_start[s], entry_start[s + 1]):
+            unscaled[entry_place[e]] += data[entry_source[e]]
+        for e in range(child_start[s], child_start[s + 1]):
+            child = _update(children[e], first, row_start, update_start, stacks)
+            add_rows(rows, child, runs[run_start[e] : run_start[e + 1]], 0, width)
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, stride)
+        if not eliminate(rows, panel, pivots[first[s] : first[s + 1]], work):
+            return False
+        update = _update(s, first, row_start, update_start, stacks)
+        subtract_product(panel, rows, 0, width, width, 0, update, work)
+        for e in range(child_start[s], child_start[s + 1]):
+            child = _update(children[e], first, row_start, update_start, stacks)
+            add_rows(update, child, runs[run_start[e] : run_start[e + 1]], width, size)
+    return True
+
+
+@nb.njit(cache=True, inline="always")
+def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyped-def]
+    """The update matrix (n, padded) of a front."""
+    size = row_start[s + 1] - row_start[s] - (first[s + 1] - first[s])
+    stride = padded(size)
+    return stacks[update_start[s] : update_start[s] + size * stride].reshape(size, stride)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
+    """right - A x of a matrix stored by its upper triangle, and the largest entry of |A| |x|."""
+    residual, size = right.copy(), np.zeros(len(x))
+    for j in range(len(x)):
+        for e in range(indptr[j], indptr[j + 1]):
+            i = indices[e]
+            product = data[e] * x[j]
+            residual[i] -= product
+            size[i] += abs(product)
+            if i != j:
+                product = data[e] * x[i]
+                residual[j] -= product
+                size[j] += abs(product)
+    return residual, size.max() if len(x) else 0.0
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
+    """Forward and backward substitution in place, supernode by supernode."""
+    supers = len(first) - 1
+    for s in range(supers):
+        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
+        values = local[: padded(size)]
+        values[:width], values[width:] = x[first[s] : first[s + 1]], 0.0
+        forward(panel, values, aside)
+        x[first[s] : first[s + 1]] = values[:width]
+        for i in range(width, size):
+            x[rows[row_start[s] + i]] += values[i]
+    for s in range(supers - 1, -1, -1):
+        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
+        values = local[: padded(size)]
+        for i in range(size):
+            values[i] = x[rows[row_start[s] + i]]
+        backward(panel, pivots[first[s] : first[s + 1]], values, aside)
+        x[first[s] : first[s + 1]] = values[:width]

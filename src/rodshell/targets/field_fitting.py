@@ -1,0 +1,389 @@
+"""From a triangle mesh to its smooth field: samples, openings filled, least squares, and on past an open rim."""
+
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+
+import numpy as np
+from numba import njit
+
+from rodshell.arrays import Bools, Floats, Ints
+from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.targets.cell_list import CellList
+from rodshell.targets.smooth_field import TERMS, SmoothField
+from rodshell.targets.trianglemesh import TriangleMesh, unique_rows
+
+# samples of a mesh
+LONGEST = 0.9  # spacings: longest edge that is not divided
+FINEST = 48  # divisions of an edge
+APART = 0.2  # spacings: samples closer to each other are merged
+
+# openings
+STEEPEST = 0.35  # cosine between an opening's axis and the normals around it: beyond it no cap fits, as on a tube
+BAND = 0.6  # of the opening's radius: width of the surface around it through which a cap is laid
+CAP_POINTS = 1500  # through which a cap is laid, at most
+DEEP, WIDEST = 0.3, 0.5  # a door is at least so deep, in its widths, and at most so wide, in the surface's extents
+PITCH = 0.5  # spacings between the samples of a cap
+
+# least squares
+FEWEST, MOST = 300, 8000  # cubics on a surface
+POINTS_EACH = 3.0  # points for each cubic
+FIT_RADIUS = 2.4  # spacings: points to which a cubic is fitted; their weight falls to exp(-2.9)
+FADE = 1.4  # spacings: radius of that weight
+SAME_SIDE = 0.3  # cosine between normals: points of another sheet of the surface are left out
+RIDGE = 1e-7  # of the sum of weights: keeps the least squares regular where points are few
+
+# past an open rim
+EASE = 1.5  # [rad] curvature fades as 1 / (1 + turned / EASE), so that the surface does not roll up
+DIRECTIONS = 12  # in which a cubic past the rim looks for sites of the next
+MEANS = 10  # cubics of which a new one is the mean
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points of a surface.
+
+    Parameters
+    ----------
+    points : (n, 3) [m].
+    normals : (n, 3) outward unit normals.
+    areas : (n,) area that each point represents [m2].
+    """
+
+    points: Floats
+    normals: Floats
+    areas: Floats
+
+
+def mesh_samples(mesh: TriangleMesh, spacing: float) -> Samples:
+    """Sample the smooth surface that a mesh represents, densely enough to fit cubics to.
+
+    The samples are the vertices, and points on triangles that are large against the spacing or long and thin. Between
+    its vertices the surface is taken as a cubic that meets their normals [Vlachos et al. 2001, Curved PN triangles]: a
+    long triangle of a vault lies below the arch that it spans. Vertices of the rim come first, so that cubics are
+    placed there: beyond the rim there is nothing to fit to.
+
+    Parameters
+    ----------
+    mesh : the surface.
+    spacing : distance between the cubics that will be fitted [m].
+    """
+    corners = mesh.vertices[mesh.faces]
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+    divisions = np.clip(np.ceil(longest / (LONGEST * spacing)), 1, FINEST).astype(int)
+    areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.areas * (divisions == 1) / 3, 3), len(mesh.vertices))
+    rim_first = np.argsort(~np.isin(np.arange(len(mesh.vertices)), np.concatenate([[-1], *mesh.loops])), kind="stable")
+    points, normals, weights = [mesh.vertices[rim_first]], [mesh.normals[rim_first]], [areas[rim_first]]
+    for n in np.unique(divisions[divisions > 1]):
+        chosen = np.flatnonzero(divisions == n)
+        i, j = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)]).T
+        share = np.stack([i, j, n - i - j]) / n
+        x, normal = _curved(corners[chosen], mesh.normals[mesh.faces[chosen]], share)
+        points.append(x.reshape(-1, 3))
+        normals.append(normal.reshape(-1, 3))
+        weights.append(np.repeat(mesh.areas[chosen] / share.shape[1], share.shape[1]))
+    return _thinned(np.vstack(points), np.vstack(normals), np.concatenate(weights), APART * spacing)
+
+
+def _curved(x: Floats, n: Floats, share: Floats) -> tuple[Floats, Floats]:
+    """Points and normals (m, k, 3) of curved triangles with corners x, normals n (m, 3, 3) at `share` (3, k)."""
+    cubic = np.einsum("ck,mcd->mkd", share**3, x)
+    middle = np.zeros_like(x[:, 0])
+    for a in range(3):
+        for b in range(3):
+            if a != b:
+                control = (2 * x[:, a] + x[:, b] - dot(x[:, b] - x[:, a], n[:, a])[:, None] * n[:, a]) / 3
+                cubic += 3 * (share[a] ** 2 * share[b])[None, :, None] * control[:, None]
+                middle += control / 4
+    middle -= x.sum(axis=1) / 6
+    cubic += 6 * np.prod(share, axis=0)[None, :, None] * middle[:, None]
+    mixed = np.einsum("ck,mcd->mkd", share, n)
+    return cubic, mixed / np.maximum(np.linalg.norm(mixed, axis=2), 1e-300)[..., None]
+
+
+def _thinned(points: Floats, normals: Floats, areas: Floats, apart: float) -> Samples:
+    """One sample for each cell of a lattice, with the area of all samples in it; vertices are preferred."""
+    sound = np.isfinite(points).all(axis=1) & (dot(normals, normals) > 0.5)
+    points, normals, areas = points[sound], normals[sound], areas[sound]
+    cell = np.floor((points - points.min(axis=0)) / apart).astype(np.int64)
+    facing = (normals @ [0.577, 0.578, 0.579] > 0).astype(np.int64)  # two sheets in one cell stay two
+    first, cell_of = unique_rows(np.column_stack([cell, facing]))
+    order = np.argsort(first)
+    weight = np.bincount(cell_of, areas)
+    return Samples(points[first][order], unit(normals[first][order]), np.maximum(weight, 1e-3 * weight.mean())[order])
+
+
+def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Samples:
+    """Add samples across every opening, and every door in the outer edge, where a smooth cap fits.
+
+    The net continues there, although no rod does. Without a cap the surface would be continued into a door from three
+    sides, and would meet itself there in a crease. A cap is the interpolant of |r|^3 through the surface around the
+    opening: it bends least [Duchon 1977].
+
+    Parameters
+    ----------
+    mesh : the surface.
+    samples : of the mesh.
+    spacing : distance between the cubics that will be fitted [m].
+    """
+    points, normals = [samples.points], [samples.normals]
+    outer, *openings = [mesh.vertices[loop] for loop in mesh.loops] or [np.empty((0, 3))]
+    for rim in (*openings, *_doors(outer, spacing)):
+        cap = _cap(rim, samples, spacing)
+        if cap is not None:
+            points.append(cap[0])
+            normals.append(cap[1])
+    added = sum(map(len, points[1:]))
+    areas = np.append(samples.areas, np.full(added, (PITCH * spacing) ** 2))
+    return Samples(np.vstack(points), np.vstack(normals), areas)
+
+
+def _doors(rim: Floats, spacing: float) -> list[Floats]:
+    """Deep bays of a closed polyline (n, 3): parts of it inside its convex hull, in the plane that fits it best."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(rim) < 4:
+        return []
+    centred = rim - rim.mean(axis=0)
+    plane = np.linalg.svd(centred, full_matrices=False)[2][:2]
+    try:
+        corners = np.sort(ConvexHull(centred @ plane.T).vertices)
+    except QhullError:  # a line
+        return []
+    extent, doors = float(np.ptp(rim, axis=0).max()), list[Floats]()
+    for first, stop in zip(corners, np.append(corners[1:], corners[0] + len(rim)), strict=True):
+        x = rim[np.arange(first, stop + 1) % len(rim)]
+        along = unit(x[-1:] - x[:1])
+        off = np.linalg.norm(cross(x - x[:1], np.broadcast_to(along, x.shape)), axis=1)
+        inside = np.flatnonzero(np.diff(np.concatenate([[False], off > spacing, [False]]).astype(int)))
+        for begin, end in inside.reshape(-1, 2):
+            door = x[max(begin - 1, 0) : end + 1]
+            wide, deep = float(np.linalg.norm(door[-1] - door[0])), float(off[begin:end].max())
+            if deep > max(DEEP * wide, 2 * spacing) and wide < WIDEST * extent:
+                doors.append(door)
+    return doors
+
+
+def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats] | None:
+    """Points and normals (n, 3) on a lattice over the plane of a rim (k, 3); None where there is no such cap."""
+    from scipy.interpolate import RBFInterpolator
+
+    centre = rim.mean(axis=0)
+    axis = cross(np.roll(rim, -1, axis=0) - centre, rim - centre).sum(axis=0)  # the hole is on the right of its loop
+    axis /= max(float(np.linalg.norm(axis)), 1e-300)
+    radius = float(np.linalg.norm(rim - centre, axis=1).max())
+    near = np.linalg.norm(samples.points - centre, axis=1) < (1 + BAND) * radius + 2 * spacing
+    around, facing = samples.points[near], samples.normals[near]
+    if len(around) < 12 or dot(facing, axis).min() < STEEPEST:
+        return None
+    chosen = np.unique(np.linspace(0, len(around) - 1, CAP_POINTS).astype(int))
+    first = unit(cross(axis, np.array([0.0, 1.0, 0.0]) if abs(axis[0]) > 0.7 else np.array([1.0, 0.0, 0.0])))
+    plane = np.stack([first, cross(axis, first)])
+    height = RBFInterpolator((around[chosen] - centre) @ plane.T, (around[chosen] - centre) @ axis, kernel="cubic")
+    reach = int(radius / (PITCH * spacing))
+    steps = np.arange(-reach, reach + 1) * PITCH * spacing
+    lattice = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    flat = lattice[_enclosed(lattice, (rim - centre) @ plane.T)]
+    if len(flat) == 0:
+        return None
+    h = 0.1 * spacing
+    slope = [(height(flat + h * way) - height(flat - h * way)) / (2 * h) for way in np.eye(2)]
+    normals = unit(axis - slope[0][:, None] * plane[0] - slope[1][:, None] * plane[1])
+    return centre + flat @ plane + height(flat)[:, None] * axis, normals
+
+
+def _enclosed(points: Floats, loop: Floats) -> Bools:
+    """(n,) plane points inside a closed polygon, by crossings of a ray along x."""
+    a, b = loop, np.roll(loop, -1, axis=0)
+    inside = np.zeros(len(points), dtype=bool)
+    for p, q in zip(a, b, strict=True):
+        across = (p[1] > points[:, 1]) != (q[1] > points[:, 1])
+        at = p[0] + (points[:, 1] - p[1]) / (q[1] - p[1] if q[1] != p[1] else 1.0) * (q[0] - p[0])
+        inside ^= across & (points[:, 0] < at)
+    return inside
+
+
+def cubic_spacing(area: float, count: int) -> float:
+    """Distance between cubics [m] for a surface of `area` [m2] that is known at `count` points."""
+    return sqrt(area / min(max(count / POINTS_EACH, FEWEST), MOST))
+
+
+def fit_field(samples: Samples, spacing: float, *, past: float, reach: float) -> tuple[SmoothField, int]:
+    """Fit a smooth field to samples of a surface, by weighted least squares.
+
+    Parameters
+    ----------
+    samples : of the surface.
+    spacing : distance between cubics [m], see `cubic_spacing`.
+    past : how far the field is continued past an open rim [m].
+    reach : distance from the cubics up to which the field is defined [m].
+
+    Returns
+    -------
+    The field; and the number of its cubics that are on the surface (or fill an opening), which come first.
+    """
+    points = CellList.of(samples.points, spacing)
+    chosen = points.spread(spacing)
+    centres, normals = samples.points[chosen], samples.normals[chosen]
+    start, near, _ = points.within(centres, FIT_RADIUS * spacing)
+    frames = _frames(normals)
+    coefficients = np.empty((len(centres), TERMS))
+    _fit(centres, frames, spacing, start, near, samples.points, samples.normals, samples.areas, coefficients)
+    field = SmoothField(centres, frames, coefficients, spacing, reach)
+    return _continued(field, points, int(np.ceil(past / spacing))), len(centres)
+
+
+def _frames(normals: Floats) -> Floats:
+    """(m, 3, 3) two tangents and the normal, as rows."""
+    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    first = unit(cross(helper, normals))
+    return np.stack([first, cross(normals, first), normals], axis=1)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp"})
+def _fit(centres, frames, spacing, start, near, points, normals, areas, coefficients):  # type: ignore[no-untyped-def]
+    """Weighted least squares of cubics over the tangent planes, (m, 10) in units of the spacing."""
+    system, right, row = np.empty((TERMS, TERMS)), np.empty(TERMS), np.empty(TERMS)
+    for m in range(len(centres)):
+        system[:], right[:], weights, count = 0.0, 0.0, 0.0, 0
+        e = frames[m]
+        for k in range(start[m], start[m + 1]):
+            j = near[k]
+            if _along(e[2], normals[j]) < SAME_SIDE:
+                continue
+            d = points[j] - centres[m]
+            a, b, c = _along(e[0], d) / spacing, _along(e[1], d) / spacing, _along(e[2], d)
+            w = areas[j] * np.exp(-_along(d, d) / (FADE * spacing) ** 2)
+            row[0], row[1], row[2], row[3], row[4] = 1.0, a, b, a * a, a * b
+            row[5], row[6], row[7], row[8], row[9] = b * b, a * a * a, a * a * b, a * b * b, b * b * b
+            for p in range(TERMS):
+                right[p] += w * row[p] * c
+                for q in range(p + 1):
+                    system[p, q] += w * row[p] * row[q]
+            weights += w
+            count += 1
+        stiff = 1.0 if count >= 2 * TERMS else 1e9  # too few points for a cubic: a quadric
+        for p in range(TERMS):
+            for q in range(p):
+                system[q, p] = system[p, q]
+            system[p, p] += RIDGE * weights * (stiff if p >= 6 else 1.0 if p >= 3 else 1e-6)
+        coefficients[m] = np.linalg.solve(system, right)
+
+
+@njit(cache=True)
+def _along(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _continued(field: SmoothField, points: CellList, rings: int) -> SmoothField:
+    """Continue a field past the rim, ring by ring, with quadrics that keep the curvature of their neighbours.
+
+    The first ring follows the cubics of the rim, so that curvature changes for one more spacing. Each ring is a mean
+    over the last one, so that noise dies out.
+    """
+    front = np.arange(len(field.centres))
+    for _ in range(rings):
+        sites = _proposals(field, front, points)
+        if len(sites) == 0:
+            break
+        added = _ring(field, sites)
+        first = len(field.centres)
+        field = SmoothField(
+            np.vstack([field.centres, added.centres]), np.vstack([field.frames, added.frames]),
+            np.vstack([field.coefficients, added.coefficients]), field.spacing, field.reach,
+        )  # fmt: skip
+        front = np.arange(first, len(field.centres))
+    return field
+
+
+def _proposals(field: SmoothField, front: Ints, points: CellList) -> Floats:
+    """Points (n, 3) one spacing away from the cubics `front`, where there is neither surface nor cubic yet."""
+    angle, s = np.arange(DIRECTIONS) * 2 * pi / DIRECTIONS, field.spacing
+    a, b = np.cos(angle), np.sin(angle)
+    terms = np.stack([np.ones(DIRECTIONS), a, b, a * a, a * b, b * b, a**3, a * a * b, a * b * b, b**3])
+    lift = field.coefficients[front] @ terms
+    around = np.stack(np.broadcast_arrays(s * a, s * b, lift), axis=2) @ field.frames[front]
+    sites = (field.centres[front][:, None] + around).reshape(-1, 3)
+    sites = sites[field.cells.nearest(sites, limit=0.8 * s)[0][:, 0] > 0.8 * s]
+    sites = sites[points.nearest(sites, limit=0.6 * s)[0][:, 0] > 0.6 * s]
+    return sites[CellList.of(sites, s).spread(0.8 * s)] if len(sites) else sites
+
+
+def _ring(field: SmoothField, sites: Floats) -> SmoothField:
+    """New cubics at about the points `sites` (n, 3): means of position, normal and curvature of cubics nearby."""
+    distance, index = field.cells.nearest(sites, min(MEANS, len(field.centres)))
+    centres, normals = np.empty_like(sites), np.empty_like(sites)
+    cubics = field.centres, field.frames, field.coefficients, field.spacing
+    _means(sites, distance, index, *cubics, centres, normals)
+    frames, coefficients = _frames(unit(normals)), np.zeros((len(sites), TERMS))
+    _curvatures(sites, distance, index, *cubics, frames, coefficients)
+    return replace(field, centres=centres, frames=frames, coefficients=coefficients)
+
+
+@njit(cache=True)
+def _weight(distance, index, frames, spacing):  # type: ignore[no-untyped-def]
+    """Weights (k,) of the cubics nearby, with sum 1; 0 for those of another sheet than the nearest."""
+    weight, total = np.zeros(len(index)), 0.0
+    for k in range(len(index)):
+        if _along(frames[index[k], 2], frames[index[0], 2]) > SAME_SIDE:
+            weight[k] = np.exp(-((distance[k] / (1.2 * spacing)) ** 2))
+            total += weight[k]
+    return weight / total
+
+
+@njit(cache=True)
+def _local(site, centre, e, spacing):  # type: ignore[no-untyped-def]
+    """Coordinates of a point over the plane of a cubic, those in the plane in spacings."""
+    d = site - centre
+    return _along(e[0], d) / spacing, _along(e[1], d) / spacing, _along(e[2], d)
+
+
+@njit(cache=True, error_model="numpy")
+def _means(sites, distance, index, centres, frames, coefficients, spacing, mean, normals):  # type: ignore[no-untyped-def]
+    """Weighted means (n, 3) of the points above `sites` (n, 3) on the cubics nearby, and of their normals."""
+    for n in range(len(sites)):
+        weight = _weight(distance[n], index[n], frames, spacing)
+        mean[n], normals[n] = sites[n], 0.0
+        for k in range(len(weight)):
+            e, c = frames[index[n, k]], coefficients[index[n, k]]
+            a, b, h = _local(sites[n], centres[index[n, k]], e, spacing)
+            height = c[0] + a * (c[1] + a * (c[3] + a * c[6])) + b * (c[2] + b * (c[5] + b * c[9]))
+            height += a * b * (c[4] + a * c[7] + b * c[8])
+            slope_a = c[1] + a * (2 * c[3] + 3 * a * c[6]) + b * (c[4] + 2 * a * c[7] + b * c[8])
+            slope_b = c[2] + b * (2 * c[5] + 3 * b * c[9]) + a * (c[4] + 2 * b * c[8] + a * c[7])
+            steep = np.sqrt(1.0 + (slope_a**2 + slope_b**2) / spacing**2)
+            for i in range(3):
+                mean[n, i] += weight[k] * (height - h) * e[2, i]
+                normals[n, i] += weight[k] * (e[2, i] - (slope_a * e[0, i] + slope_b * e[1, i]) / spacing) / steep
+
+
+@njit(cache=True, error_model="numpy")
+def _curvatures(  # type: ignore[no-untyped-def]
+    sites, distance, index, centres, frames, coefficients, spacing, turned, quadrics
+):
+    """Quadrics (n, 10) over `turned` frames (n, 3, 3), with the weighted mean of the curvature of the cubics nearby.
+
+    Each cubic is rotated into the new tangent plane by the smallest angle. The mean is reduced by `EASE`, so that the
+    surface does not roll up: over one spacing it turns by its largest principal value.
+    """
+    for n in range(len(sites)):
+        weight = _weight(distance[n], index[n], frames, spacing)
+        x, y, z = turned[n]
+        aa = ab = bb = 0.0
+        for k in range(len(weight)):
+            e, c = frames[index[n, k]], coefficients[index[n, k]]
+            a, b, _ = _local(sites[n], centres[index[n, k]], e, spacing)
+            bend_a, bend_b = 2 * c[3] + 6 * a * c[6] + 2 * b * c[7], 2 * c[5] + 6 * b * c[9] + 2 * a * c[8]
+            twist = c[4] + 2 * a * c[7] + 2 * b * c[8]
+            # v turns by v - (v.z) (e2 + z) / (1 + e2.z) for v across e2
+            share = 1.0 / (1.0 + max(_along(e[2], z), -0.9))
+            p, q = _along(x, e[0]), _along(x, e[1])
+            r, s = _along(y, e[0]), _along(y, e[1])
+            over_a, over_b = share * _along(z, e[0]), share * _along(z, e[1])
+            out_x, out_y = _along(x, e[2]), _along(y, e[2])
+            p, q, r, s = p - over_a * out_x, q - over_b * out_x, r - over_a * out_y, s - over_b * out_y
+            aa += weight[k] * (p * p * bend_a + 2 * p * q * twist + q * q * bend_b)
+            ab += weight[k] * (p * r * bend_a + (p * s + q * r) * twist + q * s * bend_b)
+            bb += weight[k] * (r * r * bend_a + 2 * r * s * twist + s * s * bend_b)
+        largest = (0.5 * abs(aa + bb) + np.sqrt(0.25 * (aa - bb) ** 2 + ab**2)) / spacing
+        eased = 1.0 + largest / EASE
+        quadrics[n, 3], quadrics[n, 4], quadrics[n, 5] = 0.5 * aa / eased, ab / eased, 0.5 * bb / eased

@@ -1,0 +1,208 @@
+"""A smooth implicit field through points of a surface: small cubics, blended.
+
+Around evenly spread centres c_i the surface is a cubic over its tangent plane, fitted to the points nearby by
+weighted least squares: Q_i(x) = zeta - q_i(xi, eta). Gaussian weights of |x - c_i| blend them,
+
+    F(x) = sum_i w_i Q_i / sum_i w_i,   w_i = exp(-|x - c_i|^2 / width^2),
+
+a partition of unity [Ohtake et al. 2003, Multi-level partition of unity implicits] with weights that never vanish:
+since |x - c_i|^2 - |x - c_j|^2 is linear in x, the blend is as smooth far off the surface as on it. F is smooth,
+and its gradient and Hessian are exact, which is what Newton needs; a mesh's own facets have neither.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from rodshell.arrays import Floats, Ints
+from rodshell.targets.cell_list import CellList
+from rodshell.targets.target import Implicit
+
+WIDTH = 0.5  # of the spacing of centres: weights of the blend
+NEGLIGIBLE = 16.0  # weights below exp(-16) of the largest change F by some 1e-10 of the spacing
+TERMS = 10  # of a cubic in two variables
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothField:
+    """A smooth implicit function F, blended from cubics over tangent planes.
+
+    Parameters
+    ----------
+    centres : (m, 3) points of the surface, about `spacing` apart [m].
+    frames : (m, 3, 3) whose rows are two tangents and the outward normal.
+    coefficients : (m, 10) of 1, a, b, a^2, ab, b^2, a^3, a^2 b, a b^2, b^3 in a = xi / spacing, b = eta / spacing [m].
+    spacing : between centres [m].
+    reach : F is NaN further than this from every centre [m].
+    """
+
+    centres: Floats
+    frames: Floats
+    coefficients: Floats
+    spacing: float
+    reach: float
+
+    @cached_property
+    def cells(self) -> CellList:
+        """The centres, sorted for searches of the nearest."""
+        return CellList.of(self.centres, self.spacing)
+
+    @property
+    def _radius(self) -> float:
+        """Distance from a centre within which others contribute to F where it is the nearest [m]."""
+        return float(self.spacing * (1.2 + WIDTH * NEGLIGIBLE**0.5))
+
+    @cached_property
+    def _near(self) -> tuple[Ints, Ints, Floats]:
+        """For each centre, the centres that contribute where it is the nearest, nearest first: where each list begins,
+        the lists in a row, and the distances [m]."""
+        return CellList.of(self.centres, 0.5 * self._radius).within(self.centres, self._radius, ordered=True)
+
+    @cached_property
+    def _packed(self) -> Floats:
+        """(m, 22) all numbers of each cubic: centre, tangents over the spacing, normal, coefficients."""
+        tangents = self.frames[:, :2] / self.spacing
+        return np.hstack([self.centres, tangents.reshape(-1, 6), self.frames[:, 2], self.coefficients])
+
+    def nearest(self, x: Floats) -> tuple[Floats, Ints]:
+        """Distance (n,) [m] of the points `x` (n, 3) to the nearest centre, and its index (n,)."""
+        distance, index = self.cells.nearest(x)
+        return distance[:, 0], index[:, 0]
+
+    def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
+        """Evaluate F and its derivatives.
+
+        Parameters
+        ----------
+        x : (n, 3) points [m].
+        second : whether second derivatives are wanted; without them the Hessian is empty.
+        """
+        distance, nearest = self.nearest(x)
+        value, gradient, hessian = np.empty(len(x)), np.empty((len(x), 3)), np.empty((len(x) if second else 0, 3, 3))
+        width2 = (WIDTH * self.spacing) ** 2
+        lists = self._radius, *self._near, self._packed
+        _blend(x, distance, nearest, *lists, width2, second, value, gradient, hessian)
+        value[~(distance <= self.reach)] = np.nan
+        return Implicit(value, gradient, hessian)
+
+
+# Offsets of the quantities of four points in one array: so the compiler does four sums at once.
+LANES = 4
+_X, _Y, _Z, _LEAST, _MOST, _D, _F, _GX, _GY, _GZ, _AX, _AY, _AZ = range(0, 13 * LANES, LANES)
+_DXX, _DXY, _DXZ, _DYY, _DYZ, _DZZ, _HXX, _HXY, _HXZ, _HYY, _HYZ, _HZZ = range(13 * LANES, 25 * LANES, LANES)
+_ALL = 25 * LANES
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _blend(  # type: ignore[no-untyped-def]
+    x, distance, nearest, radius, start, near, away, packed, width2, second, value, gradient, hessian
+):
+    """F, its gradient and, if `second`, its Hessian, for up to four points at a time that share a list of cubics.
+
+    The weights' common factor cancels, so that log w_j = t_j . x + const with t_j = 2 (c_j - c_i) / width^2:
+    F = N / D, N = sum w Q, D = sum w, grad N = sum w (grad Q + Q t), grad D = sum w t = A,
+    hess N = sum w (hess Q + 2 sym(grad Q, t) + Q t t), hess D = sum w t t.
+    """
+    work, first = np.zeros(_ALL), 0
+    while first < len(x):
+        i = nearest[first]
+        count, furthest = _take(x, distance, first, packed[i], radius, width2, work)
+        for k in range(start[i], start[i + 1]):
+            if away[k] > furthest:
+                break
+            _add(packed[near[k]], packed[i], width2, second, work)
+        for m in range(count):
+            n, d, f = first + m, work[_D + m], work[_F + m] / work[_D + m]
+            ax, ay, az = work[_AX + m], work[_AY + m], work[_AZ + m]
+            gx, gy, gz = (work[_GX + m] - f * ax) / d, (work[_GY + m] - f * ay) / d, (work[_GZ + m] - f * az) / d
+            value[n] = f
+            gradient[n, 0], gradient[n, 1], gradient[n, 2] = gx, gy, gz
+            if not second:
+                continue
+            hessian[n, 0, 0] = (work[_HXX + m] - f * work[_DXX + m] - 2 * gx * ax) / d
+            hessian[n, 1, 1] = (work[_HYY + m] - f * work[_DYY + m] - 2 * gy * ay) / d
+            hessian[n, 2, 2] = (work[_HZZ + m] - f * work[_DZZ + m] - 2 * gz * az) / d
+            hessian[n, 0, 1] = hessian[n, 1, 0] = (work[_HXY + m] - f * work[_DXY + m] - gx * ay - gy * ax) / d
+            hessian[n, 0, 2] = hessian[n, 2, 0] = (work[_HXZ + m] - f * work[_DXZ + m] - gx * az - gz * ax) / d
+            hessian[n, 1, 2] = hessian[n, 2, 1] = (work[_HYZ + m] - f * work[_DYZ + m] - gy * az - gz * ay) / d
+        first += count
+
+
+@njit(cache=True, error_model="numpy")
+def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-untyped-def]
+    """Start the sums of the point `first` and of those after it that can use its list. Returns their number, and the
+    distance from its nearest centre up to which centres contribute to any of them, by the triangle inequality."""
+    work[:] = 0.0
+    count, furthest = 0, 0.0
+    for m in range(LANES):
+        n = min(first + m, len(x) - 1)
+        least = (x[n, 0] - centre[0]) ** 2 + (x[n, 1] - centre[1]) ** 2 + (x[n, 2] - centre[2]) ** 2
+        most = distance[n] ** 2 + NEGLIGIBLE * width2
+        reach = np.sqrt(least) + np.sqrt(most)
+        if m == count and first + m < len(x) and (m == 0 or reach <= radius):
+            count, furthest = m + 1, max(furthest, reach)
+        else:  # an unused lane
+            n = first
+        work[_X + m], work[_Y + m], work[_Z + m] = x[n, 0], x[n, 1], x[n, 2]
+        work[_LEAST + m], work[_MOST + m] = least, (most - least) / width2
+    return count, furthest
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
+    """Add one cubic to the sums of four points; see `SmoothField._packed` for its numbers."""
+    x, y, z = p[0], p[1], p[2]
+    tx, ty, tz = (x - centre[0]) * 2 / width2, (y - centre[1]) * 2 / width2, (z - centre[2]) * 2 / width2
+    e0, e1, e2, e3, e4, e5, n0, n1, n2 = p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = p[12], p[13], p[14], p[15], p[16], p[17], p[18], p[19], p[20], p[21]
+    for m in range(LANES):
+        dx, dy, dz = work[_X + m] - x, work[_Y + m] - y, work[_Z + m] - z
+        fade = (dx * dx + dy * dy + dz * dz - work[_LEAST + m]) / width2
+        w = _exponential(fade) if fade < work[_MOST + m] else 0.0
+        a, b = e0 * dx + e1 * dy + e2 * dz, e3 * dx + e4 * dy + e5 * dz
+        q = c0 + a * (c1 + a * (c3 + a * c6)) + b * (c2 + b * (c5 + b * c9)) + a * b * (c4 + a * c7 + b * c8)
+        q = w * (n0 * dx + n1 * dy + n2 * dz - q)
+        qa = w * (c1 + a * (2 * c3 + 3 * a * c6) + b * (c4 + 2 * a * c7 + b * c8))
+        qb = w * (c2 + b * (2 * c5 + 3 * b * c9) + a * (c4 + 2 * b * c8 + a * c7))
+        ux, uy, uz = w * n0 - qa * e0 - qb * e3, w * n1 - qa * e1 - qb * e4, w * n2 - qa * e2 - qb * e5
+        work[_D + m] += w
+        work[_F + m] += q
+        work[_GX + m] += ux + q * tx
+        work[_GY + m] += uy + q * ty
+        work[_GZ + m] += uz + q * tz
+        work[_AX + m] += w * tx
+        work[_AY + m] += w * ty
+        work[_AZ + m] += w * tz
+        if second:
+            qaa, qbb = w * (2 * c3 + 6 * a * c6 + 2 * b * c7), w * (2 * c5 + 6 * b * c9 + 2 * a * c8)
+            qab = w * (c4 + 2 * a * c7 + 2 * b * c8)
+            mx, my, mz = 2 * ux + q * tx, 2 * uy + q * ty, 2 * uz + q * tz
+            vx, vy, vz = qaa * e0 + qab * e3, qaa * e1 + qab * e4, qaa * e2 + qab * e5
+            sx, sy, sz = qab * e0 + qbb * e3, qab * e1 + qbb * e4, qab * e2 + qbb * e5
+            work[_DXX + m] += w * tx * tx
+            work[_DXY + m] += w * tx * ty
+            work[_DXZ + m] += w * tx * tz
+            work[_DYY + m] += w * ty * ty
+            work[_DYZ + m] += w * ty * tz
+            work[_DZZ + m] += w * tz * tz
+            work[_HXX + m] += mx * tx - vx * e0 - sx * e3
+            work[_HYY + m] += my * ty - vy * e1 - sy * e4
+            work[_HZZ + m] += mz * tz - vz * e2 - sz * e5
+            work[_HXY + m] += 0.5 * (mx * ty + my * tx) - vx * e1 - sx * e4
+            work[_HXZ + m] += 0.5 * (mx * tz + mz * tx) - vx * e2 - sx * e5
+            work[_HYZ + m] += 0.5 * (my * tz + mz * ty) - vy * e2 - sy * e5
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _exponential(fade):  # type: ignore[no-untyped-def]
+    """exp(-fade) by arithmetic alone, to 1e-9 up to a fade of 16: the series of its 64th root, squared six times."""
+    y = fade / -64.0
+    root = 1.0 + y * (1.0 + y / 2 * (1.0 + y / 3 * (1.0 + y / 4 * (1.0 + y / 5 * (1.0 + y / 6 * (1.0 + y / 7))))))
+    root *= root
+    root *= root
+    root *= root
+    root *= root
+    root *= root
+    return root * root
