@@ -151,7 +151,7 @@ def warm(runs: int) -> Section:
             for _ in range(runs + 1):
                 for start, times in ((None, cold), (last, again)):
                     begin = clock()
-                    form = rs.find_form(target, layout, ROD, start=start)
+                    form = rs.find_form(target, layout, ROD, warm_start=start)
                     times.append(clock() - begin)
                     solves = [popped.report.factorizations for popped in form.popped.values()]
                     counts = f"{form.draped.report.factorizations} + {' + '.join(map(str, solves))}"

@@ -50,9 +50,9 @@ from rodshell.form import find_form
 told("other imports")
 form = find_form(target, layout, rod, **options)
 told("solve")
-archive = form.archive(case.to_toml(), takeaway=case.takeaway())
+archive = form.archive(case.to_toml(), options=case.output_options())
 told("checks")
-from rodshell.output.files import DEFAULT, KINDS, Content
+from rodshell.output.files import Content, DEFAULT, KINDS
 content = Content(archive)
 content.drawings
 told("drawings")

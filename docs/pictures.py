@@ -2,16 +2,14 @@
 
 from pathlib import Path
 
-from rodshell.case import load_case
-from rodshell.form import find_form
+from rodshell.job import Job
 from rodshell.output import picture_svg
 
 FOLDER = Path(__file__).parent / "pictures"
 
 
 def main() -> None:
-    target, layout, rod, options = load_case("pavilion").build()
-    archive = find_form(target, layout, rod, **options).archive()
+    archive = Job.load("pavilion").run().archive()
     (FOLDER / "pavilion-flat.svg").write_text(picture_svg(archive, "flat"), encoding="utf-8")
     (FOLDER / "pavilion-pinned.svg").write_text(picture_svg(archive, "popped_pinned", "stress"), encoding="utf-8")
 

@@ -11,7 +11,7 @@ from math import degrees, pi
 from pathlib import Path
 
 import rodshell as rs
-from rodshell.output.verdict import verdict_of
+from rodshell.results.verdict import verdict_of
 
 DATA = Path(__file__).parent / "data"
 MM = 1e-3  # m
@@ -96,6 +96,6 @@ if __name__ == "__main__":
         print(f"{name}: {len(form.footprint.rods)} rods, angle {angle:.0f} deg, gap rms {gaps}")
         if asked:
             archive = form.archive()
-            found = verdict_of(archive.result)
+            found = verdict_of(archive.results)
             print(f"  {found.headline}")
             archive.save(Path("out") / name.replace(" ", "-").replace(",", ""))

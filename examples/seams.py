@@ -25,7 +25,7 @@ def ball() -> rs.Target:
     return rs.Cap(radius=5.0, base=-3.0)
 
 
-def check(form: rs.Sewn) -> None:
+def check(form: rs.Form) -> None:
     """Both patches end at the very same points, converged and stable."""
     assert form.status == "converged"
     for ends in form.popped:
@@ -41,21 +41,21 @@ def check(form: rs.Sewn) -> None:
         assert form.popped[ends][1].stable
 
 
-def roof() -> rs.Sewn:
+def roof() -> rs.Form:
     """In a valley a free grid springs off its target; a seam there holds it down."""
     whole = rs.find_form(bumps(), LAYOUT, LATH, ends=("clamped",))
-    form = rs.sew(bumps(), [[(0.0, -6.0), (0.0, 6.0)]], LAYOUT, LATH)
+    form = rs.find_form(bumps(), LAYOUT, LATH, seams=[[(0.0, -6.0), (0.0, 6.0)]])
     assert form.agreement["clamped"].rms < 0.2 * whole.agreement["clamped"].rms
     return form
 
 
-def sphere() -> rs.Sewn:
+def sphere() -> rs.Form:
     """Rods of both families become parallel on the whole; on its halves they meet at 30 degrees and more."""
     try:
         rs.find_form(ball(), LAYOUT, LATH)
     except rs.NetLimitError as reason:
         print(reason)
-    form = rs.sew(ball(), [[(-6.0, 0.0), (6.0, 0.0)]], LAYOUT, LATH)
+    form = rs.find_form(ball(), LAYOUT, LATH, seams=[[(-6.0, 0.0), (6.0, 0.0)]])
     assert min(degrees(laid.net.min_angle) for laid in form.laid.values()) > 30.0
     assert form.agreement["clamped"].rms_relative < 5e-4
     return form

@@ -53,7 +53,7 @@ for name, at in sliders.items():
 target, layout, anchor = design()
 form = rs.find_form(target, layout, rod, anchor=anchor)
 target, layout, anchor = design(spacing=0.0306)
-again = rs.find_form(target, layout, rod, anchor=anchor, start=form)
+again = rs.find_form(target, layout, rod, anchor=anchor, warm_start=form)
 afresh = rs.find_form(target, layout, rod, anchor=anchor)
 for ends, popped in again.popped.items():
     assert popped.report.stable

@@ -2,12 +2,11 @@
 
     import rodshell as rs
 
-    target = rs.Hemisphere(radius=0.2)
-    layout = rs.GridLayout.orthogonal(rods=(17, 17), spacing=0.03, length=1.2, edge=0.005)
-    rod = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
-    form = rs.find_form(target, layout, rod)
+    job = rs.Job.load("hemisphere")              # a case by its name or its file, or rs.Job(target, layout, rod)
+    form = job.run(progress=rs.bar)
     print(form.summary())
     form.save("out/dome")
+    turned = job.changed(layout__rotate="10 deg").run(warm_start=form)
 
 Names are imported when they are first used, so that the command line starts at once.
 """
@@ -20,6 +19,7 @@ from rodshell.uncached import allow_uncached
 allow_uncached()
 
 if TYPE_CHECKING:
+    from rodshell.checks import check
     from rodshell.errors import (
         ConvergenceError,
         InputError,
@@ -29,14 +29,13 @@ if TYPE_CHECKING:
         RodshellError,
         StabilityError,
     )
-    from rodshell.fabrication import Fabrication
-    from rodshell.form import Form, PoppedUp, Sewn, find_form, pop_up_table, sew
+    from rodshell.fabrication import Fabrication, fabricate
+    from rodshell.form import Form
     from rodshell.formfinding import (
         Agreement,
         Bound,
         Boundary,
         Draped,
-        DrapeFigures,
         Fall,
         Footprint,
         Gravity,
@@ -49,7 +48,10 @@ if TYPE_CHECKING:
         trim,
     )
     from rodshell.formfinding.dynamic_pop_up import DynamicPopUp, DynamicPopUpSettings, dynamic_pop_up
-    from rodshell.formfinding.sewn import PatchLayout
+    from rodshell.formfinding.patches import PatchLayout
+    from rodshell.formfinding.progress import bar
+    from rodshell.formfinding.search import search
+    from rodshell.job import Job, find_form, pop_up_table
     from rodshell.joints import (
         Ball,
         ExplicitPenalty,
@@ -61,11 +63,12 @@ if TYPE_CHECKING:
         Spring,
     )
     from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
-    from rodshell.model.elastic_rod import ElasticRod, RodStrains
+    from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
-    from rodshell.nets import ChebyshevNet, chebyshev_net, sphere_net_end, sphere_net_rod
-    from rodshell.output.archive import Archive, read
-    from rodshell.output.takeaway import DrawingStyle, Takeaway
+    from rodshell.nets import ChebyshevNet, chebyshev_net
+    from rodshell.output import export, save
+    from rodshell.output.options import DrawingStyle, OutputOptions
+    from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
     from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
@@ -89,33 +92,36 @@ if TYPE_CHECKING:
     )
 
 _HOMES = {
+    "rodshell.checks": ("check",),
     "rodshell.errors": (
-        "ConvergenceError", "RodshellError", "InputError", "NetLimitError", "OutOfTimeError", "OutputError",
+        "ConvergenceError", "InputError", "NetLimitError", "OutOfTimeError", "OutputError", "RodshellError",
         "StabilityError",
     ),
-    "rodshell.fabrication": ("Fabrication",),
-    "rodshell.form": ("Form", "PoppedUp", "Sewn", "find_form", "pop_up_table", "sew"),
+    "rodshell.fabrication": ("Fabrication", "fabricate"),
+    "rodshell.form": ("Form",),
     "rodshell.formfinding": (
-        "Agreement", "Bound", "Boundary", "DrapeFigures", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed",
-        "agreement", "drape", "map_back", "pop_up", "trim",
+        "Agreement", "Bound", "Boundary", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed", "agreement",
+        "drape", "map_back", "pop_up", "trim",
     ),
     "rodshell.formfinding.dynamic_pop_up": ("DynamicPopUp", "DynamicPopUpSettings", "dynamic_pop_up"),
-    "rodshell.formfinding.sewn": ("PatchLayout",),
-    "rodshell.joints": (
-        "Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring",
-    ),
+    "rodshell.formfinding.patches": ("PatchLayout",),
+    "rodshell.formfinding.progress": ("bar",),
+    "rodshell.formfinding.search": ("search",),
+    "rodshell.job": ("Job", "find_form", "pop_up_table"),
+    "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
-    "rodshell.model.elastic_rod": ("ElasticRod", "RodStrains"),
+    "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
-    "rodshell.nets": ("ChebyshevNet", "chebyshev_net", "sphere_net_end", "sphere_net_rod"),
+    "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
+    "rodshell.output": ("export", "save"),
+    "rodshell.output.options": ("DrawingStyle", "OutputOptions"),
+    "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
-    "rodshell.output.archive": ("Archive", "read"),
-    "rodshell.output.takeaway": ("DrawingStyle", "Takeaway"),
-    "rodshell.solve.rod_supports": ("RodLoads", "RodSupports"),
-    "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
     "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
+    "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
+    "rodshell.solve.rod_supports": ("RodLoads", "RodSupports"),
     "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
@@ -125,17 +131,17 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError",
-    "Damping", "Disc", "DrapeFigures", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings",
-    "ElasticRod", "Ellipse", "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid",
-    "FlatRod", "Footprint", "Form", "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh",
-    "HeightField", "Hemisphere", "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Linker",
-    "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "Paraboloid", "PatchLayout", "Pin",
-    "Placement", "PointLoads", "PopUp", "PoppedUp", "Rectangle", "RectangularSection", "Rigid", "Rod", "RodLoads",
-    "RodShape", "RodStrains", "RodSupports", "RodshellError", "Sample", "Sewn", "SharedDofs", "Shell", "Spring",
-    "StabilityError", "Takeaway", "Target", "TimeSeries", "Trimmed", "Tube", "agreement", "chebyshev_net", "drape",
-    "dynamic_pop_up", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "sew",
-    "simulate", "solve_rod", "sphere_net_end", "sphere_net_rod", "straight_rods", "surface_from", "trim",
+    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
+    "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse", "Ellipsoid",
+    "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform",
+    "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
+    "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Motion", "NetLimitError",
+    "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads",
+    "PopUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports",
+    "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed",
+    "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export", "fabricate",
+    "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save", "search",
+    "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

@@ -1,348 +1,324 @@
-"""The front door: from a target to a form in one call, and what can be done with it."""
+"""A form that was found: its stages, its checks and fabrication, and its files."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rodshell.case.from_objects import case_text
-from rodshell.checks import Checks, Contact, check
+from rodshell.arrays import Floats
+from rodshell.case import Case
+from rodshell.checks import Checks, check
 from rodshell.checks.contact import contact_of_patches
 from rodshell.checks.merge import merged_checks
 from rodshell.errors import InputError
-from rodshell.fabrication import fabricate
-from rodshell.formfinding import Bound, FoundForm, Method, PoppedTable, find_stages, pop_up_stages
+from rodshell.fabrication import Fabricated, fabricate
+from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
+from rodshell.formfinding.patches import MergedPopUp, PatchedForm
 from rodshell.formfinding.popup import Ends
-from rodshell.formfinding.progress import Progress, limited, silent
-from rodshell.formfinding.sewn import PatchLayout, SewnForm, find_sewn_stages
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.seams import Meeting
+from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
-from rodshell.layout import FlatGrid, GridLayout
-from rodshell.output import Archive
-from rodshell.output.inputs import read_inputs
-from rodshell.output.result import States, form_result, form_states, table_result, table_states
-from rodshell.output.sewn import sewn_result, sewn_states, with_seam_forces
-from rodshell.output.takeaway import Takeaway
-from rodshell.output.verdict import Verdict, verdict
-from rodshell.output.workshop import PREFERRED, sharpest, workshop_result, workshop_states
+from rodshell.layout import GridLayout
+from rodshell.output.files import save
+from rodshell.output.options import OutputOptions
+from rodshell.output.pictures import picture_svg
+from rodshell.results import Archive, Results, Verdict
+from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
+from rodshell.results.from_form import results_of, states_of, with_seam_forces
 from rodshell.rods.section import Rod
-from rodshell.targets import Target
-from rodshell.targets.patch import Seam
-from rodshell.validation import instance
+from rodshell.targets import Seam, Target
 
-FOUND = "a form that an earlier rodshell.find_form returned (one read from a folder: run its case.toml again)"
-LONGEST_STRETCH = 1.02  # of a rod between its final ends; a rod drawn further is a mistake in the table
+Stages = PatchForm | PatchedForm
 
 
-class _Judged:
-    """A job's result with its checks, made once with the usual options, and what they come to."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Form:
+    """What `Job.run` and `find_form` return. Two forms are equal that have the same case and the same shapes.
+
+    Parameters
+    ----------
+    case : everything that decided it, in SI, with what was left open ("auto") as it was decided.
+    asked : the same as it was asked for.
+    stages : what form finding returned, of the whole or of its patches.
+    options : of checks, fabrication and drawings.
+    inputs : contents of the files that the case names, by their path in it.
+    search : the search for anchor and heading, where the case asked for one.
+    reused : the stages that were taken over from an earlier form, see `Job.run`.
+    """
+
+    case: Case
+    asked: Case
+    stages: Stages
+    options: OutputOptions
+    inputs: Mapping[str, bytes]
+    search: Search | None = None
+    reused: tuple[str, ...] = ()
+    _known_checks: Checks | None = field(default=None)
+    _known_fabrication: Fabricated | None = field(default=None)
+
+    # What was asked for
+
+    @property
+    def target(self) -> Target:
+        """The shape wanted.
+
+        Raises
+        ------
+        InputError : the form comes from a table of rods; so for `layout`.
+        """
+        return self.stages.target
+
+    @property
+    def layout(self) -> GridLayout:
+        """The flat grid asked for."""
+        return self.stages.layout
+
+    @property
+    def rod(self) -> Rod:
+        return self.stages.rod
+
+    @property
+    def joint(self) -> Joint:
+        return self.stages.joint
+
+    @property
+    def ends(self) -> tuple[Ends, ...]:
+        """The end conditions asked for."""
+        return self.stages.ends
+
+    @property
+    def from_table(self) -> bool:
+        """Whether it comes from a table of rods, which has no target."""
+        return isinstance(self.stages, PatchForm) and self.stages.from_table
+
+    # The stages
+
+    @property
+    def patches(self) -> tuple[PatchForm, ...]:
+        """The stages of each patch; a form in one piece has one."""
+        return tuple(self.stages.found.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
+
+    @property
+    def seams(self) -> tuple[Seam, ...]:
+        """The lines along which the target was cut."""
+        return self.stages.seams if isinstance(self.stages, PatchedForm) else ()
+
+    @property
+    def meetings(self) -> tuple[Meeting, ...]:
+        """Where rods of two patches end at one point of a seam."""
+        return self.stages.meetings if isinstance(self.stages, PatchedForm) else ()
+
+    @property
+    def draped(self) -> Draped:
+        """The grid on its target, of a form in one piece; of several patches see `patches`.
+
+        Raises
+        ------
+        InputError : the form has several patches, or comes from a table of rods; so for `trimmed`.
+        """
+        return self._only_patch("draped").draped
+
+    @property
+    def trimmed(self) -> Trimmed:
+        """The draped grid cut to its target, of a form in one piece."""
+        return self._only_patch("trimmed").trimmed
+
+    @property
+    def footprint(self) -> Footprint:
+        """The flat grid; of several patches side by side."""
+        return self.stages.footprint
+
+    @property
+    def boundary(self) -> Boundary:
+        """Where all rod ends go, rod by rod."""
+        return self.stages.boundary
+
+    @property
+    def popped(self) -> Mapping[Ends, PopUp | MergedPopUp]:
+        """The popped-up shell with each kind of ends; of several patches that of all together."""
+        return self.stages.popped
+
+    @property
+    def agreement(self) -> Mapping[Ends, Agreement]:
+        """How far the popped-up shell is from its target, with each kind of ends; empty for a table of rods."""
+        return self.stages.agreement
+
+    @property
+    def dropped(self) -> tuple[tuple[str, str], ...]:
+        """Rods that are not built, with the reason."""
+        return self.stages.dropped
+
+    @property
+    def status(self) -> str:
+        """ "converged", or which stage stopped and what to do; checks are not counted."""
+        return self.stages.status
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences of form finding that a user should read; those of checks are in the archive."""
+        return self.stages.warnings
+
+    # Checks, fabrication, verdict
 
     @cached_property
-    def _checked(self) -> Archive:
-        return self.archive()  # type: ignore[attr-defined]
+    def checks(self) -> Checks:
+        """The checks of every shell that converged; made when they are first asked for, if `Job.run` made none."""
+        return self._known_checks or self._checked(silent)
+
+    @cached_property
+    def fabrication(self) -> Fabricated:
+        """Cut list, layers, splices, stock and bracing; made as `checks` are."""
+        if self._known_fabrication is not None:
+            return self._known_fabrication
+        ends = final_ends(self.checks)
+        shape = None if ends is None else self.popped[ends].positions
+        return fabricate(
+            self.footprint.mesh, self.rod, self.options.fabrication, curvature=sharpest(self.checks), final=shape
+        )
+
+    @property
+    def known_checks(self) -> Checks | None:
+        """The checks, if they were made."""
+        return self.__dict__.get("checks", self._known_checks)
+
+    @property
+    def known_fabrication(self) -> Fabricated | None:
+        """The fabrication, if it was made."""
+        return self.__dict__.get("fabrication", self._known_fabrication)
 
     @property
     def verdict(self) -> Verdict:
-        """What the result is worth, all checks done: good, check or unbuildable, with the reasons.
+        """What the form is worth, all checks done: good, check or unbuildable, with the reasons."""
+        return self._archive.verdict
 
-        For a strength or other options of the checks: `archive(takeaway=...).verdict`.
+    def with_options(self, options: OutputOptions) -> "Form":
+        """The same stages, to be checked, fabricated and drawn with other options."""
+        same = options.stages == self.options.stages and self._weight(options) == self._weight(self.options)
+        known = self.known_checks if same else None
+        return replace(self, options=options, _known_checks=known, _known_fabrication=None)
+
+    def finished(self, progress: Progress = silent) -> "Form":
+        """This form, its checks and fabrication made now; a progress may end the checks early."""
+        checks = self.known_checks
+        if checks is None or checks.stopped:
+            checks = self._checked(progress)
+        known = replace(self, _known_checks=checks)
+        return replace(known, _known_fabrication=known.fabrication)
+
+    # Files
+
+    def results(self) -> Results:
+        """The typed content of result.json before anything was checked."""
+        return results_of(self.stages)
+
+    def archive(self, *, options: OutputOptions | None = None) -> Archive:
+        """Everything that is kept, checked and made ready to be built.
+
+        options : of checks, fabrication and drawings in place of the form's own.
         """
-        return self._checked.verdict
+        return self._archive if options is None else self.with_options(options)._archive
 
     def summary(self) -> str:
         """One screen of text, all checks done."""
-        return self._checked.summary()
-
-
-class Form(_Judged, FoundForm):
-    """A form that was found: its stages, and its files."""
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json before anything was checked."""
-        return form_result(self)
-
-    def archive(
-        self,
-        case_toml: str | None = None,
-        *,
-        takeaway: Takeaway | None = None,
-        inputs: Mapping[str, bytes] | None = None,
-        progress: Progress = silent,
-    ) -> Archive:
-        """Everything that is kept, checked and made ready to be built.
-
-        case_toml : the input it came from, by default one made from the objects.
-        inputs : contents of the files that it names, by their path in it; default: as they are now.
-        """
-        takeaway = takeaway or Takeaway()
-        if case_toml is None:
-            draped = self.draped
-            case_toml = case_text(
-                self.target, self.layout, self.rod, joint=self.joint,
-                method=draped.method, anchor=draped.anchor, ends=self.ends, takeaway=takeaway,
-            )  # fmt: skip
-        return _archive(self, form_states(self), case_toml, takeaway, progress, inputs)
+        return self._archive.summary()
 
     def save(
         self,
         folder: str | PathLike[str],
         *,
-        case_toml: str | None = None,
-        takeaway: Takeaway | None = None,
+        options: OutputOptions | None = None,
         kinds: Iterable[str] | None = None,
         force: bool = False,
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
 
-        kinds : of files beside the archive, such as "dxf", "csv"; default: all that every installation can.
+        Parameters
+        ----------
+        options : as of `archive`.
+        kinds : of files besides the archive, such as "dxf", "csv"; default: all that every installation can.
         force : also replace files that rodshell did not write, or that were changed since, where it has to write.
 
         Raises
         ------
         OutputError : the folder cannot be written, or such files are there and `force` is False.
         """
-        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
+        return save(self.archive(options=options), folder, kinds, force=force)
 
+    # Python manners
 
-class PoppedUp(_Judged, PoppedTable):
-    """A table of rods that was popped up, and its files."""
+    def __repr__(self) -> str:
+        rods, pieces = len(self.footprint.rods), len(self.patches)
+        name = "a table of rods" if self.from_table else self.target.name
+        parts = f" in {pieces} patches" if pieces > 1 else ""
+        found = f"popped up {' and '.join(self.popped)}" if self.popped else "not popped up"
+        return f"<rodshell.Form of {name}{parts}: {rods} rods, {found}, {self.status}>"
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json before anything was checked."""
-        return table_result(self, "popup")
+    def _repr_html_(self) -> str:
+        """The shell in its final shape and what it is worth, as notebooks show it."""
+        archive = self._archive
+        picture = picture_svg(archive, archive.final or "flat")
+        level, reasons = self.verdict.level, "".join(f"<li>{escape(reason)}</li>" for reason in self.verdict.reasons)
+        return f"<div>{picture}<p>{escape(repr(self))}: <b>{level}</b></p><ul>{reasons}</ul></div>"
 
-    def archive(self, *, takeaway: Takeaway | None = None, progress: Progress = silent) -> Archive:
-        """Everything that is kept, checked and made ready to be built."""
-        return _archive(self, table_states(self), "", takeaway or Takeaway(), progress)
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Form):
+            return NotImplemented
+        if self is other:
+            return True
+        ours, theirs = self._shapes(), other._shapes()
+        same = self.case == other.case and list(ours) == list(theirs)
+        return same and all(np.array_equal(ours[name], theirs[name], equal_nan=True) for name in ours)
 
-    def save(
-        self,
-        folder: str | PathLike[str],
-        *,
-        takeaway: Takeaway | None = None,
-        kinds: Iterable[str] | None = None,
-        force: bool = False,
-    ) -> Path:
-        """As `Form.save`."""
-        return self.archive(takeaway=takeaway).save(folder, kinds, force=force)
+    def __hash__(self) -> int:
+        return hash(self.case)
 
+    def _shapes(self) -> dict[str, Floats]:
+        return {"flat": self.footprint.mesh.flat} | {ends: shell.positions for ends, shell in self.popped.items()}
 
-class Sewn(_Judged, SewnForm):
-    """A form in patches that are sewn together, and its files."""
+    def _only_patch(self, what: str) -> PatchForm:
+        if isinstance(self.stages, PatchedForm):
+            raise InputError(f"this form has {len(self.patches)} patches: take patches[k].{what}")
+        return self.stages
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json before anything was checked."""
-        return sewn_result(self)
+    def _weight(self, options: OutputOptions) -> float:
+        return options.judged_by(self.rod).shear_weight
 
-    def archive(
-        self,
-        case_toml: str | None = None,
-        *,
-        takeaway: Takeaway | None = None,
-        inputs: Mapping[str, bytes] | None = None,
-        progress: Progress = silent,
-    ) -> Archive:
-        """All patches as one: everything that is kept, checked and made ready to be built; see `Form.archive`."""
-        takeaway = takeaway or Takeaway()
-        if case_toml is None:
-            case_toml = case_text(
-                self.target, self.layout, self.rod, joint=self.joint, ends=self.ends, takeaway=takeaway, sewn=self
-            )
-        takeaway.require_known_stress(self.rod, self.joint)
-        weight = takeaway.judged_by(self.rod).shear_weight
-        checks = merged_checks(
-            {
-                name: check(
-                    one.popped, self.rod,
-                    stages=takeaway.stages, shear_weight=weight, progress=progress,
-                )
-                for name, one in self.found.items()
-            },
-            {ends: self._contact(ends) for ends in self.popped},
+    def _checked(self, progress: Progress) -> Checks:
+        self.options.require_known_stress(self.rod, self.joint)
+        settings: dict[str, Any] = {"stages": self.options.stages, "shear_weight": self._weight(self.options)}
+        if not isinstance(self.stages, PatchedForm):
+            return check(self.stages.popped, self.rod, **settings, progress=progress)
+        found = self.stages.found
+        each = {name: check(patch.popped, self.rod, **settings, progress=progress) for name, patch in found.items()}
+        met = {}
+        for ends in self.stages.popped:
+            shells = [patch.popped[ends] for patch in found.values()]
+            states = [(shell.shell, shell.state) for shell in shells]
+            met[ends] = contact_of_patches(self.footprint.mesh, states, self.rod)
+        return merged_checks(each, met)
+
+    @cached_property
+    def _archive(self) -> Archive:
+        checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
+        results = self.results()
+        if isinstance(self.stages, PatchedForm):
+            results = with_seam_forces(results, self.stages, checks)
+        results = checked_results(
+            results, self.footprint.mesh, checks, self.fabrication,
+            strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
         )  # fmt: skip
-        result = with_seam_forces(self.result(), self, checks)
-        shapes = {ends: positions for ends, (positions, _) in self.popped.items()}
-        return _kept(self, result, sewn_states(self), checks, shapes, case_toml, takeaway, inputs)
+        results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
+        states = states_of(self.stages) | checked_states(checks)
+        return Archive(results, states, self._case_with_options().text(), self.inputs)
 
-    def _contact(self, ends: Ends) -> Contact:
-        """Of all patches."""
-        popped = [one.popped[ends] for one in self.found.values()]
-        return contact_of_patches(self.flat.mesh, [(one.shell, one.state) for one in popped], self.rod)
-
-    def save(
-        self,
-        folder: str | PathLike[str],
-        *,
-        case_toml: str | None = None,
-        takeaway: Takeaway | None = None,
-        kinds: Iterable[str] | None = None,
-        force: bool = False,
-    ) -> Path:
-        """As `Form.save`."""
-        return self.archive(case_toml, takeaway=takeaway).save(folder, kinds, force=force)
-
-
-def _archive(
-    job: Form | PoppedUp, states: States, case_toml: str, takeaway: Takeaway, progress: Progress,
-    inputs: Mapping[str, bytes] | None = None,
-) -> Archive:  # fmt: skip
-    """A job's result and states with its checks and its fabrication."""
-    takeaway.require_known_stress(job.rod, job.joint)
-    weight = takeaway.judged_by(job.rod).shear_weight
-    checks = check(job.popped, job.rod, stages=takeaway.stages, shear_weight=weight, progress=progress)
-    shapes = {ends: shell.positions for ends, shell in job.popped.items()}
-    return _kept(job, job.result(), states, checks, shapes, case_toml, takeaway, inputs)
-
-
-def _kept(
-    job: Form | PoppedUp | Sewn, result: dict[str, Any], states: States, checks: Checks, shapes: Mapping[Ends, Any],
-    case_toml: str, takeaway: Takeaway, inputs: Mapping[str, bytes] | None,
-) -> Archive:  # fmt: skip
-    mesh = job.footprint.mesh
-    final = next((shapes[ends] for ends in PREFERRED if ends in checks.bending), None)
-    made = fabricate(mesh, job.rod, takeaway.fabrication, curvature=sharpest(checks), final=final)
-    judged = takeaway.judged_by(job.rod)
-    result = workshop_result(result, mesh, checks, made, judged.strength, judged.shear_strength)
-    result["bending"]["strength_of"] = judged.strength_of
-    if takeaway.rod_chosen:
-        result["rod"] = {**result["rod"], "chosen": dict.fromkeys(takeaway.rod_chosen, True)}
-    if checks.out_of_time and result["status"] == "converged":
-        result["status"] = checks.out_of_time
-    result["drawings"] = takeaway.drawings.parameters()
-    result["name"] = takeaway.drawings.name or result["name"]
-    result["verdict"] = verdict(result).table()
-    kept = read_inputs(case_toml) if inputs is None else inputs
-    return Archive(result, states | workshop_states(checks), case_toml, kept).as_stored()
-
-
-def find_form(
-    target: Target,
-    layout: GridLayout,
-    rod: Rod,
-    *,
-    method: Method = Bound(),
-    anchor: tuple[float, float] | None = None,
-    joint: Joint | None = None,
-    ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
-    start: FoundForm | None = None,
-    progress: Progress = silent,
-    time_limit: float | None = None,
-) -> Form:
-    """From a target to the flat grid that pops up into it, with the proof.
-
-    Parameters
-    ----------
-    target : the shape wanted.
-    layout : the flat grid asked for.
-    rod : section and material of every rod.
-    method : of the drape: `Bound()`, `Gravity()` or `Fall()`, see `drape`.
-    anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
-    joint : what the rods do to each other where they cross, see `pop_up`; ball joints without.
-    ends : end conditions of the pop-up: "pinned", "clamped", or both in a tuple.
-    start : a form found before, for a spacing, heading, anchor or target that has changed a little: its net is where
-        the new net is looked for (with `Bound()`), and where its shells went from their draped states is where the new
-        ones start, rods being matched by their place in the lattice. Any form will do; what does not help is
-        left, and the result is the same as without, to the solver's tolerance. A shell that has several equilibria
-        stays with the one that it is in.
-    progress : called as progress(stage, detail, residual) at every iteration.
-    time_limit : [s] after which the search ends, at its next iteration, with what was found until then.
-
-    Returns
-    -------
-    The form. Its `status` is "converged", or says which stage stopped, or was out of time; nothing is raised for that.
-
-    Raises
-    ------
-    InputError : a value does not fit. NetLimitError : no net covers the target from this anchor and heading.
-    OutOfTimeError : the time limit came before there was a net.
-    """
-    for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
-        instance(name, value, kind)
-    if start is not None:
-        instance("start", start, FoundForm, FOUND)
-    found = find_stages(
-        target, layout, rod,
-        method=method, anchor=anchor, joint=joint, ends=ends,
-        start=start, progress=limited(progress, time_limit),
-    )  # fmt: skip
-    return Form(**{field.name: getattr(found, field.name) for field in fields(found)})
-
-
-def sew(
-    target: Target,
-    seams: Sequence[ArrayLike],
-    layout: GridLayout,
-    rod: Rod,
-    *,
-    own: Mapping[str, PatchLayout] | None = None,
-    joint: Joint | None = None,
-    ends: Ends | Sequence[Ends] = ("pinned", "clamped"),
-    search: bool = False,
-    progress: Progress = silent,
-    time_limit: float | None = None,
-) -> Sewn:
-    """From a target cut into patches to the flat grids that pop up into them and meet at the seams.
-
-    Parameters
-    ----------
-    seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down; each goes on
-        straight past its ends, unless it is closed.
-    layout : of every patch, rods and length "auto"; its heading is that at the target's summit.
-    own : what patches, by their names A, B, ... from left to right, have of their own.
-    rod, joint, ends, progress, time_limit : as of `find_form`.
-    search : whether to look for the heading that leaves out the fewest rods, in place of the layout's.
-
-    Raises
-    ------
-    InputError : a value does not fit. NetLimitError : no net covers a patch from its anchor and heading.
-    OutOfTimeError : the time limit came before every patch had its net.
-    """
-    for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
-        instance(name, value, kind)
-    found = find_sewn_stages(
-        target, [Seam.of(row) for row in seams], layout, rod,
-        own=own, joint=joint, ends=ends, search=search, progress=limited(progress, time_limit),
-    )  # fmt: skip
-    return Sewn(**{field.name: getattr(found, field.name) for field in fields(found)})
-
-
-def pop_up_table(
-    grid: FlatGrid,
-    finals: ArrayLike,
-    rod: Rod,
-    *,
-    joint: Joint | None = None,
-    edge: float | None = None,
-    progress: Progress = silent,
-    time_limit: float | None = None,
-) -> PoppedUp:
-    """Pop up rods from elsewhere: pinned, from flat.
-
-    Parameters
-    ----------
-    grid : the rods, flat (see `straight_rods`).
-    finals : (m, 2, 3) where the ends of each rod go [m].
-    joint : where rods cross, see `pop_up`, without eccentricity; ball joints without.
-    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
-    progress, time_limit : as of `find_form`.
-
-    Raises
-    ------
-    InputError : `finals` does not fit `grid`; no rod has three joints; the joint is eccentric.
-    """
-    points = np.asarray(finals, dtype=float)
-    if points.shape != (len(grid.rods), 2, 3) or not np.isfinite(points).all():
-        raise InputError(f"final ends must be finite and of the shape ({len(grid.rods)}, 2, 3), not {points.shape}")
-    apart = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
-    for rod_line, distance in zip(grid.rods, apart, strict=True):
-        if distance > LONGEST_STRETCH * rod_line.length:
-            raise InputError(
-                f"rod {rod_line.name} is {rod_line.length:.4g} m long, but its final ends lie {distance:.4g} m apart: "
-                "move them closer, or give a longer rod"
-            )
-    found = pop_up_stages(grid, points, rod, joint=joint, edge=edge, progress=limited(progress, time_limit))
-    return PoppedUp(**{field.name: getattr(found, field.name) for field in fields(found)})
+    def _case_with_options(self) -> Case:
+        """The case with the tables of the options."""
+        asked = Case.model_validate(self.options.parameters())
+        tables = {name: getattr(asked, name) for name in ("checks", "fabrication", "drawings")}
+        return self.case.model_copy(update=tables)

@@ -3,8 +3,6 @@
 from dataclasses import MISSING, fields
 from typing import Any
 
-import numpy as np
-
 
 def brief(record: Any) -> str:
     """A dataclass in one line, as its `__repr__`: arrays by their shape, and without what is at its default.
@@ -14,7 +12,7 @@ def brief(record: Any) -> str:
     shown = []
     for field in fields(record):
         value = getattr(record, field.name)
-        if isinstance(value, np.ndarray):
+        if hasattr(value, "dtype") and hasattr(value, "shape"):  # NumPy is not imported: cases show records without it
             shown.append(f"{field.name}={value.shape}")
         elif field.default is MISSING or type(value) is not type(field.default) or value != field.default:
             shown.append(f"{field.name}={value!r}")

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from rodshell.errors import RodshellError
-from rodshell.output import read
-from rodshell.output.manifest import mark, read_manifest
+from rodshell.results import read
+from rodshell.results.folder import mark, read_manifest
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 PROGRAM = "from rodshell.cli import entry; entry()"
@@ -135,10 +135,10 @@ def project(folder: Path) -> str:
         archive = read(folder)
     except RodshellError as error:
         return str(error)
-    name = str(archive.result["drawings"]["project"])
+    name = str(archive.results.plain()["drawings"]["project"])
     if f'project = "{name}"' not in archive.case_toml:
         return f"result.json is of {name}, case.toml is not"
-    ends = np.array(archive.result["footprint"])
+    ends = np.array(archive.results.plain()["footprint"])
     flat = archive.states["flat"]
     if not np.isin(np.round(ends[:, 0], 9), np.round(flat[:, 0], 9)).all():
         return f"result.json is of {name}, states.npz is not"

@@ -18,15 +18,15 @@ import numpy as np
 import rodshell as rs
 from rodshell.checks import bending
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
-from rodshell.output import Archive
-from rodshell.output.archive import export
+from rodshell.output import export
 from rodshell.output.files import DEFAULT
+from rodshell.results import Archive, Results
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
 from tests.acceptance.rows import Row, print_table
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "files"))  # the readers and samples of the tests of files
 from dxf_reader import read_dxf, rods_of_dxf
-from sample_archive import sample_archive, with_way_up
+from sample_archive import sample_archive, with_deployment
 
 TARGETS = {
     "hemisphere": (HEMISPHERE, {"rods": (17, 17)}),
@@ -51,7 +51,7 @@ def rebuilt_rows(name: str) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder:
         export(archive_of(name), folder, ["dxf"])
         flat, final = rods_of_dxf(Path(folder) / "drawings/plan.dxf")
-    grid = straight_rods(1e-3 * flat, names=[rod["id"] for rod in archive_of(name).result["rods"]])
+    grid = straight_rods(1e-3 * flat, names=[rod["id"] for rod in archive_of(name).results.plain()["rods"]])
     again = rs.pop_up_table(grid, 1e-3 * final, ROD, edge=0.005)
     shape = again.popped["pinned"]
     mesh, first = again.footprint.mesh, form_of(name).footprint.mesh
@@ -92,7 +92,7 @@ def file_rows(name: str) -> Iterator[Row]:
     lengths = np.array([
         [1e3 * entry["cut_length"], float(row["cut_length_mm"]), svg[row["id"]],
          float(np.linalg.norm(np.subtract(*cuts[row["id"]])))]
-        for entry, row in zip(archive.result["rods"], rows, strict=True)
+        for entry, row in zip(archive.results.plain()["rods"], rows, strict=True)
     ])  # fmt: skip
     yield Row(name, "cut lengths in JSON, CSV, SVG, DXF, apart", float(np.ptp(lengths, axis=1).max()), 0.01, "mm")
     yield Row(name, "faults that the DXF audit finds", faults, 0)
@@ -120,7 +120,7 @@ def _faults(path: Path) -> int:
 
 def reaction_rows(name: str) -> Iterator[Row]:
     """Sums of forces and of moments over the largest."""
-    for ends, held in archive_of(name).result["reactions"].items():
+    for ends, held in archive_of(name).results.plain()["reactions"].items():
         largest = f"largest {held['largest_force']:.2e} N, {held['largest_moment']:.1e} N m"
         yield Row(name, f"{ends}: sum of reactions over the largest", held["force_imbalance"], 1e-8, "", largest)
         yield Row(name, f"{ends}: sum of moments over the largest", held["moment_imbalance"], 1e-8)
@@ -147,7 +147,7 @@ def time_rows() -> Iterator[Row]:
     rods, seconds = [], []
     for across in (10, 30, 60, 110):
         archive = vault(across)
-        rods.append(len(archive.result["rods"]))
+        rods.append(len(archive.results.plain()["rods"]))
         seconds.append(_seconds(archive))
     slope = float(np.polyfit(np.log(rods), np.log(seconds), 1)[0])
     note = ", ".join(f"{n} rods {s:.2f} s" for n, s in zip(rods, seconds, strict=True))
@@ -174,7 +174,7 @@ def vault(across: int) -> Archive:
     result = {"format": "rodshell-result", "version": 1, "status": "converged", "name": "vault", "rods": entries,
               "footprint": mesh.flat[ends, :2].tolist(), "boundary": bent[ends].tolist()}  # fmt: skip
     states = {"flat": mesh.flat, "popped_pinned": bent, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
-    return with_way_up(Archive(result, states), 9)
+    return with_deployment(Archive(Results.of(result), states), 9)
 
 
 def _seconds(archive: Archive) -> float:
@@ -189,12 +189,12 @@ def size_rows() -> Iterator[Row]:
     """Sizes of reports."""
     for name, archive, bound in (
         ("hemisphere", archive_of("hemisphere"), 5.0),
-        ("60 x 60 grid, ten stages", with_way_up(sample_archive(60, 6)), 15.0),
+        ("60 x 60 grid, ten stages", with_deployment(sample_archive(60, 6)), 15.0),
     ):
         with tempfile.TemporaryDirectory() as folder:
             export(archive, folder, ["report"])
             size = (Path(folder) / "report.html").stat().st_size / 1e6
-        yield Row(name, "size of the report", size, bound, "MB", f"{len(archive.result['rods'])} rods")
+        yield Row(name, "size of the report", size, bound, "MB", f"{len(archive.results.plain()['rods'])} rods")
 
 
 def all_rows() -> Iterator[Row]:

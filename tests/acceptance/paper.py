@@ -19,6 +19,7 @@ from rodshell.formfinding.dynamic_pop_up import DynamicPopUpSettings, dynamic_po
 from rodshell.formfinding.methods import Fall
 from rodshell.formfinding.progress import silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
+from rodshell.nets import sphere_net_end
 from rodshell.paper import fig8, genetic
 from tests.acceptance.rows import Row, print_table
 from tests.paper.falls import TARGETS, Particles
@@ -53,9 +54,7 @@ def stretched(factor: float) -> rs.Rod:
 def net_errors(draped: Draped) -> np.ndarray:
     """How far G0's rod ends lie beyond those of the hemisphere's exact net [mm]."""
     rods = rs.trim(draped).mesh.grid.rods
-    return 1e3 * np.array(
-        [end - rs.sphere_net_end(0.2, abs(rod.offset)) for rod in rods for end in (rod.end, -rod.start)]
-    )
+    return 1e3 * np.array([end - sphere_net_end(0.2, abs(rod.offset)) for rod in rods for end in (rod.end, -rod.start)])
 
 
 def rms(errors: np.ndarray) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import rodshell as rs
+from rodshell.nets import sphere_net_end
 from tests.acceptance.cases import AUTO, BEYOND, FURTHER, PAPER, ROD, SHARP, AcceptanceCase
 from tests.analytic.goursat import goursat_ends
 
@@ -68,7 +69,7 @@ def net_rows(case: AcceptanceCase) -> Iterator[Row]:
     rods = form_of(case).footprint.rods
     if isinstance(case.target, rs.Hemisphere):
         exact = [
-            [sign * rs.sphere_net_end(case.target.radius, rod.offset, case.target.base or 0.0) for sign in (-1, 1)]
+            [sign * sphere_net_end(case.target.radius, rod.offset, case.target.base or 0.0) for sign in (-1, 1)]
             for rod in rods
         ]
         how = "similarity equation"
@@ -160,7 +161,7 @@ def gravity_rows() -> Iterator[Row]:
         draped = rs.drape(case.grid(length=1.2), rod, case.target, method=rs.Gravity())
         rods = rs.trim(draped).mesh.grid.rods
         short = [
-            rs.sphere_net_end(case.target.size, abs(rod.offset)) - end for rod in rods for end in (rod.end, -rod.start)
+            sphere_net_end(case.target.size, abs(rod.offset)) - end for rod in rods for end in (rod.end, -rod.start)
         ]
         rms = 1e3 * float(np.sqrt(np.mean(np.square(short))))
         kind = "stable" if draped.report.stable else f"saddle: {draped.report.negative_modes} negative modes, said so"

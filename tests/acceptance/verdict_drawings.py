@@ -15,15 +15,15 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.cli import main
-from rodshell.output import Archive, read
-from rodshell.output.archive import export
+from rodshell.output import export
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings import sheet_set
+from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.files import KINDS
 from rodshell.output.fonts import CAPITAL
-from rodshell.output.plan import flat_plan
-from rodshell.output.rounding import rounding_of
-from rodshell.output.takeaway import DrawingStyle, Takeaway
+from rodshell.output.options import DrawingStyle, OutputOptions
+from rodshell.results import Archive, read
+from rodshell.results.wording import rounding_of
 from tests.acceptance.cases import HEMISPHERE, ROD
 from tests.acceptance.rows import Row
 
@@ -93,7 +93,7 @@ def dome() -> Archive:
     style = DrawingStyle(
         project="Park", author="A. Nyone", date="2026-11-22", revision="C", tolerance=5e-4, name="Dome"
     )
-    return rs.find_form(HEMISPHERE, layout, ROD).archive(takeaway=Takeaway(stages=2, drawings=style))
+    return rs.find_form(HEMISPHERE, layout, ROD).archive(options=OutputOptions(stages=2, drawings=style))
 
 
 def sheets_of(archive: Archive) -> list[Drawing]:
@@ -133,7 +133,7 @@ def letter_rows(name: str, archive: Archive) -> Iterator[Row]:
 
 def digit_rows(name: str, archive: Archive) -> Iterator[Row]:
     """Digits of lengths beyond the rule: in the schedules that people read, and in every text of the sheets."""
-    digits, beyond, lengths = rounding_of(archive.result).digits, 0, 0
+    digits, beyond, lengths = rounding_of(archive.results).digits, 0, 0
     with tempfile.TemporaryDirectory() as folder:
         for file in export(archive, folder, ["csv"]):
             if "end_paths" in file:  # which finite element programs read
@@ -146,17 +146,17 @@ def digit_rows(name: str, archive: Archive) -> Iterator[Row]:
     for text in (text.text for sheet in strips for text in sheet.texts if text.layer == "LABEL"):
         for number in re.findall(r"\d+\.(\d+)", text):
             lengths, beyond = lengths + 1, beyond + (len(number) > digits)
-    step = rounding_of(archive.result).words
+    step = rounding_of(archive.results).words
     yield Row(name, "lengths with digits beyond the rule", beyond, 0, note=f"{lengths} lengths, shown to {step}")
 
 
 def sum_rows(name: str, archive: Archive) -> Iterator[Row]:
     """Cumulative distances are each rounded from the exact one: no error adds up."""
-    step, worst = rounding_of(archive.result).step, 0.0
+    step, worst = rounding_of(archive.results).step, 0.0
     with tempfile.TemporaryDirectory() as folder:
         export(archive, folder, ["csv"])
         rows = csv.DictReader(io.StringIO((Path(folder) / "schedule/rods.csv").read_text(encoding="utf-8")))
-        for row, rod in zip(rows, archive.result["rods"], strict=True):
+        for row, rod in zip(rows, archive.results.plain()["rods"], strict=True):
             shown = [float(word.split()[-1]) for word in row["joints_from_cut_end_mm"].split("; ") if word]
             before = 0.5 * (rod["cut_length"] - rod["length"])  # the allowance
             exact = sorted(1e3 * (before + joint["at"]) for joint in rod["joints"])
@@ -168,7 +168,7 @@ def title_rows(name: str, archive: Archive) -> Iterator[Row]:
     """Fields of the title block on every sheet of the PDF."""
     sheets = sheets_of(archive)
     missing = sum(label not in {text.text for text in sheet.texts} for sheet in sheets for label in LABELS)
-    given = archive.result["drawings"]
+    given = archive.results.plain()["drawings"]
     wanted = [given[key] for key in ("project", "author", "date", "revision") if given[key]]
     missing += sum(value not in {text.text for text in sheet.texts} for sheet in sheets for value in wanted)
     yield Row(name, "fields of title blocks missing", missing, 0, note=f"{len(sheets)} sheets, {len(LABELS)} fields")

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 import rodshell as rs
+from rodshell.nets import sphere_net_end
 from tests.acceptance.cases import ROD, R
 from tests.acceptance.rows import Row
 from tests.targets.meshes import sheet
@@ -51,7 +52,7 @@ def off_the_sphere(form: rs.Form, eccentricity: float) -> float:
     radius, worst = form.target.size, 0.0
     for rod in form.footprint.rods:
         h = (0.5 if rod.family == "v" else -0.5) * eccentricity
-        exact = (radius + h) / radius * rs.sphere_net_end(radius, rod.offset * radius / (radius - h))
+        exact = (radius + h) / radius * sphere_net_end(radius, rod.offset * radius / (radius - h))
         worst = max(worst, abs(rod.end - exact), abs(rod.start + exact))
     return worst
 

@@ -12,7 +12,7 @@ import numpy as np
 import rodshell as rs
 from examples.gallery import gallery
 from rodshell.cli import main
-from rodshell.output.verdict import verdict_of
+from rodshell.results.verdict import verdict_of
 from tests.acceptance.rows import Row
 
 Range = tuple[float, float]
@@ -94,7 +94,7 @@ def good_rows() -> Iterator[Row]:
         verdict = json.loads((Path(name) / "out" / "result.json").read_text())["verdict"]
     yield Row("pavilion", "not good", float(verdict["level"] != "good"), 0, note=verdict["reasons"][0][:60])
     shells = {name: piece for name, piece in gallery().items() if name in HOPEFUL}
-    good = [name for name, piece in shells.items() if verdict_of(piece.form().archive().result).level == "good"]
+    good = [name for name, piece in shells.items() if verdict_of(piece.form().archive().results).level == "good"]
     yield Row("gallery", "shells missing from five good ones", max(0, 5 - len(good)), 0, note=", ".join(good))
 
 

@@ -117,9 +117,10 @@ def design_rows() -> Iterator[Row]:
     dome, rod = rs.Hemisphere(R), rs.Rod(rs.Circle(1.5e-3), rs.Material(1e9, 1e3))
     seams = [[(-1.0, 0.0), (1.0, 0.0)], [(-1.0, -1.0), (1.0, 1.0)], [(-1.0, 0.2), (0.0, -0.05), (1.0, 0.1)]]
     for number, seam in enumerate(seams, start=1):
-        sewn = rs.sew(dome, [seam], rs.GridLayout.orthogonal(spacing=0.04, edge=0.01), rod, ends=("clamped",))
-        met = sewn._contact("clamped")
-        yield Row(f"dome with seam {number}", "contacts", float(met.pairs), 0, "", f"{len(sewn.meetings)} meetings")
+        layout = rs.GridLayout.orthogonal(spacing=0.04, edge=0.01)
+        form = rs.find_form(dome, layout, rod, seams=[seam], ends=("clamped",))
+        met = form.checks.contact["clamped"]
+        yield Row(f"dome with seam {number}", "contacts", float(met.pairs), 0, "", f"{len(form.meetings)} meetings")
     for offset in (0.0, 0.006, 0.013):
         layout = rs.GridLayout.orthogonal(spacing=0.04, edge=0.01, offset=(offset, offset), rotate=0.3)
         popped = rs.find_form(dome, layout, rod, ends=("clamped",)).popped["clamped"]
@@ -134,7 +135,7 @@ def strength_rows() -> Iterator[Row]:
     assert alone is not None
     for share, says in ((0.5, "200 %"), (1.25, None)):
         strength = share * float(alone.max())
-        result = form.archive(takeaway=rs.Takeaway(strength=strength, stages=0)).result
+        result = form.archive(options=rs.OutputOptions(strength=strength, stages=0)).results.plain()
         used = result["bending"]["pinned"]["utilisation"]
         case = f"laths, strength {share:g} of the stress"
         yield Row(case, "utilisation off", abs(used * share - 1), 1e-6, "", f"{100 * used:.0f} %")
@@ -143,7 +144,7 @@ def strength_rows() -> Iterator[Row]:
         yield Row(case, "said wrongly", float(not said), 0)
     given = rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=0.7))
     try:
-        rs.Takeaway(strength=1e8).require_known_stress(given, rs.Pin())
+        rs.OutputOptions(strength=1e8).require_known_stress(given, rs.Pin())
         refused = ""
     except rs.InputError as error:
         refused = str(error)

@@ -153,6 +153,7 @@ def test_laths_popped_through_are_not_twisted_in_their_clamps() -> None:
     np.testing.assert_allclose(mirrored[rods], -own[rods], atol=0.02 * np.abs(own[rods]).max())
 
 
+@pytest.mark.slow
 def test_a_cap_in_two_layers_is_found_popped_through() -> None:
     """Its joints are nearly where the reflection has them: the layers are 1 % of half the width apart."""
     popped = steel_cap(rs.Pin(eccentricity=2e-3)).popped["pinned"]
@@ -258,7 +259,7 @@ def test_two_shapes_of_a_search_are_never_the_same() -> None:
 
 def test_result_and_summary_say_what_was_found() -> None:
     archive = square_cap().archive()
-    way, searched = archive.result["deployment"], archive.result["other_shapes"]["pinned"]
+    way, searched = archive.results.plain()["deployment"], archive.results.plain()["other_shapes"]["pinned"]
     assert way["reached_from_flat"] is True
     assert way["elsewhere"] is None
     assert way["snaps"] == way["snapped_by"] == []

@@ -43,8 +43,12 @@ def test_rods_without_a_mass_are_said_to_have_none():
     given = rs.Rod(rs.GivenSection(EA=3.0, EI1=8e-7, EI2=8e-7, GJ=5e-7))
     form = with_rod(given)
     archive = form.archive()
-    assert archive.result["self_weight"]["pinned"] == {"load_factor": None, "deflection": None, "limit": "no mass"}
-    assert any("no mass was given" in word for word in archive.result["warnings"])
+    assert archive.results.plain()["self_weight"]["pinned"] == {
+        "load_factor": None,
+        "deflection": None,
+        "limit": "no mass",
+    }
+    assert any("no mass was given" in word for word in archive.results.plain()["warnings"])
     assert "own weight borne: unknown: no mass was given" in archive.summary()
 
 
@@ -76,7 +80,7 @@ def test_what_is_sewn_bears_as_little_as_its_weakest_patch():
 
 def test_summary_and_result_say_both_kinds_of_ends():
     archive = dome().archive()
-    for ends, said in archive.result["self_weight"].items():
+    for ends, said in archive.results.plain()["self_weight"].items():
         assert said["limit"] == "bifurcation"
         assert f"weight    {ends:<8}own weight borne: {100 * said['load_factor']:.2g} %" in archive.summary()
     assert "stable, unloaded" in archive.summary()

@@ -12,8 +12,8 @@ from rodshell.case import load_case
 from rodshell.checks.sizing import Bends, Fit, bends_of, net_bends
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
-from rodshell.output.summary import summary_text
-from rodshell.output.wording import percent
+from rodshell.results.summary import summary_text
+from rodshell.results.wording import percent
 from rodshell.rods.section import TRADE_SIZES
 
 
@@ -75,7 +75,7 @@ def test_a_lath_whose_joints_let_it_roll_is_thicker_for_it_bends_towards_its_thi
     held, free = (Fit.on(target, layout, joint=joint).section(larch) for joint in (rs.Pin(), rs.Ball()))
     assert free.depth > held.depth
     form = rs.find_form(target, layout, rs.Rod(free, larch), ends=("clamped",))
-    bending = form.archive(takeaway=rs.Takeaway(stages=0)).result["bending"]["clamped"]
+    bending = form.archive(options=rs.OutputOptions(stages=0)).results.plain()["bending"]["clamped"]
     assert 0.2 < bending["utilisation"] <= 0.5
 
 
@@ -155,14 +155,14 @@ def test_the_rod_that_was_chosen_is_announced_said_in_the_summary_and_kept(
     assert "bending strength 240 MPa, characteristic, short-term: reduce for duration" in said.out
     assert "of gfrp's bending strength" in said.out
     saved = rs.read(out)
-    assert saved.result["rod"]["chosen"] == {"material": True, "section": True}
-    assert saved.result["bending"]["strength_of"] == "gfrp"
-    used = saved.result["bending"]["clamped"]["utilisation"]
+    assert saved.results.plain()["rod"]["chosen"] == {"material": True, "section": True}
+    assert saved.results.plain()["bending"]["strength_of"] == "gfrp"
+    used = saved.results.plain()["bending"]["clamped"]["utilisation"]
     assert used <= 0.5
     assert f"{chosen}aiming at {aim} by an estimate of the bends; reached {percent(used)} in the final" in said.out
     again = load_case(Path(out) / "case.toml")
     assert again.rod.left_open == ()
-    assert again.build().rod.parameters() == {key: saved.result["rod"][key] for key in ("section", "material")}
+    assert again.build().rod.parameters() == {key: saved.results.plain()["rod"][key] for key in ("section", "material")}
 
 
 def table_of_rods(path: Path, rods: int, share: float) -> str:
@@ -189,7 +189,7 @@ def test_rods_of_a_table_use_what_they_are_chosen_for_and_the_summary_says_so(
     table, out = table_of_rods(tmp_path / "rods.csv", rods, share), str(tmp_path / "out")
     main(["popup", table, "--unit", "m", "--rod.material.preset", "larch", "--checks.stages", "0", "--out", out])
     said = capsys.readouterr()
-    used = rs.read(out).result["bending"]["pinned"]["utilisation"]
+    used = rs.read(out).results.plain()["bending"]["pinned"]["utilisation"]
     estimate = float(re.findall(r"half of the bending strength at most and comes to (\d+) %", said.err)[0]) / 100
     assert 0.8 * estimate < used < 1.2 * estimate
     assert 0.2 < used < 0.5 * 1.2
@@ -200,7 +200,7 @@ def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path)
     """The same result, had its rods bent more sharply than estimated."""
     table, out = table_of_rods(tmp_path / "rods.csv", 4, 0.92), str(tmp_path / "out")
     main(["popup", table, "--unit", "m", "--checks.stages", "0", "--quiet", "--out", out])
-    result = rs.read(out).result
+    result = rs.read(out).results.plain()
     result["bending"]["pinned"]["utilisation"] = 0.98
     assert "aiming at half of the bending strength at most by an estimate of the bends; reached 98 % in the final" in (
         summary_text(result)
@@ -225,7 +225,7 @@ def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path)
 )
 def test_what_keeps_a_chosen_section_from_being_thicker_is_named(keys: dict[str, str], limit: str) -> None:
     case = roof(**{"rod.material.preset": "larch", **keys})
-    target, layout, rod, _ = case.build()
+    target, layout, rod, *_ = case.build()
     fit = case.fit_on(target, layout)
     assert isinstance(rod.section, rs.Circle | rs.Tube | rs.RectangularSection)
     assert rod.material
@@ -246,9 +246,9 @@ def test_a_given_strength_wins_over_the_presets(tmp_path: Path, capsys: pytest.C
     target, layout = half_sphere(5.0)
     rod = rs.Rod(rs.Circle(0.005), rs.Material.preset("gfrp"))
     form = rs.find_form(target, layout, rod, ends=("clamped",))
-    bending = form.archive(takeaway=rs.Takeaway(strength=100e6, stages=0)).result["bending"]
+    bending = form.archive(options=rs.OutputOptions(strength=100e6, stages=0)).results.plain()["bending"]
     assert (bending["strength"], bending["strength_of"]) == (100e6, None)
-    bending = form.archive(takeaway=rs.Takeaway(stages=0)).result["bending"]
+    bending = form.archive(options=rs.OutputOptions(stages=0)).results.plain()["bending"]
     assert (bending["strength"], bending["strength_of"]) == (240e6, "gfrp")
     assert bending["clamped"]["utilisation"] == bending["clamped"]["max_stress"] / 240e6
 
@@ -275,7 +275,7 @@ def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
     out = tmp_path / "barrel"
     assert main(["form", "heightfield", *options, "--only", "csv", "--quiet", "--out", str(out)]) == 0
     case = load_case(out / "case.toml")
-    target, layout, rod, _ = case.build()
+    target, layout, rod, *_ = case.build()
     assert layout.rotate == pytest.approx(np.pi / 4)
     assert rod.section == Fit.on(target, layout, anchor=case.drape.anchor).section(
         rs.Material.preset("larch"), strength=20e6

@@ -94,11 +94,11 @@ def test_without_twist_nothing_is_added() -> None:
 def test_a_shear_strength_is_used_up_by_torsion_alone() -> None:
     rod = rs.Rod(rs.RectangularSection(1e-2, 3e-2), rs.Material(1.1e10, 450, shear=6.9e8))
     rate = 4e6 / torsion_stress(rod, np.ones(1))[0]  # a shear stress of 4 MPa
-    takeaway = rs.Takeaway(strength=24e6, shear_strength=4e6)
+    options = rs.OutputOptions(strength=24e6, shear_strength=4e6)
     zero = np.zeros(1)
-    used = largest_stress(rod, zero, zero, zero, np.array([rate]), weight=takeaway.shear_weight) / 24e6
+    used = largest_stress(rod, zero, zero, zero, np.array([rate]), weight=options.shear_weight) / 24e6
     assert used[0] == pytest.approx(1.0)
-    assert rs.Takeaway(strength=24e6).shear_weight == VON_MISES
+    assert rs.OutputOptions(strength=24e6).shear_weight == VON_MISES
 
 
 def helix(radius: float, rise: float, edge: float = 0.005) -> tuple[rs.GridMesh, np.ndarray, np.ndarray, np.ndarray]:
@@ -256,14 +256,14 @@ def test_a_strength_is_refused_where_a_given_section_does_not_say_what_its_stres
     known: dict[str, object], joint: Joint, missing: str | None
 ) -> None:
     rod = rs.Rod(rs.GivenSection(**{**GIVEN, **known}))  # type: ignore[arg-type]
-    rs.Takeaway().require_known_stress(rod, joint)  # no strength, nothing to refuse
+    rs.OutputOptions().require_known_stress(rod, joint)  # no strength, nothing to refuse
     if missing is None:
-        rs.Takeaway(strength=1e8).require_known_stress(rod, joint)
+        rs.OutputOptions(strength=1e8).require_known_stress(rod, joint)
         return
     with pytest.raises(rs.InputError, match=missing):
-        rs.Takeaway(strength=1e8).require_known_stress(rod, joint)
+        rs.OutputOptions(strength=1e8).require_known_stress(rod, joint)
 
 
 def test_a_shear_strength_alone_is_refused() -> None:
     with pytest.raises(rs.InputError, match="give the strength too"):
-        rs.Takeaway(shear_strength=4e6)
+        rs.OutputOptions(shear_strength=4e6)

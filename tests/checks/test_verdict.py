@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from rodshell.output.verdict import Verdict, facts, verdict, verdict_of
+from rodshell.results import Results, Verdict
+from rodshell.results.verdict import facts, verdict, verdict_of
 
 
 def good() -> dict[str, Any]:
@@ -42,8 +43,13 @@ def good() -> dict[str, Any]:
     }
 
 
-def changed(*changes: tuple[str, Any]) -> dict[str, Any]:
+def changed(*changes: tuple[str, Any]) -> Results:
     """The good figures with some of them, named by paths such as "pop_up.pinned.stable", replaced."""
+    return Results.model_validate(figures(*changes))
+
+
+def figures(*changes: tuple[str, Any]) -> dict[str, Any]:
+    """The plain content of `changed`."""
     result = deepcopy(good())
     for path, value in changes:
         *tables, key = path.split(".")
@@ -62,7 +68,7 @@ TOUCHING = {"clearance": -0.003, "pairs": 5, "rods": ["U03", "U04"], "where": [0
 
 
 def test_a_result_without_fault_is_good_and_says_what_was_not_checked() -> None:
-    found = verdict(good())
+    found = verdict(changed())
     assert found.level == "good"
     assert found.headline == (
         "Good: with pinned and clamped ends the shell is stable and bears at least 3 times its own weight; with "
@@ -158,19 +164,20 @@ def test_the_gravest_reason_comes_first() -> None:
 
 
 def test_the_verdict_of_a_result_is_the_one_that_it_holds() -> None:
-    held = {**good(), "verdict": {"level": "check", "reasons": ["so it was"]}}
-    assert verdict_of(held) == Verdict("check", ("so it was",))
-    assert verdict_of(good()) == verdict(good())
+    held = changed(("verdict", {"level": "check", "reasons": ["so it was"]}))
+    assert verdict_of(held) == Verdict(level="check", reasons=("so it was",))
+    assert verdict_of(changed()) == verdict(changed())
 
 
 def test_supports_are_recommended_only_where_both_can_be_used() -> None:
     advice = "gain little here: pinned ones will do"
-    near = changed(("agreement.pinned", {"max": 0.003, "max_relative": 0.0015}))
+    close = ("agreement.pinned", {"max": 0.003, "max_relative": 0.0015})
+    near = changed(close)
     assert any(advice in fact for fact in facts(near))
     far = changed(("agreement.pinned", {"max": 0.531, "max_relative": 0.26}),
                   ("agreement.clamped", {"max": 0.53, "max_relative": 0.26}))  # fmt: skip
     assert not any(advice in fact for fact in facts(far))
-    near["pop_up"]["pinned"]["stable"] = False
+    near = changed(close, ("pop_up.pinned.stable", False))
     assert not any(advice in fact or "of the gap that" in fact for fact in facts(near))
 
 
@@ -204,4 +211,4 @@ def test_dips_are_no_cause_where_joints_hold_the_net() -> None:
 
 def test_guiding_is_no_part_of_what_is_known_of_the_strength() -> None:
     (said,) = [fact for fact in facts(changed(("deployment.guided", [0.77, 1.0]))) if "strength" in fact]
-    assert said.endswith("what guiding the shell from 77 % to 100 % of the way asks of them is not known.")
+    assert said.endswith("the stress while the shell is guided from 77 % to 100 % is not known.")

@@ -10,8 +10,10 @@ import rodshell as rs
 from rodshell.checks import Bending, Checks, bending
 from rodshell.checks.deployment import Deployment
 from rodshell.fabrication import Fabrication, fabricate
-from rodshell.output.verdict import verdict
-from rodshell.output.workshop import workshop_result
+from rodshell.results import Results
+from rodshell.results.from_checks import checked_results
+from rodshell.results.records import PopUp, Rod
+from rodshell.results.verdict import verdict
 
 E = 1e9
 THICKNESS = 2e-3  # radius of the rod [m]
@@ -35,9 +37,11 @@ def checks(final: dict[str, float], way: list[float]) -> Checks:
 
 def reasons(found: Checks, strength: float | None = STRENGTH) -> list[str]:
     """What the verdict finds in stress and strain."""
-    made = workshop_result({"rods": [{}] * len(MESH.grid.rods), "warnings": [], "rod": {}}, MESH, found, MADE, strength)
-    shells = {ends: {"status": "converged", "stable": True} for ends in found.bending}
-    found_words = verdict({**made, "pop_up": shells}).reasons
+    rods = tuple(Rod(id=rod.name, family=rod.family, start=rod.start, end=rod.end) for rod in MESH.grid.rods)
+    shells = {ends: PopUp(status="converged", stable=True) for ends in found.bending}
+    found_words = verdict(
+        checked_results(Results(rods=rods, pop_up=shells), MESH, found, MADE, strength=strength)
+    ).reasons
     return [words for words in found_words if (" thick" if strength is None else "break") in words]
 
 

@@ -88,11 +88,11 @@ def test_what_a_file_leaves_out_is_the_default_but_counts_and_lengths_are_auto(l
 def test_lengths_left_out_grow_with_the_target(load: Any, size: float) -> None:
     """So every scale has the same net: the spacing is a round length, and all else follows it or the size."""
     text = f'target = {{ kind = "heightfield", formula = "0", radius = {size} }}\nrod.material.preset = "rubber"'
-    _, layout, rod, _ = load(text).build()
+    _, layout, rod, *_ = load(text).build()
     assert size / 12 < layout.spacing[0] <= size / 8  # rounded down to 1, 1.5, 2, 3, 5 or 7 times a power of ten
     assert layout.edge == layout.spacing[0] / 6
     assert rod.section.radius == pytest.approx(size / 200, rel=1e-3)
-    _, layout, _, _ = load(text, {"layout.spacing": [size / 5, size / 10]}).build()
+    _, layout, *_ = load(text, {"layout.spacing": [size / 5, size / 10]}).build()
     assert layout.edge == pytest.approx(size / 60, rel=1e-15)
 
 
@@ -102,10 +102,10 @@ def test_seams_take_the_rods_of_the_whole_from_a_built_in_case_but_not_from_the_
         case = load_case(name, seams)
         whole = load_case(name, {"layout.rods": "auto", "layout.length": "auto"})
         assert case.layout == whole.layout
-        assert case.build_sewn().layout.spacing == (0.03, 0.03)
+        assert case.build().layout.spacing == (0.03, 0.03)
     for key, value in (("layout.rods", "17x17"), ("layout.length", "1.2 m"), ("drape.method", "gravity")):
         with pytest.raises(InputError, match=f"{key} = .*: (use|each patch .* use|seams need .* use)"):
-            load_case("hemisphere", {**seams, key: value}).build_sewn()
+            load_case("hemisphere", {**seams, key: value}).build()
 
 
 def test_an_empty_table_is_written_without_a_gap_in_it() -> None:
@@ -230,7 +230,7 @@ def test_another_kind_keeps_the_keys_that_it_has_too(load: Any) -> None:
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nturn = [0, 0, 30]', "third value: a plain number is in radians"),
         (
             'layout.spacing = "700,5 mm"',
-            'a decimal takes a point, not a comma: give each its own, such as "700 mm, 5 mm"',
+            'a decimal takes a point, not a comma: give each its unit, such as "700 mm, 5 mm"',
         ),
         ('layout.offset = "10 mm, 20"', "only some of these have a unit"),
         ('[target]\nkind = "mesh"\nfile = "a.obj"\nmove = "1,0,2 m"', "only some of these have a unit"),
@@ -366,24 +366,19 @@ def test_build_makes_the_layout_the_rod_and_the_drape_options() -> None:
     from rodshell.rods.section import Circle, Material, Rod, Tube
 
     overrides = {"drape.anchor": "0.1,0", "drape.method": "gravity", "layout.rotate": 0.5}
-    _, layout, rod, options = load_case("ellipsoid", overrides).build()
+    _, layout, rod, *options = load_case("ellipsoid", overrides).build()
     assert layout == GridLayout.orthogonal(
         rods=(11, 15), spacing=0.03, length=1.2, edge=0.005, rotate=0.5, offset=(0.0, 0.0)
     )
     assert rod == Rod(Circle(0.001), Material(1e6, 1000.0, 0.5))
-    assert options == {
-        "method": Gravity(),
-        "anchor": (0.1, 0.0),
-        "ends": ("pinned", "clamped"),
-        "joint": Ball(),
-    }
+    assert options == [Ball(), Gravity(), (0.1, 0.0), ("pinned", "clamped")]
     tube = {"rod.section.kind": "tube", "rod.section.thickness": "0.1 mm", "pop_up.ends": "pinned"}
     tube |= {"joint.kind": "pin", "joint.eccentricity": "2 mm"}
     built = load_case("hemisphere", tube).build()
     assert built.rod.section == Tube(0.001, 0.0001)
-    assert built.drape_options["ends"] == ("pinned",)
-    assert built.drape_options["joint"] == Pin(eccentricity=0.002)
-    assert built.drape_options["anchor"] is None
+    assert built.ends == ("pinned",)
+    assert built.joint == Pin(eccentricity=0.002)
+    assert built.anchor is None
 
 
 def test_a_height_field_gets_its_formula_and_its_domain(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -425,14 +420,14 @@ def test_values_that_do_not_fit_together_are_refused_when_built(overrides: dict[
 def test_what_would_do_nothing_is_refused_before_the_job(overrides: dict[str, object], message: str) -> None:
     case = load_case("hemisphere", overrides)
     with pytest.raises(InputError) as caught:
-        case.build(), case.takeaway()
+        case.build(), case.output_options()
     assert message in str(caught.value)
 
 
 def test_seams_have_no_objective() -> None:
     case = load_case("hemisphere", {"seams.lines": "-1,0;1,0", "layout.rotate": "auto", "drape.objective": "gap"})
     with pytest.raises(InputError, match=r"drape\.objective"):
-        case.build_sewn()
+        case.build()
 
 
 def test_a_patch_of_finer_spacing_may_have_shorter_stock() -> None:
@@ -441,8 +436,8 @@ def test_a_patch_of_finer_spacing_may_have_shorter_stock() -> None:
     with pytest.raises(InputError, match="stock_length"):
         load_case("hemisphere", short).build()
     case = load_case("hemisphere", {**seams, **short})
-    assert case.build_sewn()
-    assert case.takeaway().fabrication.stock_length == 0.01
+    assert case.build()
+    assert case.output_options().fabrication.stock_length == 0.01
 
 
 def test_another_method_keeps_what_it_uses_alone(load: Any) -> None:
@@ -479,18 +474,16 @@ def test_a_zero_needs_no_unit_beside_others() -> None:
 @pytest.mark.parametrize("angle", [7.0, -30.0, 0.3])
 def test_a_case_of_python_objects_can_be_read_again_whatever_its_angle(load: Any, angle: float) -> None:
     import rodshell as rs
-    from rodshell.case.from_objects import case_text
 
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02, rotate=angle)
     rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
-    case = load(case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball()))
+    case = load(rs.Job(rs.Hemisphere(radius=0.2), layout, rod).to_toml())
     assert cos(case.layout.rotate - angle) == pytest.approx(1)
     assert abs(case.layout.rotate) < tau
 
 
 def test_each_method_of_draping_is_written_to_a_case_and_read_again(load: Any) -> None:
     import rodshell as rs
-    from rodshell.case.from_objects import case_text
 
     layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02)
     rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
@@ -498,8 +491,8 @@ def test_each_method_of_draping_is_written_to_a_case_and_read_again(load: Any) -
     timed = {"time_step": 1e-3, "duration": 2.0, "friction": 0.1, "drag": 4.0}
     slow = rs.Fall(acceleration=1.6, height=0.1, coupling=ties, **timed)
     for method in (rs.Bound(), rs.Gravity(acceleration=1.6), rs.Fall(), slow):
-        text = case_text(rs.Hemisphere(radius=0.2), layout, rod, joint=rs.Ball(), method=method)
-        assert load(text).build().drape_options["method"] == method
+        text = rs.Job(rs.Hemisphere(radius=0.2), layout, rod, method=method).to_toml()
+        assert load(text).build().method == method
 
 
 def test_each_key_has_one_line_of_help() -> None:

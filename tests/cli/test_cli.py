@@ -9,9 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any, ClassVar
 
 import numba
@@ -19,15 +18,18 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.case import case_keys, load_case
+import rodshell.run  # before JIT is switched off
+from rodshell.case import Case, case_keys, load_case
+from rodshell.case.rod_ends import COLUMNS
 from rodshell.cli import main
 from rodshell.cli.options import ALIASES
-from rodshell.cli.rodends import COLUMNS
 from rodshell.errors import NetLimitError
-from rodshell.output import folder as folder_module
-from rodshell.output import read
-from rodshell.output.archive import export
-from rodshell.output.folder import ResultFolder
+from rodshell.formfinding.search import Search
+from rodshell.output import export
+from rodshell.output.options import OutputOptions
+from rodshell.results import Results, read
+from rodshell.results import folder as folder_module
+from rodshell.results.folder import ResultFolder
 
 CROSS = [
     [-0.1, 0.0, 0.1, 0.0, -0.08, 0.0, 0.0, 0.08, 0.0, 0.0],
@@ -39,7 +41,7 @@ CROSS = [
 class FakeArchive:
     def __init__(self, status: str, case_toml: str, level: str = "good") -> None:
         verdict = {"level": level, "reasons": ["the rods touch"]}
-        self.result = {"format": "rodshell-result", "status": status, "verdict": verdict}
+        self.results = Results.model_validate({"format": "rodshell-result", "status": status, "verdict": verdict})
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:
@@ -51,35 +53,47 @@ class FakeArchive:
         return "agreement 0.01 mm"
 
 
+@dataclass
 class FakeForm:
-    told: ClassVar = list[dict[str, Any]]()
+    case: Case
+    asked: Case
+    stages: tuple[str, str]
+    options: OutputOptions
+    inputs: dict[str, bytes]
+    search: Search | None
 
-    def __init__(self, status: str, level: str) -> None:
-        self.status, self.level = status, level
+    told: ClassVar = list[OutputOptions]()
 
-    def archive(self, case_toml: str = "", **options: Any) -> FakeArchive:
-        self.told.append(options)
-        return FakeArchive(self.status, case_toml, self.level)
+    def finished(self, progress: Callable[[str, str, float], None]) -> "FakeForm":
+        return self
+
+    def archive(self) -> FakeArchive:
+        self.told.append(self.options)
+        return FakeArchive(self.stages[0], self.case.text(), self.stages[1])
 
 
-class FakeFinder(ModuleType):
-    """Stands in for rodshell.form: remembers its calls, and ends as it is told."""
+class FakeFinder:
+    """Stands in for form finding: remembers its calls, and ends as it is told."""
 
     def __init__(self) -> None:
-        super().__init__("rodshell.form")
         self.calls = list[tuple[tuple[Any, ...], dict[str, Any]]]()
         self.status, self.level = "converged", "good"
         self.fault: BaseException | None = None
 
-    def find_form(self, *args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
+    def find_stages(self, *args: Any, progress: Callable[[str, str, float], None], **options: Any) -> tuple[str, str]:
+        """The status and the level that its form will have."""
         self.calls.append((args, options))
         for stage, iteration in (("net", 1), ("drape", 1), ("drape", 2), ("pop up", 1)):
             progress(stage, f"iteration {iteration}", 1e-3)
         if self.fault:
             raise self.fault
-        return FakeForm(self.status, self.level)
+        return self.status, self.level
 
-    pop_up_table = find_form
+    def stand_in(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        for name in ("find_stages", "pop_up_stages"):
+            monkeypatch.setattr(rodshell.run, name, lambda *args, **options: self.find_stages(*args, **options))
+        monkeypatch.setattr(rodshell.run, "Form", FakeForm)
+        monkeypatch.setattr("rodshell.output.files.save", lambda archive, *args, **more: archive.save(*args, **more))
 
 
 @pytest.fixture(autouse=True)
@@ -91,8 +105,8 @@ def _elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 @pytest.fixture
 def finder(monkeypatch: pytest.MonkeyPatch) -> FakeFinder:
     fake = FakeFinder()
-    monkeypatch.setitem(sys.modules, "rodshell.form", fake)
-    monkeypatch.setattr("rodshell.cli.progress.compiled_before", lambda: True)
+    fake.stand_in(monkeypatch)
+    monkeypatch.setattr("rodshell.cli.reporting.compiled_before", lambda: True)
     return fake
 
 
@@ -120,8 +134,9 @@ def test_form_asks_for_the_case_and_saves_its_full_input(
     assert main(["form", "hemisphere", "--out", "dome", *options]) == 0
     overrides = {"target.radius": 0.26, "layout.rods": [13, 11], "drape.anchor": [-0.1, 0]}
     case = load_case("hemisphere", {**overrides, "rod.material.youngs_modulus": 25e9})
-    target, layout, rod, drape = case.build()
-    assert finder.calls == [((target, layout, rod), drape)]
+    built = case.build()._asdict()
+    target, layout, rod = (built.pop(name) for name in ("target", "layout", "rod"))
+    assert finder.calls == [((target, layout, rod), {**built, "warm_start": None, "same_drape": False})]
     assert load_case("dome/case.toml") == case
     assert "agreement 0.01 mm" in capsys.readouterr().out
 
@@ -154,7 +169,8 @@ WORDS = [key for key in case_keys() if key.startswith(ANY_WORDS)]
 
 @pytest.mark.parametrize("key", [key for key in case_keys() if key not in WORDS])
 def test_each_option_reaches_its_key(key: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
-    assert f"{key} = " in refused(capsys, "form", "hemisphere", f"--{key}", "no such value")
+    said = refused(capsys, "form", "hemisphere", f"--{key}", "no such value")
+    assert f"{key} = " in said or f"{key} must be " in said
 
 
 @pytest.mark.parametrize("key", WORDS)
@@ -183,7 +199,7 @@ def test_any_words_reach_their_key(key: str, finder: FakeFinder) -> None:
         (["--drape.anchor", "--out", "C/y"], "--drape.anchor needs a value, but --out follows"),
         (["-o", "--quiet"], "-o needs a value, but --quiet follows"),
         (["--rotate", "30"], 'write "30 deg"'),
-        (["--target.kind", "mesh", "--target.file", "no.obj"], 'no file named "no.obj": give the path of one that is'),
+        (["--target.kind", "mesh", "--target.file", "no.obj"], 'there is no file named "no.obj": check the path'),
         (["twice"], "unexpected extra argument"),
         (["--target.kind", "mesh"], "target.file is missing"),
     ],
@@ -333,15 +349,15 @@ def test_progress_away_from_a_terminal_is_a_line_for_each_stage(
 def test_a_long_silence_is_broken_by_a_line_that_says_everything(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rodshell.cli.progress.SILENCE", 0.05)
-    search = finder.find_form
+    monkeypatch.setattr("rodshell.cli.reporting.SILENCE", 0.05)
+    search = finder.find_stages
 
-    def slow(*args: Any, progress: Callable[[str, str, float], None], **options: Any) -> FakeForm:
+    def slow(*args: Any, progress: Callable[[str, str, float], None], **options: Any) -> tuple[str, str]:
         progress("drape", "bound, iteration 3 of at most 60", 1e-3)
         time.sleep(0.5)
         return search(*args, progress=progress, **options)
 
-    finder.find_form = slow  # type: ignore[method-assign]
+    finder.find_stages = slow  # type: ignore[method-assign]
     assert main(["form", "hemisphere"]) == 0
     said = capsys.readouterr().err.splitlines()
     assert said[0] == "rodshell: drape"
@@ -389,7 +405,7 @@ def test_the_first_run_announces_the_compilation(
 ) -> None:
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, "rodshell.form", finder)
+    finder.stand_in(monkeypatch)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     numba.config.reload_config()  # type: ignore[attr-defined]
     assert main(["form", "hemisphere", "--out", "a"]) == 0
@@ -427,7 +443,7 @@ def test_popup_reads_the_schedule_of_a_result(
     np.testing.assert_allclose(its, final, atol=1e-6)  # the schedule's rounding
     np.testing.assert_allclose(finder.calls[2][0][1], its)
     capsys.readouterr()
-    assert "are in mm; leave --unit out" in refused(capsys, "popup", schedule, "--unit", "m")
+    assert "are in mm: leave it out" in refused(capsys, "popup", schedule, "--unit", "m")
 
 
 def test_a_table_may_be_separated_by_semicolons(finder: FakeFinder) -> None:
@@ -475,8 +491,8 @@ def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dom
     options = [word for key, value in wishes.items() for word in (f"--{key}", value)]
     for source in (["dome"], [write_table(Path("rods.csv"), CROSS), "--unit", "m"]):
         assert main(["popup", *source, *options]) == 0
-        told = FakeForm.told[-1]["takeaway"]
-        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).takeaway()
+        told = FakeForm.told[-1]
+        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).output_options()
 
 
 def test_popup_writes_only_the_kinds_that_are_asked_for(
@@ -488,7 +504,7 @@ def test_popup_writes_only_the_kinds_that_are_asked_for(
     assert main(["popup", "dome", "--only", "csv, dxf"]) == 0
     assert kinds == [["csv", "dxf"]]
     capsys.readouterr()
-    assert '"docx" is no kind of file' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
+    assert 'unknown kind of file "docx"' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
 
 
 def test_a_result_takes_the_rod_that_is_asked_for_in_place_of_its_own(finder: FakeFinder, dome: Path) -> None:
@@ -573,7 +589,7 @@ def test_a_table_that_is_not_there_is_missed_before_its_unit(
 def test_a_table_needs_rods_and_a_known_unit(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     table = write_table(Path("rods.csv"), [])
     assert "rods.csv has no rods" in refused(capsys, "popup", table, "--unit", "m")
-    assert "--unit is missing" in refused(capsys, "popup", table)
+    assert "unit is missing" in refused(capsys, "popup", table)
     assert 'unknown unit "parsec"' in refused(capsys, "popup", table, "--unit", "parsec")
     assert "deg is a unit of angle" in refused(capsys, "popup", table, "--unit", "deg")
     Path("empty.csv").write_text("")
@@ -600,7 +616,7 @@ def dome() -> Path:
 
 def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinder, dome: Path) -> None:
     """As of a target that was a Python function, or of a table of rods."""
-    from rodshell.output.result import rod_table
+    from rodshell.results.from_form import rod_type
 
     result = json.loads((dome / "result.json").read_text())
     (dome / "case.toml").write_text("# the target was a Python function\n")
@@ -608,7 +624,7 @@ def test_popup_keeps_rod_and_joints_of_a_result_without_a_case(finder: FakeFinde
         rs.Rod(rs.Tube(radius=0.02, thickness=0.003), rs.Material.preset("gfrp")),
         rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=2.0, GJ=0.5, mass=0.3)),
     ):
-        told = result | {"rod": rod_table(rod), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
+        told = result | {"rod": rod_type(rod).plain(), "joint": rs.joints.joint_parameters(rs.Pin(mass=0.1))}
         (dome / "result.json").write_text(json.dumps(told))
         assert main(["popup", str(dome), "--force", "-q"]) == 0
         (_, _, same), options = finder.calls[-1]
@@ -646,7 +662,7 @@ def test_popup_reads_an_earlier_result(finder: FakeFinder, dome: Path) -> None:
 def test_an_earlier_result_that_cannot_be_read_is_refused(
     finder: FakeFinder, dome: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "leave --unit out" in refused(capsys, "popup", "dome", "--unit", "m")
+    assert "which is in SI: leave it out" in refused(capsys, "popup", "dome", "--unit", "m")
     assert "give another folder" in refused(capsys, "popup", "dome", "--out", "dome")
     np.savez(dome / "states.npz", flat=np.zeros((5, 3)), rod_nodes=[0, 1, 2, 3, 1, 4], rod_start=[0, 3])
     assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
@@ -656,7 +672,7 @@ def test_an_earlier_result_that_cannot_be_read_is_refused(
     (dome / "result.json").write_text(json.dumps(result))
     assert "dome has no rods" in refused(capsys, "popup", "dome")
     (dome / "result.json").write_text(json.dumps({**result, "rods": [{"id": "U01"}]}))
-    assert "dome lacks its rods or its states" in refused(capsys, "popup", "dome")
+    assert "dome/result.json: rods[0].family is missing" in refused(capsys, "popup", "dome")
     (dome / "result.json").unlink()
     assert "no rodshell result" in refused(capsys, "popup", "dome")
 
@@ -669,13 +685,12 @@ def test_ctrl_c_ends_with_one_line_and_130(finder: FakeFinder, capsys: pytest.Ca
 
 
 WAITING = """
-import sys, time, types
-fake = types.ModuleType("rodshell.form")
-def find_form(*args, progress, **options):
+import sys, time
+import rodshell.run
+def find_stages(*args, progress, **options):
     progress("drape", "level 1 of 1, iteration 3", 1e-4)
     time.sleep(60)
-fake.find_form = find_form
-sys.modules["rodshell.form"] = fake
+rodshell.run.find_stages = find_stages
 from rodshell.cli import main
 sys.exit(main(["form", "hemisphere"]))
 """

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rodshell.case.rod_ends import COLUMNS
 from rodshell.cli import main, warmup
-from rodshell.cli.rodends import COLUMNS
 
 pytestmark = pytest.mark.slow
 

@@ -20,7 +20,7 @@ JOB = Job("few", ("form", "hemisphere", *FEW))
 HELD = """
 import sys, time
 from rodshell.formfinding import progress
-from rodshell.cli import progress as shown, entry
+from rodshell.cli import reporting as shown, entry
 {patch}
 entry()
 """
@@ -48,7 +48,7 @@ IN_AN_IMPORT = """
 import builtins
 wanted = builtins.__import__
 def slowly(name, *rest):
-    if name == "rodshell.form":
+    if name == "rodshell.job":
         print("here", flush=True)
         try:
             time.sleep(30)

@@ -20,7 +20,7 @@ caching.CacheImpl.__init__ = no_locator  # as where neither the package nor a ho
 import os
 os.access = lambda path, mode: not mode & os.W_OK
 import rodshell.geometry.curves
-from rodshell.cli.progress import announce_compilation
+from rodshell.cli.reporting import announce_compilation
 announce_compilation()
 """
 

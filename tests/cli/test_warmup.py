@@ -59,7 +59,7 @@ def test_every_kernel_is_called_by_some_job() -> None:
         for value in vars(module).values()
         if isinstance(value, Dispatcher)
     }
-    from rodshell.cli.progress import Progress
+    from rodshell.cli.reporting import Progress
     from rodshell.cli.warmup import warm_up as run_all
 
     run_all(Progress(quiet=True))

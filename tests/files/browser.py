@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rodshell.output import Archive
+from rodshell.results import Archive
 
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
@@ -115,7 +115,7 @@ def coloured(made: Archive) -> dict[str, list[np.ndarray | None]]:
     ends = [end for end in ("pinned", "clamped") if f"popped_{end}" in states]
     between = len(states["history"]) - 2 if "history" in states else 0
     stress = [*states.get("history_stress", [])[1 : between + 1], *(states.get(f"stress_{end}") for end in ends)]
-    if not made.result.get("target"):
+    if not made.results.plain().get("target"):
         return {"gap": [None, *(states[f"popped_{end}"][nodes, 2] for end in ends)]}
     gap = [*[None] * between, *(states[f"gap_{end}"][nodes] for end in ends)]
     return {"stress": [None, *stress], "gap": [None, *gap]}
@@ -123,7 +123,7 @@ def coloured(made: Archive) -> dict[str, list[np.ndarray | None]]:
 
 def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
     """Every caption or tick at the colour bar that is not true of the frame that is shown."""
-    strength, wrong = (made.result.get("bending") or {}).get("strength"), []
+    strength, wrong = (made.results.plain().get("bending") or {}).get("strength"), []
     for kind, k, caption, ticks in found["legends"]:
         shown = coloured(made)[kind][k] if kind != "none" else None
         if shown is None or not caption:
@@ -138,7 +138,7 @@ def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
         low, high = (least + (end - share) * (most - least) / (stop - share) for end in (0, 1))
         true = {
             "word": what
-            == {"gap": "gap to target" if made.result.get("target") else "height"}.get(
+            == {"gap": "gap to target" if made.results.plain().get("target") else "height"}.get(
                 kind, "utilisation" if strength else "stress"
             ),
             "choice": found["kinds"][kind] == what,

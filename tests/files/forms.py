@@ -7,8 +7,8 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.fabrication import Fabrication
-from rodshell.output import Archive
-from rodshell.output.takeaway import DrawingStyle, Takeaway
+from rodshell.output.options import DrawingStyle, OutputOptions
+from rodshell.results import Archive
 from tests.acceptance.cases import ROD, ridge_formula
 
 TARGETS = {
@@ -36,14 +36,14 @@ def wished() -> Archive:
     """The dome with allowances, stock, a strength and names of its own."""
     style = DrawingStyle(project="Pavilion", revision="B", tolerance=5e-4, layers={"CUT": "LASER"})
     making = Fabrication(end_allowance=0.012, stock_length=0.4, kerf=0.003)
-    return form("dome").archive(takeaway=Takeaway(strength=2e4, stages=4, fabrication=making, drawings=style))
+    return form("dome").archive(options=OutputOptions(strength=2e4, stages=4, fabrication=making, drawings=style))
 
 
 def breaking() -> Archive:
     """A dome whose rods use 169 % of their strength halfway up, and little of it before and after."""
     made = wished()
     history = made.states["history_stress"].copy()
-    history[2] *= 1.69 * made.result["bending"]["strength"] / history[2].max()
+    history[2] *= 1.69 * made.results.plain()["bending"]["strength"] / history[2].max()
     return replace(made, states={**made.states, "history_stress": history})
 
 
@@ -72,6 +72,6 @@ def formed(name: str) -> Archive:
         return archive(name)
     if name == "sewn":
         layout = rs.GridLayout.orthogonal(spacing=0.03, edge=0.01)
-        return rs.sew(rs.Hemisphere(0.2), [[(-1.0, 0.0), (1.0, 0.0)]], layout, ROD).archive()
+        return rs.find_form(rs.Hemisphere(0.2), layout, ROD, seams=[[(-1.0, 0.0), (1.0, 0.0)]]).archive()
     target, spacing = (ROOF, 0.8) if name == "roof" else (mesh_with_an_opening(), 0.6)
     return rs.find_form(target, rs.GridLayout.orthogonal(spacing=spacing, edge=0.2), LATH).archive()

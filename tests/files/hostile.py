@@ -3,9 +3,9 @@
 import json
 from typing import Any
 
-from sample_archive import sample_archive, with_way_up
+from sample_archive import sample_archive, with_deployment
 
-from rodshell.output import Archive
+from rodshell.results import Archive, Results
 
 NAMES = (
     "=cmd|' /C calc'!A0", "+1+cmd", "-2+3+cmd", "@SUM(A1:A9)", "\uff1d1+1", "\t=1+1", "\r\n=1+1", "a;=1+1", '";=1+1;"',
@@ -20,9 +20,11 @@ LAYERS = {
 
 def hostile_archive() -> Archive:
     """The sample dome with hostile names of rods, drawings, layers, target, patches, bars and warnings."""
-    made = with_way_up(sample_archive(count=9), stages=4)
-    renamed = {rod["id"]: name for rod, name in zip(made.result["rods"], NAMES, strict=False)}
-    result: dict[str, Any] = json.loads(json.dumps(made.result), object_hook=lambda table: _renamed(table, renamed))
+    made = with_deployment(sample_archive(count=9), stages=4)
+    renamed = {rod["id"]: name for rod, name in zip(made.results.plain()["rods"], NAMES, strict=False)}
+    result: dict[str, Any] = json.loads(
+        json.dumps(made.results.plain()), object_hook=lambda table: _renamed(table, renamed)
+    )
     ids = [rod["id"] for rod in result["rods"]]
     a, b = f"{ids[0]}/{ids[9]}", f"{ids[1]}/{ids[10]}"
     pieces = [{"piece": name, "length": 0.1} for name in ids]
@@ -38,7 +40,7 @@ def hostile_archive() -> Archive:
         },
         "seams": [{"meetings": [{"ends": [f"{ids[0]}.0", f"{ids[1]}.1"], "point": [-0.1, 0.0, 0.1]}]}],
     }  # fmt: skip
-    return Archive(result, made.states, f'# {NAMES[9]}\nname = "{NAMES[10]}"\n')
+    return Archive(Results.of(result), made.states, f'# {NAMES[9]}\nname = "{NAMES[10]}"\n')
 
 
 def _renamed(table: dict[str, Any], renamed: dict[str, str]) -> dict[str, Any]:

@@ -7,13 +7,13 @@ import pytest
 from forms import formed
 from numpy.typing import NDArray
 
-from rodshell.output import Archive
-from rodshell.output.callouts import callouts, outward
 from rodshell.output.drawing import Drawing, Text
-from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.supports import supports_drawing
-from rodshell.output.labels import Room, boxes_meet, lines_meet
-from rodshell.output.plan import flat_plan
+from rodshell.output.drawings.flat import flat_drawing, flat_plan
+from rodshell.output.drawings.shell import supports_drawing
+from rodshell.output.labels import Room, boxes_meet, callouts, lines_meet, outward
+from rodshell.results import Archive
+
+pytestmark = pytest.mark.slow
 
 Floats = NDArray[np.float64]
 
@@ -51,9 +51,9 @@ def read_from(drawing: Drawing, place: Floats, labels: list[Text]) -> set[str]:
 
 def supports_of(made: Archive) -> dict[str, Floats]:
     """Where each rod end that is not sewn goes [mm], by its name."""
-    sewn = {end for seam in made.result.get("seams") or [] for one in seam["meetings"] for end in one["ends"]}
-    names = [f"{rod['id']}.{end}" for rod in made.result["rods"] for end in (0, 1)]
-    places = 1e3 * np.array(made.result["boundary"])[:, :2]
+    sewn = {end for seam in made.results.plain().get("seams") or [] for one in seam["meetings"] for end in one["ends"]}
+    names = [f"{rod['id']}.{end}" for rod in made.results.plain()["rods"] for end in (0, 1)]
+    places = 1e3 * np.array(made.results.plain()["boundary"])[:, :2]
     return {name: place for name, place in zip(names, places, strict=True) if name not in sewn}
 
 

@@ -17,20 +17,18 @@ from hypothesis.extra.numpy import arrays
 from sample_archive import sample_archive, table_archive
 
 from rodshell.errors import InputError
-from rodshell.output import Archive
-from rodshell.output.archive import export
+from rodshell.output import export
 from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
-from rodshell.output.drawings.bracing import bracing_drawing
-from rodshell.output.drawings.final import elevations_drawing
-from rodshell.output.drawings.flat import diagonals, flat_drawing
+from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, fitted, room, tiled
+from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing
+from rodshell.output.grid import joint_places, rods_of
 from rodshell.output.labels import boxes_meet, lines_meet, spread
-from rodshell.output.plan import flat_plan
-from rodshell.output.rods import joint_places, rods_of
-from rodshell.output.rounding import rounding_of
-from rodshell.output.takeaway import DrawingStyle, Takeaway
+from rodshell.output.options import DrawingStyle, OutputOptions
+from rodshell.results import Archive
+from rodshell.results.wording import rounding_of
 
 PAPER = (420.0, 297.0)  # A3
 FORMED = [*TARGETS, "roof", "opening", "sewn"]
@@ -57,6 +55,7 @@ def covered(drawing: Drawing) -> list[tuple[str, str]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
     plan = flat_plan(named(name))
@@ -64,6 +63,7 @@ def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
         assert covered(drawing) == [], drawing.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_sheet_cover_each_other(name: str) -> None:
     sheets, paper = sheet_set(named(name), flat_plan(named(name)))
@@ -129,8 +129,8 @@ def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
     }
     assert list(sheets) == [row + column for row in "ABCD" for column in "12"]
     rods = {part: {path.name for path in sheet.content.paths if path.name} for part, sheet in sheets.items()}
-    top = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "u" else -1.0).id
-    right = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "v" else -1.0).id
+    top = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "u" else -1.0).id
+    right = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "v" else -1.0).id
     assert {part for part, drawn in rods.items() if top in drawn} == {"A1", "A2"}
     assert {part[1] for part, drawn in rods.items() if right in drawn} == {"2"}
     middle = 0.5 * np.sum(room(PAPER), axis=0)
@@ -184,6 +184,7 @@ def test_diagonals_are_those_of_the_largest_rectangle() -> None:
     assert area == pytest.approx(best)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMED)
 def test_each_grid_is_set_out_by_two_diagonals_with_their_lengths(name: str) -> None:
     """Each patch of a sewn shell has its own; along them every cell is there, so that none runs over an opening."""
@@ -210,6 +211,7 @@ def apart(point: np.ndarray, lines: np.ndarray) -> np.ndarray:
     return np.linalg.norm(start + share[:, None] * along - point, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "share"), [("dome", 0.7), ("roof", 1.0), ("opening", 1.0), ("sewn", 0.45)])
 def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -> None:
     """Nearly all of them find room, where cells are not too thin; between joints, rods are taken to be straight."""
@@ -226,13 +228,14 @@ def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -
         rods += [(a[:2], b[:2]) for a, b in pairwise(places)]
     lines = np.concatenate([1e3 * np.array(rods), braces])
     assert [text.text for text in numbers if lines_meet(text.box(), lines)] == []
-    lengths = [rounding_of(made.result).mm(one["final"]) for one in made.result["fabrication"]["bracing"]]
+    lengths = [rounding_of(made.results).mm(one["final"]) for one in made.results.plain()["fabrication"]["bracing"]]
     for number in numbers:  # of the brace that it lies along: nearest to both ends of its text
         ends = 0.5 * (number.box()[[0, 1]] + number.box()[[3, 2]])
         off = np.max([apart(end, braces) for end in ends], axis=0)
         assert lengths[int(np.argmin(off))] == number.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "spans"), [("roof", ("12000", "8000")), ("dome", ("400.00", "400.00"))])
 def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[str, str]) -> None:
     """Rod ends are some hundredths of a millimetre off the edge: to a ten-thousandth a roof of 12 by 8 m is that."""
@@ -245,10 +248,11 @@ def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[st
     assert elevations_drawing(replace(made, states=longer), plan.text).texts[0].text != spans[0]
 
 
+@pytest.mark.slow
 def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:
     """Strips, both schedules, the PDF's tables and the pieces of stock: 12 mm of allowance before the rod's start."""
     made = wished()
-    half = 0.501 * rounding_of(made.result).step
+    half = 0.501 * rounding_of(made.results).step
     export(made, tmp_path, ["dxf", "csv"])
     rods, joints, stock = (rows_of(tmp_path / f"schedule/{name}.csv") for name in ("rods", "joints", "stock"))
     pieces = dict(words.split() for row in stock for words in row["pieces_mm"].split("; "))
@@ -260,7 +264,7 @@ def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -
         np.array([one.points.mean(axis=0) for one in entities if one.layer == "MARK" and one.kind == kind])
         for kind in ("CIRCLE", "LINE")
     )
-    for rod, row, line in zip(made.result["rods"], rods, lines, strict=True):
+    for rod, row, line in zip(made.results.plain()["rods"], rods, lines, strict=True):
         assert line[1, 0] - line[0, 0] == pytest.approx(float(row["cut_length_mm"]), abs=half)
         met = {joint["with"]: 1e3 * joint["at"] + 12.0 for joint in rod["joints"]}
         cuts = 1e3 * np.array(rod["splices"]) + 12.0
@@ -276,7 +280,7 @@ def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -
                 for joint in joints for a, b in ("ab", "ba") if joint[f"rod_{a}"] == rod["id"]]  # fmt: skip
         assert {name: float(at) for name, at in ends} == pytest.approx(met, abs=half)
         assert {*shown, *(at for _, at in ends)} <= printed
-    assert any(rod["splices"] for rod in made.result["rods"])
+    assert any(rod["splices"] for rod in made.results.plain()["rods"])
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -287,11 +291,11 @@ def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> No
     export(wished(), tmp_path, ["dxf"])
     entities = read_dxf(tmp_path / "drawings/plan.dxf")
     cuts = [one.points for one in entities if one.layer == "LASER"]
-    rods = wished().result["rods"]
+    rods = wished().results.plain()["rods"]
     for cut, rod in zip(cuts, rods, strict=True):
         assert np.linalg.norm(cut[1] - cut[0]) == pytest.approx(1e3 * rod["length"] + 24.0, abs=1e-6)
     (footprint,) = (one.points for one in entities if one.layer == "BOUNDARY-FLAT")
-    expected = {tuple(np.round(1e3 * np.array(point), 6)) for point in wished().result["footprint"]}
+    expected = {tuple(np.round(1e3 * np.array(point), 6)) for point in wished().results.plain()["footprint"]}
     assert {tuple(np.round(point, 6)) for point in footprint} == expected
 
 
@@ -306,8 +310,8 @@ def test_styles_that_no_file_can_hold_are_refused(style: dict, reason: str) -> N
         DrawingStyle(**style)
 
 
-def test_takeaways_that_make_no_sense_are_refused() -> None:
+def test_options_that_make_no_sense_are_refused() -> None:
     with pytest.raises(InputError, match="strength must be positive"):
-        Takeaway(strength=0.0)
+        OutputOptions(strength=0.0)
     with pytest.raises(InputError, match="0 to 1000 stages"):
-        Takeaway(stages=-1)
+        OutputOptions(stages=-1)

@@ -13,15 +13,17 @@ from forms import wished
 from sample_archive import sample_archive, table_archive
 
 from rodshell.errors import OutputError
-from rodshell.output import Archive, ForeignFileError, folder, manifest, open_folder, read, write
-from rodshell.output.archive import ARCHIVE, export
+from rodshell.output import export, save
 from rodshell.output.files import KINDS, NAMES, Content
+from rodshell.results import Archive, folder, read
+from rodshell.results.archive import ARCHIVE
+from rodshell.results.folder import ForeignFileError, open_folder
 
 
 @pytest.fixture
 def dome(tmp_path: Path) -> Path:
     """A result with few files, of which the user changed none."""
-    return write(sample_archive(), tmp_path / "dome", ["csv", "obj"])
+    return save(sample_archive(), tmp_path / "dome", ["csv", "obj"])
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -30,7 +32,7 @@ def contents(path: Path) -> dict[str, bytes]:
 
 def rewrite(path: Path, *, force: bool = False) -> Path:
     """Another result, with other files."""
-    return write(table_archive(), path, ["svg"], force=force)
+    return save(table_archive(), path, ["svg"], force=force)
 
 
 def test_the_manifest_lists_every_file_with_size_and_digest(dome: Path) -> None:
@@ -52,14 +54,14 @@ def test_a_second_run_keeps_all_other_files_and_removes_its_own_old_ones(dome: P
     assert left.keys() == {*mine, "manifest.json", "result.json", "states.npz", "drawings/plan.svg",
                            "drawings/strips.svg", "drawings/supports.svg", "drawings/elevations.svg"}  # fmt: skip
     assert {name: left[name] for name in mine} == mine
-    assert read(dome).result["name"] == "table of rods"
+    assert read(dome).results.plain()["name"] == "table of rods"
     assert {one.name for one in dome.iterdir() if one.is_dir()} == {"photos", "schedule", "drawings"}
 
 
 def test_a_changed_file_that_is_not_written_again_stays_and_is_named(dome: Path) -> None:
     (dome / "schedule/rods.csv").write_text("my own prices")
     with open_folder(dome) as place:
-        write(table_archive(), place, ["svg"])
+        save(table_archive(), place, ["svg"])
     assert place.kept == ("schedule/rods.csv",)
     assert (dome / "schedule/rods.csv").read_text() == "my own prices"
     rewrite(dome)  # it is the user's now
@@ -110,7 +112,7 @@ def test_what_rodshell_did_not_write_is_replaced_by_force_only(interfere, dome: 
         rewrite(dome)
     assert contents(dome.parent) == before
     rewrite(dome, force=True)
-    assert read(dome).result["name"] == "table of rods"
+    assert read(dome).results.plain()["name"] == "table of rods"
     assert (dome / "drawings/plan.svg").read_bytes() != b"<svg/>"
     assert list((dome.parent / "elsewhere").glob("*")) == []
     rewrite(dome)
@@ -132,7 +134,7 @@ def test_a_manifest_from_elsewhere_reaches_nothing_outside_its_folder(dome: Path
     (dome / "link").symlink_to(dome.parent)
     listed = json.loads((dome / "manifest.json").read_text())
     for name in ("../mine.txt", str(mine), "link/mine.txt"):
-        listed["files"][name] = manifest.mark(dome.parent, "mine.txt")
+        listed["files"][name] = folder.mark(dome.parent, "mine.txt")
     (dome / "manifest.json").write_text(json.dumps(listed))
     rewrite(dome)
     assert mine.read_text() == "mine"
@@ -168,7 +170,7 @@ def test_export_follows_the_same_rules_and_keeps_the_rest_of_the_result(dome: Pa
     assert {name: data for name, data in contents(dome).items() if name in before and name != "manifest.json"} == {
         name: data for name, data in before.items() if name != "manifest.json"
     }
-    assert {"drawings/plan.svg", "schedule/rods.csv"} <= manifest.read_manifest(dome).keys()
+    assert {"drawings/plan.svg", "schedule/rods.csv"} <= folder.read_manifest(dome).keys()
     (dome / "drawings/plan.svg").write_text("mine")
     with pytest.raises(ForeignFileError, match=r"plan\.svg"):
         export(read(dome), dome, ["svg"])
@@ -216,7 +218,7 @@ def commit_killed_after(steps: int, archive: Archive, path: Path) -> bool:
             patch.setattr(Path, name, counted(getattr(Path, name)))
         patch.setattr(shutil, "rmtree", lambda *_, **__: None)
         try:
-            write(archive, path, ["svg"])
+            save(archive, path, ["svg"])
         except Killed:
             return True
     return False
@@ -233,7 +235,7 @@ def test_a_kill_at_any_step_of_a_commit_leaves_the_old_result_or_the_new_one_who
         killed = commit_killed_after(steps, table_archive(), path)
         expected = results[steps > 0]
         seen = read(path)
-        assert (seen.result, seen.case_toml) == (expected.result, expected.case_toml)
+        assert (seen.results.plain(), seen.case_toml) == (expected.results.plain(), expected.case_toml)
         assert seen.states.keys() == expected.states.keys()
         for state, values in expected.states.items():
             np.testing.assert_array_equal(seen.states[state], values)
@@ -301,13 +303,13 @@ def test_where_nothing_can_be_written_is_said(tmp_path: Path, monkeypatch: pytes
 def test_the_working_folder_is_written_into(dome: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(dome)
     rewrite(Path())
-    assert read(".").result["name"] == "table of rods"
+    assert read(".").results.plain()["name"] == "table of rods"
 
 
 def test_a_result_reads_the_same_with_another_file_beside_it(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full/chapter.tex").write_text("mine")
     archive: Archive = replace(sample_archive(), case_toml="# a case")
-    out = write(archive, tmp_path / "full", [])
+    out = save(archive, tmp_path / "full", [])
     assert contents(out).keys() == {*ARCHIVE, "manifest.json", "chapter.tex"}
     assert read(out).case_toml == "# a case"

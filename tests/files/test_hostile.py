@@ -15,10 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from live_cells import live_cells
 
-from rodshell.output.archive import export, write
-from rodshell.output.csvtext import csv_text
+from rodshell.output import export, save
 from rodshell.output.dxf import layer_names
 from rodshell.output.files import KINDS
+from rodshell.output.schedules import csv_text
 
 
 @pytest.fixture(scope="module")
@@ -111,5 +111,5 @@ def test_a_rhino_file_names_every_rod(written: dict[str, Path]) -> None:
 
 
 def test_a_hostile_archive_is_written_and_exported_again(tmp_path: Path) -> None:
-    folder = write(hostile_archive(), tmp_path / "out", ["csv"])
+    folder = save(hostile_archive(), tmp_path / "out", ["csv"])
     assert json.loads((folder / "result.json").read_text(encoding="utf-8"))["rods"][0]["id"] == NAMES[0]

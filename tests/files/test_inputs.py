@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from sample_archive import sample_archive
 
-from rodshell.output import inputs as inputs_module
-from rodshell.output import read
-from rodshell.output.archive import write
-from rodshell.output.drawings.titleblock import title_block
-from rodshell.output.inputs import read_inputs
+from rodshell.output import save
+from rodshell.output.drawings.sheets import title_block
+from rodshell.results import inputs as inputs_module
+from rodshell.results import read
+from rodshell.results.inputs import read_inputs
 
 
 def case_of(*files: Path) -> str:
@@ -25,7 +25,7 @@ def case_of(*files: Path) -> str:
 
 
 def saved(case: str, folder: Path) -> Path:
-    return write(replace(sample_archive(3, 2), case_toml=case, inputs=read_inputs(case)), folder, [])
+    return save(replace(sample_archive(3, 2), case_toml=case, inputs=read_inputs(case)), folder, [])
 
 
 def named(folder: Path) -> list[str]:
@@ -51,14 +51,14 @@ def test_a_copy_is_what_the_file_held_when_it_was_read(files: tuple[Path, Path],
     case = case_of(files[0])
     inputs = read_inputs(case)
     files[0].write_text("changed since")
-    out = write(replace(sample_archive(3, 2), case_toml=case, inputs=inputs), tmp_path / "out", [])
+    out = save(replace(sample_archive(3, 2), case_toml=case, inputs=inputs), tmp_path / "out", [])
     assert (out / named(out)[0]).read_text() == "a"
 
 
 def test_what_was_read_is_written_again_elsewhere(files: tuple[Path, Path], tmp_path: Path) -> None:
     first = saved(case_of(*files), tmp_path / "out")
     moved = first.rename(tmp_path / "moved")
-    again = write(read(moved), tmp_path / "deep/er/again", [])
+    again = save(read(moved), tmp_path / "deep/er/again", [])
     assert (again / "case.toml").read_bytes() == (moved / "case.toml").read_bytes()
     assert [(again / name).read_text() for name in named(again)] == ["a", "b"]
 
@@ -69,7 +69,7 @@ def test_a_large_file_stays_and_is_named_from_the_folder(
     monkeypatch.setattr(inputs_module, "LARGEST", 0)
     out = saved(case_of(files[0]), tmp_path / "out")
     assert named(out) == ['../a/ro=of "1".obj']
-    again = write(read(out), tmp_path / "deep/er/again", [])
+    again = save(read(out), tmp_path / "deep/er/again", [])
     assert (again / named(again)[0]).resolve() == files[0]
     assert not (out / "inputs").exists()
 
@@ -85,7 +85,7 @@ def test_the_hash_of_the_input_is_of_its_content_wherever_it_lies(files: tuple[P
 
     first = saved(case_of(files[0]), tmp_path / "out")
     same = first.rename(tmp_path / "moved")
-    hashes = shown(same), shown(write(read(same), tmp_path / "again", []))
+    hashes = shown(same), shown(save(read(same), tmp_path / "again", []))
     assert (
         hashes[0]
         == hashes[1]

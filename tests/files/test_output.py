@@ -17,10 +17,10 @@ import pytest
 from sample_archive import sample_archive, table_archive
 
 from rodshell.errors import OutputError
-from rodshell.output import Archive, picture_svg, read, write
-from rodshell.output.archive import export
+from rodshell.output import export, picture_svg, save
+from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.labels import boxes_meet, lines_meet, place
-from rodshell.output.plan import flat_plan
+from rodshell.results import Archive, Results, read
 
 TOLERANCE = 0.01  # mm: a tenth of what a saw or a laser holds
 SVG = "{http://www.w3.org/2000/svg}"
@@ -33,12 +33,12 @@ def archive() -> Archive:
 
 @pytest.fixture(scope="module")
 def out(archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write(archive, tmp_path_factory.mktemp("results") / "dome")
+    return save(archive, tmp_path_factory.mktemp("results") / "dome")
 
 
 @pytest.fixture(scope="module")
 def table_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write(table_archive(), tmp_path_factory.mktemp("results") / "table")
+    return save(table_archive(), tmp_path_factory.mktemp("results") / "table")
 
 
 def rows(out: Path, name: str) -> list[dict[str, str]]:
@@ -99,7 +99,7 @@ def test_cut_lengths_agree_in_every_file(which: str, request: pytest.FixtureRequ
 def test_lines_lie_where_the_flat_state_has_its_ends(out: Path, archive: Archive) -> None:
     nodes = np.split(archive.states["rod_nodes"], archive.states["rod_start"][1:])
     svg, dxf = svg_rods(out), layer(out, "LINE", "CUT")
-    for rod, own, line, row in zip(archive.result["rods"], nodes, dxf, rows(out, "rods.csv"), strict=True):
+    for rod, own, line, row in zip(archive.results.plain()["rods"], nodes, dxf, rows(out, "rods.csv"), strict=True):
         ends = 1e3 * archive.states["flat"][own[[0, -1]], :2]
         np.testing.assert_allclose(svg[rod["id"]], ends, atol=TOLERANCE)
         np.testing.assert_allclose([line.dxf.start.vec2, line.dxf.end.vec2], ends, atol=TOLERANCE)
@@ -134,7 +134,7 @@ def test_joint_marks_of_both_rods_coincide(which: str, request: pytest.FixtureRe
 
 def test_joints_in_space_lie_on_the_final_state(out: Path, archive: Archive) -> None:
     rod_nodes = np.split(archive.states["rod_nodes"], archive.states["rod_start"][1:])
-    nodes = {rod["id"]: own for rod, own in zip(archive.result["rods"], rod_nodes, strict=True)}
+    nodes = {rod["id"]: own for rod, own in zip(archive.results.plain()["rods"], rod_nodes, strict=True)}
     for row in rows(out, "joints.csv"):
         (shared,) = np.intersect1d(nodes[row["rod_a"]], nodes[row["rod_b"]])
         final = [float(row[f"final_{axis}_mm"]) for axis in "xyz"]
@@ -187,7 +187,7 @@ def test_dxf_has_both_boundaries(out: Path, archive: Archive) -> None:
     assert np.all(np.diff(turns) > 0)
     assert turns[-1] - turns[0] < 2 * np.pi  # once around
     boundary = {tuple(np.round(vertex.dxf.location, 3)) for vertex in final.vertices}
-    assert boundary == {tuple(np.round(1e3 * np.array(point), 3)) for point in archive.result["boundary"]}
+    assert boundary == {tuple(np.round(1e3 * np.array(point), 3)) for point in archive.results.plain()["boundary"]}
 
 
 def test_svg_is_at_true_scale(out: Path) -> None:
@@ -257,7 +257,7 @@ def test_vtp_holds_lines_points_and_gaps(out: Path, archive: Archive) -> None:
     piece = ET.parse(out / "model/popped_pinned.vtp").getroot().find("PolyData/Piece")
     assert piece is not None
     data = vtk_arrays(out / "model/popped_pinned.vtp")
-    nodes, m = archive.states["rod_nodes"], len(archive.result["rods"])
+    nodes, m = archive.states["rod_nodes"], len(archive.results.plain()["rods"])
     assert (piece.attrib["NumberOfPoints"], piece.attrib["NumberOfLines"]) == (str(len(nodes)), str(m))
     np.testing.assert_array_equal(data["Points"].reshape(-1, 3), archive.states["popped_pinned"][nodes])
     np.testing.assert_array_equal(data["gap"], archive.states["gap_pinned"][nodes])
@@ -271,7 +271,7 @@ def test_obj_polylines_are_the_states(out: Path, archive: Archive) -> None:
     points = np.array([word[1:] for word in words if word[0] == "v"], dtype=float)
     lines = [np.array(word[1:], dtype=int) - 1 for word in words if word[0] == "l"]
     nodes = np.split(archive.states["rod_nodes"], archive.states["rod_start"][1:])
-    assert [word[1] for word in words if word[0] == "o"] == [rod["id"] for rod in archive.result["rods"]]
+    assert [word[1] for word in words if word[0] == "o"] == [rod["id"] for rod in archive.results.plain()["rods"]]
     for line, own in zip(lines, nodes, strict=True):
         np.testing.assert_allclose(points[line], archive.states["popped_clamped"][own], atol=1e-8)
 
@@ -324,8 +324,8 @@ def test_report_puts_failure_and_then_warnings_once_before_all_else(archive: Arc
         "clamped": {"status": "converged", "stable": False, "negative_modes": 1},
     }
     words = {"warnings": ["<script>alert(1)</script>"], "dropped": [{"id": "U99", "reason": "no two ends"}]}
-    result = {**archive.result, "status": "stalled", "pop_up": shells, **words}
-    export(replace(archive, result=result), tmp_path, ["report"])
+    result = {**archive.results.plain(), "status": "stalled", "pop_up": shells, **words}
+    export(replace(archive, results=Results.of(result)), tmp_path, ["report"])
     page = (tmp_path / "report.html").read_text()
     first = "Not buildable: the pop-up with pinned ends did not converge: stalled"
     assert page.index(first) < page.index("&lt;script&gt;alert(1)") < page.index("<h2>")
@@ -338,8 +338,8 @@ def test_report_puts_failure_and_then_warnings_once_before_all_else(archive: Arc
 def test_no_name_breaks_a_page_or_a_drawing(tmp_path: Path) -> None:
     plain = table_archive()
     name = '"><script>x</script> & \N{GREEK SMALL LETTER ALPHA}\x07'
-    archive = Archive({**plain.result, "name": name}, plain.states, "# </pre><script>x</script>")
-    out = write(archive, tmp_path / "named")
+    archive = Archive(Results.of({**plain.results.plain(), "name": name}), plain.states, "# </pre><script>x</script>")
+    out = save(archive, tmp_path / "named")
     assert "<script>x" not in (out / "report.html").read_text()
     root = ET.parse(out / "drawings/plan.svg").getroot()
     texts = {text.text or "" for text in root.iter(f"{SVG}text")}
@@ -352,8 +352,10 @@ def test_no_name_breaks_a_page_or_a_drawing(tmp_path: Path) -> None:
 def test_least_result_is_written(tmp_path: Path) -> None:
     """A result with nothing but rods (a run stopped early) still gives its files."""
     full = sample_archive()
-    result = {key: full.result[key] for key in ("format", "version", "units", "rods")}
-    out = write(Archive({**result, "status": "diverged"}, {"flat": full.states["flat"]}, ""), tmp_path / "least")
+    result = {key: full.results.plain()[key] for key in ("format", "version", "units", "rods")}
+    out = save(
+        Archive(Results.of({**result, "status": "diverged"}), {"flat": full.states["flat"]}, ""), tmp_path / "least"
+    )
     assert "Not buildable: it did not converge: diverged" in (out / "report.html").read_text()
     assert len(rows(out, "rods.csv")) == 18
     assert rows(out, "joints.csv")[0]["final_deg"] == ""
@@ -376,8 +378,8 @@ def test_pictures_share_the_view_and_the_scale(archive: Archive) -> None:
 def test_the_ring_is_where_the_agreement_found_the_largest_gap(archive: Archive) -> None:
     """Between two nodes it may be larger than at either: picture and table give one number."""
     between = {"pinned": {"max": 0.00135, "where": [0.0, 0.0, 0.2]}}
-    result = {**archive.result, "agreement": between}
-    root = ET.fromstring(picture_svg(replace(archive, result=result), "popped_pinned"))
+    result = {**archive.results.plain(), "agreement": between}
+    root = ET.fromstring(picture_svg(replace(archive, results=Results.of(result)), "popped_pinned"))
     texts = [text.text for text in root.iter(f"{SVG}text")]
     assert "\N{MINUS SIGN}1.35 mm" in texts
 
@@ -404,7 +406,7 @@ def test_report_of_60_by_60_rods_stays_below_5_megabytes(tmp_path: Path) -> None
 
 def test_read_gives_back_what_was_written(out: Path, archive: Archive) -> None:
     again = read(out)
-    assert again.result == archive.result
+    assert again.results.plain() == archive.results.plain()
     assert again.case_toml == archive.case_toml
     assert again.states.keys() == archive.states.keys()
     for name, values in archive.states.items():
@@ -413,20 +415,20 @@ def test_read_gives_back_what_was_written(out: Path, archive: Archive) -> None:
 
 
 def test_json_holds_no_nan(archive: Archive, tmp_path: Path) -> None:
-    result = {**archive.result, "net": {"error_estimate": np.nan, "min_angle_deg": np.float64("inf"),
+    result = {**archive.results.plain(), "net": {"error_estimate": np.nan, "min_angle_deg": np.float64("inf"),
               "min_angle_at": np.array([np.nan, 0.0, 1.0])}, "count": np.int64(3)}  # fmt: skip
 
     def refuse(word: str) -> None:
         raise AssertionError(word)
 
-    text = (write(replace(archive, result=result), tmp_path / "nan") / "result.json").read_text()
+    text = (save(replace(archive, results=Results.of(result)), tmp_path / "nan") / "result.json").read_text()
     stored = json.loads(text, parse_constant=refuse)
     assert stored["net"] == {"error_estimate": None, "min_angle_deg": None, "min_angle_at": [None, 0.0, 1.0]}
     assert stored["count"] == 3
 
 
 def test_the_same_archive_gives_the_same_bytes(archive: Archive, out: Path, tmp_path: Path) -> None:
-    again = write(archive, tmp_path / "again")
+    again = save(archive, tmp_path / "again")
     for path in out.rglob("*"):
         if path.is_file():
             assert path.read_bytes() == (again / path.relative_to(out)).read_bytes(), path.name

@@ -14,13 +14,14 @@ from sample_archive import sample_archive
 
 from rodshell.cli import main
 from rodshell.errors import OutputWarning
-from rodshell.output.archive import Archive, export, write
+from rodshell.output import export, save
 from rodshell.output.drawing import Drawing, Pen, Pencil, Text
 from rodshell.output.drawings import sheet_set
+from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.fonts import CAPITAL
+from rodshell.output.options import PAPERS
 from rodshell.output.pdf import drawings_pdf, text_width
-from rodshell.output.plan import flat_plan
-from rodshell.output.takeaway import PAPERS
+from rodshell.results import Archive, Results
 
 INCH = 25.4  # mm
 
@@ -155,8 +156,8 @@ def test_a_warning_names_no_more_characters_than_can_be_read() -> None:
 
 def test_the_command_line_says_which_characters_are_boxes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = sample_archive(5)
-    made = replace(made, result={**made.result, "drawings": {"project": "漢字 Halle"}})
-    write(made, tmp_path / "out", [])
+    made = replace(made, results=Results.of({**made.results.plain(), "drawings": {"project": "漢字 Halle"}}))
+    save(made, tmp_path / "out", [])
     assert main(["export", str(tmp_path / "out"), "--only", "pdf", "--quiet"]) == 0
     (line,) = capsys.readouterr().err.splitlines()
     assert line == "rodshell: warning: the PDF shows boxes for characters that its typeface lacks: 字 漢"

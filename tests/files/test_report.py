@@ -9,19 +9,21 @@ import numpy as np
 import pytest
 from browser import coloured, needs_browser, open_report, wrong_legends
 from forms import TARGETS, archive, breaking, wished
-from sample_archive import sample_archive, table_archive, with_way_up
+from sample_archive import sample_archive, table_archive, with_deployment
 
 import rodshell as rs
 from rodshell.checks import Deployment
-from rodshell.output import Archive, wording
-from rodshell.output.archive import export
-from rodshell.output.figures import checks_table, key_figures
-from rodshell.output.inputs import shown_case
-from rodshell.output.plan import flat_plan
-from rodshell.output.result import rod_table
-from rodshell.output.rounding import Rounding
-from rodshell.output.verdict import facts
+from rodshell.output import export
+from rodshell.output.drawings.flat import flat_plan
+from rodshell.output.report import checks_table, key_figures
 from rodshell.output.viewer import viewer_data, viewer_json
+from rodshell.results import Archive, Results, wording
+from rodshell.results.checked import Bending, WorstBent
+from rodshell.results.from_form import rod_type
+from rodshell.results.inputs import shown_case
+from rodshell.results.records import Layout, Material, Target
+from rodshell.results.verdict import facts
+from rodshell.results.wording import Rounding
 from rodshell.solve.path import Snap
 from tests.acceptance.cases import ROD
 
@@ -61,7 +63,7 @@ def test_colours_of_the_view_mean_what_stands_at_their_own_bar() -> None:
     made = breaking()
     data = viewer_data(made)
     assert data is not None
-    unit = made.result["bending"]["strength"] / 100
+    unit = made.results.plain()["bending"]["strength"] / 100
     for kind, factor in (("stress", unit), ("gap", 1e-3)):
         for frame, shown in zip(data["frames"], coloured(made)[kind], strict=True):
             assert (kind in frame) == (shown is not None)
@@ -77,7 +79,7 @@ def test_colours_of_the_view_mean_what_stands_at_their_own_bar() -> None:
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page of 60 by 60 rods with a way up."""
-    return page_of(with_way_up(sample_archive(60, 6)), tmp_path_factory.mktemp("large"))
+    return page_of(with_deployment(sample_archive(60, 6)), tmp_path_factory.mktemp("large"))
 
 
 @needs_browser
@@ -105,7 +107,7 @@ def test_frames_of_the_view_are_the_archive_s_shapes() -> None:
         assert ("stress" in frame) == (frame["name"] != "flat")
 
 
-def test_without_a_way_up_the_view_says_that_nothing_is_known_between(tmp_path: Path) -> None:
+def test_without_a_deployment_the_view_says_that_nothing_is_known_between(tmp_path: Path) -> None:
     made = sample_archive()
     page = page_of(made, tmp_path).read_text()
     assert "The deployment from flat was not followed: nothing is known between these shapes." in page
@@ -114,8 +116,8 @@ def test_without_a_way_up_the_view_says_that_nothing_is_known_between(tmp_path: 
 
 def test_data_of_the_view_cannot_end_its_script() -> None:
     made = table_archive()
-    rods = [{**rod, "id": "</script>"} for rod in made.result["rods"]]
-    data = viewer_data(replace(made, result={**made.result, "rods": rods}))
+    rods = tuple(rod.changed(id="</script>") for rod in made.results.rods)
+    data = viewer_data(replace(made, results=made.results.changed(rods=rods)))
     assert "</" not in viewer_json({**(data or {}), "names": {"gap": "</script>"}})
 
 
@@ -124,14 +126,15 @@ def test_data_of_the_view_cannot_end_its_script() -> None:
 def test_the_verdict_comes_first_with_its_colour_and_all_reasons(level: str, tmp_path: Path) -> None:
     made = archive("dome")
     reasons = ["the <first> reason", "the second"]
-    result = {**made.result, "verdict": {"level": level, "reasons": reasons}}
-    page = page_of(replace(made, result=result), tmp_path).read_text()
+    result = {**made.results.plain(), "verdict": {"level": level, "reasons": reasons}}
+    page = page_of(replace(made, results=Results.of(result)), tmp_path).read_text()
     words = {"good": "Good", "check": "Check", "unbuildable": "Not buildable"}
     notice = f'<section class="notice {level}" aria-label="Verdict">'
     places = [page.index(text) for text in (notice, f"{words[level]}: the &lt;first&gt; reason", "the second", "<h2>")]
     assert places == sorted(places)
     assert f".{level} {{ --tone: var(--{level}); }}" in page
-    assert replace(made, result=result).summary().startswith(f"{made.name}: {words[level]}: the <first> reason\n")
+    text = replace(made, results=Results.of(result)).summary()
+    assert text.startswith(f"{made.name}: {words[level]}: the <first> reason\n")
 
 
 def test_warnings_are_reasons_and_stand_once(tmp_path: Path) -> None:
@@ -139,8 +142,8 @@ def test_warnings_are_reasons_and_stand_once(tmp_path: Path) -> None:
     snaps = (Snap(0.14, 0.15, 0.03),)
     way = Deployment(np.zeros(1), np.zeros((1, 1, 3)), (), snaps, reached_from_flat=True)
     (words,) = way.warnings
-    result = {key: value for key, value in made.result.items() if key != "verdict"} | {"warnings": [words]}
-    page = page_of(replace(made, result=result), tmp_path).read_text()
+    result = {key: value for key, value in made.results.plain().items() if key != "verdict"} | {"warnings": [words]}
+    page = page_of(replace(made, results=Results.of(result)), tmp_path).read_text()
     assert page.count(words) == 1
     assert page.index(words) < page.index("<h2>")
 
@@ -148,7 +151,7 @@ def test_warnings_are_reasons_and_stand_once(tmp_path: Path) -> None:
 def test_checks_are_in_words_and_numbers(tmp_path: Path) -> None:
     made = wished()
     page = page_of(made, tmp_path).read_text()
-    share = made.result["bending"]["pinned"]["utilisation"]
+    share = made.results.plain()["bending"]["pinned"]["utilisation"]
     assert 0.1 < share < 1
     assert f"{100 * share:.2g} %" in page
     assert "Sum of all forces over the largest" in page
@@ -163,40 +166,42 @@ def test_report_of_60_by_60_rods_with_its_way_up_stays_below_15_megabytes(large:
     assert page_of(archive("dome"), tmp_path).stat().st_size < 5e6
 
 
-def with_way(strength_used: float | None, lost: float | None, snaps: list[list[float]]) -> Archive:
-    """The dome with a way up whose stages below `lost` are missing."""
+def with_stages(strength_used: float | None, lost: float | None, snaps: list[list[float]]) -> Archive:
+    """The dome with a deployment whose stages below `lost` are missing."""
     made = archive("dome")
-    bent = {key: dict(entry) for key, entry in made.result["bending"].items() if isinstance(entry, dict)}
+    bent = {key: dict(entry) for key, entry in made.results.plain()["bending"].items() if isinstance(entry, dict)}
     for entry in bent.values():
         entry["utilisation"] = strength_used
-    whole = made.result["deployment"]
+    whole = made.results.plain()["deployment"]
     kept = [k for k, stage in enumerate(whole["stages"]) if stage["share"] == 0 or stage["share"] >= (lost or 0.0)]
     way = {**whole, "stages": [whole["stages"][k] for k in kept], "lost_at": lost, "snaps": snaps}
     states = {name: rows[kept] if name.startswith("history") else rows for name, rows in made.states.items()}
-    return replace(made, result={**made.result, "bending": bent, "deployment": way}, states=states)
+    return replace(
+        made, results=Results.of({**made.results.plain(), "bending": bent, "deployment": way}), states=states
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "snaps", "words", "note", "head"),
-    [(None, [], "deployment included.", "Every stage is an equilibrium", "on the way up"),
-     (None, [[0.14, 0.25]], "what a snap asks of them is not known.", "Every stage", "on the way up"),
+    [(None, [], "deployment included.", "Every stage is an equilibrium", "deployment"),
+     (None, [[0.14, 0.25]], "the stress during a snap is not known.", "Every stage", "deployment"),
      (0.5625, [], "above 56 % of the deployment; below, nothing is known of it.", "Below 56 %",
-      "on the way up above 56 %"),
+      "deployment above 56 %"),
      (1.0, [], "nothing is known of the deployment, which could not be followed.",
       "The deployment from flat was not followed", None)],
 )  # fmt: skip
-def test_no_more_is_said_of_the_way_up_than_was_followed(
+def test_no_more_is_said_of_the_deployment_than_was_followed(
     lost: float | None, snaps: list[list[float]], words: str, note: str, head: str | None, tmp_path: Path
 ) -> None:
-    made = with_way(0.32, lost, snaps)
-    (said,) = [sentence for sentence in facts(made.result) if "of their strength" in sentence]
+    made = with_stages(0.32, lost, snaps)
+    (said,) = [sentence for sentence in facts(made.results) if "of their strength" in sentence]
     assert said.startswith("The rods use 32 % of their strength at most, ")
     assert said.endswith(words)
     assert ("deployment included" in said) == (lost is None and not snaps)
     page = page_of(made, tmp_path).read_text()
     assert f"<figcaption>{note}" in page
-    assert re.findall(r">(on the way up[^<]*)</th>", page) == ([head] if head else [])
+    assert re.findall(r">(deployment[^<]*)</th>", page) == ([head] if head else [])
     lines = [line for line in made.summary().splitlines() if line.startswith("  bending   stages")]
     assert len(lines) == (head is not None)
     assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)  # as the warning has it
@@ -219,19 +224,19 @@ def test_no_more_is_said_of_the_way_up_than_was_followed(
 def test_under_the_view_stands_where_the_stages_do_not_follow_each_other_smoothly(
     lost: float | None, snaps: list[list[float]], guided: list[float] | None, note: str, tmp_path: Path
 ) -> None:
-    made = with_way(None, lost, snaps)
-    result = {**made.result, "deployment": {**made.result["deployment"], "guided": guided}}
-    page = page_of(replace(made, result=result), tmp_path).read_text()
+    made = with_stages(None, lost, snaps)
+    result = {**made.results.plain(), "deployment": {**made.results.plain()["deployment"], "guided": guided}}
+    page = page_of(replace(made, results=Results.of(result)), tmp_path).read_text()
     assert f"<figcaption>{note}</figcaption>" in page
 
 
-def test_a_way_up_that_nobody_followed_is_not_included() -> None:
-    made = with_way(0.32, None, [])
-    result = {key: value for key, value in made.result.items() if key != "deployment"}
+def test_a_deployment_that_was_not_followed_is_not_included() -> None:
+    made = with_stages(0.32, None, [])
+    result = {key: value for key, value in made.results.plain().items() if key != "deployment"}
     for stages in ("pop_up", "deployment"):
         del result["bending"][stages]
-    assert facts(result)[-1].endswith("in the final shape; the deployment from flat was not followed.")
-    assert "bending   stages" not in replace(made, result=result).summary()
+    assert facts(Results.of(result))[-1].endswith("in the final shape; the deployment from flat was not followed.")
+    assert "bending   stages" not in replace(made, results=Results.of(result)).summary()
 
 
 @pytest.mark.parametrize(
@@ -246,7 +251,7 @@ def test_numbers_are_plain(value: float, shown: str) -> None:
 
 def test_every_number_of_a_material_has_its_unit() -> None:
     timber = rs.Material(youngs_modulus=11e9, density=470.0, shear=0.69e9).parameters()
-    rows = dict(wording.case_rows(timber))
+    rows = dict(wording.case_rows(Material.model_validate(timber)))
     assert rows == {
         "Young's modulus": "11 GPa",
         "density": "470 kg/m\N{SUPERSCRIPT THREE}",
@@ -256,7 +261,11 @@ def test_every_number_of_a_material_has_its_unit() -> None:
 
 def test_a_page_for_others_names_files_and_no_folders() -> None:
     target = {"kind": "mesh", "file": "/home/ann/roof.obj", "boundary": "C:\\ann\\rim.dxf", "unit": 0.001}
-    assert wording.case_rows(target) == [("kind", "mesh"), ("file", "roof.obj"), ("boundary", "rim.dxf")]
+    assert wording.case_rows(Target.model_validate(target)) == [
+        ("kind", "mesh"),
+        ("file", "roof.obj"),
+        ("boundary", "rim.dxf"),
+    ]
     case = '[target]\nfile = "/home/ann/roof.obj"\nboundary = "/home/ann/rim.dxf"\n'
     assert (
         shown_case(case, {"/home/ann/roof.obj": b"v"}) == '[target]\nfile = "inputs/roof.obj"\nboundary = "rim.dxf"\n'
@@ -270,7 +279,7 @@ def test_no_drawing_of_the_page_claims_to_be_at_true_scale(tmp_path: Path) -> No
 
 
 def test_lengths_of_the_case_follow_the_rounding() -> None:
-    layout = {"spacing": [0.5, 0.5], "edge": 0.5 / 6, "offset": [0.0, -0.0125]}
+    layout = Layout(spacing=(0.5, 0.5), edge=0.5 / 6, offset=(0.0, -0.0125))
     assert [value for _, value in wording.case_rows(layout, Rounding(0.1))] == [
         "500 mm \N{MULTIPLICATION SIGN} 500 mm", "83.3 mm", "0 mm, \N{MINUS SIGN}12.5 mm",
     ]  # fmt: skip
@@ -290,7 +299,7 @@ def test_lengths_of_the_case_follow_the_rounding() -> None:
 )  # fmt: skip
 def test_the_summary_names_the_rod(rod: rs.Rod, line: str) -> None:
     made = archive("dome")
-    text = replace(made, result={**made.result, "rod": rod_table(rod)}).summary()
+    text = replace(made, results=Results.of({**made.results.plain(), "rod": rod_type(rod)})).summary()
     (said,) = [one for one in text.splitlines() if one.startswith("  rod ")]
     assert said.startswith(f"  rod       {line}")
     assert said.endswith("rubber's; for another: rod.material)") == ("rubber's;" in line)
@@ -299,14 +308,15 @@ def test_the_summary_names_the_rod(rod: rs.Rod, line: str) -> None:
 
 def test_strengths_of_a_preset_are_shown_with_what_they_mean_and_their_source() -> None:
     made = archive("dome")
-    rod = rod_table(rs.Rod(rs.Circle(0.02), rs.Material.preset("larch")))
-    result = {**made.result, "rod": rod, "bending": {"strength_of": "larch", "clamped": {"utilisation": 0.4}}}
-    rows = dict(dict(key_figures(result, flat_plan(made)))["Rod"])
+    rod = rod_type(rs.Rod(rs.Circle(0.02), rs.Material.preset("larch")))
+    bending = Bending(strength_of="larch", clamped=WorstBent(utilisation=0.4))
+    results = made.results.changed(rod=rod, bending=bending)
+    rows = dict(dict(key_figures(results, flat_plan(made)))["Rod"])
     assert rows["preset"] == "larch"
     assert rows["bending strength"] == "30 MPa"
     assert rows["these strengths are"] == "characteristic, short-term: reduce for duration and moisture"
     assert rows["source"].startswith("EN 338")
-    table = checks_table(result)
+    table = checks_table(results)
     assert table is not None
     assert ("Utilisation of larch's strength", ["40 %"]) in table["rows"]
 
@@ -314,14 +324,14 @@ def test_strengths_of_a_preset_are_shown_with_what_they_mean_and_their_source() 
 def test_lengths_with_allowances_are_told_from_those_without() -> None:
     for made, added in ((archive("dome"), 0.0), (wished(), 0.024)):
         plan = flat_plan(made)
-        cut = dict(dict(key_figures(made.result, plan))["Cut list"])
+        cut = dict(dict(key_figures(made.results, plan))["Cut list"])
         (bare,) = (float(text.split()[0]) for name, text in cut.items() if name.startswith("longest rod"))
         assert ("longest rod, without allowances" in cut) == plan.summary.endswith(", with allowances") == (added > 0)
         assert f"longest {bare + 1e3 * added:.{plan.rounding.digits}f} mm" in plan.summary
 
 
 def test_the_page_says_that_the_fewest_bars_are_a_bound(tmp_path: Path) -> None:
-    stock = wished().result["fabrication"]["stock"]
+    stock = wished().results.plain()["fabrication"]["stock"]
     page = " ".join(page_of(wished(), tmp_path).read_text().split())
     assert f"{len(stock['bars'])} bars, " in page
     assert f"total length alone it takes {stock['fewest']} bars; that is a bound" in page
@@ -333,10 +343,13 @@ def test_a_grid_that_rests_on_its_target_tells_depth_and_not_gap() -> None:
     assert ("largest gap", "0.00 mm") not in _drape_rows(made, "gravity")
     for method, word in (("bound", "largest gap"), ("gravity", "deepest inside the target")):
         assert word in [title for title, _ in _drape_rows(made, method)]
-    drape = {**made.result["drape"], "method": "gravity", "max_gap": 5.54e-5}
-    assert "deepest node inside by 0.06 mm" in replace(made, result={**made.result, "drape": drape}).summary()
+    assert made.results.drape is not None
+    drape = made.results.drape.changed(method="gravity", max_gap=5.54e-5)
+    text = replace(made, results=made.results.changed(drape=drape)).summary()
+    assert "deepest node inside by 0.06 mm" in text
 
 
 def _drape_rows(made: Archive, method: str) -> list[tuple[str, str]]:
-    result = {**made.result, "drape": {**made.result["drape"], "method": method, "max_gap": 5.54e-5}}
-    return dict(key_figures(result, flat_plan(made)))["Drape"]
+    assert made.results.drape is not None
+    drape = made.results.drape.changed(method=method, max_gap=5.54e-5)
+    return dict(key_figures(made.results.changed(drape=drape), flat_plan(made)))["Drape"]

@@ -5,12 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rodshell.output.rounding import rounding_of
 from rodshell.output.schedules import heading
+from rodshell.results import Results
+from rodshell.results.checked import Drawings
+from rodshell.results.records import Rod
+from rodshell.results.wording import rounding_of
 
 
-def result(longest: float, tolerance: float | None = None) -> dict:
-    return {"rods": [{"length": longest}, {"length": 0.5 * longest}], "drawings": {"tolerance": tolerance}}
+def result(longest: float, tolerance: float | None = None) -> Results:
+    rods = [Rod(id="U", family="u", start=0.0, end=length, length=length) for length in (longest, 0.5 * longest)]
+    return Results(rods=tuple(rods), drawings=Drawings(tolerance=tolerance))
 
 
 @given(st.floats(1e-5, 0.05))

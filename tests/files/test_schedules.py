@@ -9,9 +9,9 @@ import pytest
 from forms import ROD, archive, form, wished
 
 from rodshell.checks import JointLoads
-from rodshell.output.archive import export
-from rodshell.output.rods import joints_of, rods_of
-from rodshell.output.rounding import rounding_of
+from rodshell.output import export
+from rodshell.output.grid import joints_of, rods_of
+from rodshell.results.wording import rounding_of
 
 STEP = 0.1  # mm, to which a tolerance of 0.5 mm has lengths shown
 
@@ -32,7 +32,7 @@ def test_each_rod_weighs_what_is_cut(tables: dict[str, list[dict[str, str]]]) ->
 
 
 def test_lengths_are_shown_by_the_rule() -> None:
-    assert rounding_of(wished().result).step == STEP
+    assert rounding_of(wished().results).step == STEP
 
 
 def test_the_sharpest_bend_is_that_of_the_rod_s_own_nodes(tables: dict[str, list[dict[str, str]]]) -> None:
@@ -61,7 +61,7 @@ def test_the_rod_of_the_higher_layer_lies_over_the_other(tables: dict[str, list[
 
 def test_joints_scissor_by_what_their_angles_differ(tables: dict[str, list[dict[str, str]]]) -> None:
     """To the digits of the table; in the result by another estimate of the same tangents."""
-    loads = {"/".join(one["rods"]): one["scissor_deg"] for one in wished().result["joint_loads"]["clamped"]}
+    loads = {"/".join(one["rods"]): one["scissor_deg"] for one in wished().results.plain()["joint_loads"]["clamped"]}
     for row in tables["joints"]:
         grown = float(row["final_deg"]) - float(row["flat_deg"])
         assert float(row["scissor_deg"]) == pytest.approx(grown, abs=0.0101)
@@ -122,9 +122,9 @@ def test_end_paths_go_from_flat_to_the_supports(tables: dict[str, list[dict[str,
     rows = tables["end_paths"]
     last = [row for row in rows if row["share"] == "1.000000"]
     first = [row for row in rows if row["share"] == "0.000000"]
-    assert len(first) == len(last) == 2 * len(made.result["rods"])
+    assert len(first) == len(last) == 2 * len(made.results.plain()["rods"])
     assert len(rows) == len(last) * len(made.states["history_share"])
-    for row, start, place in zip(last, first, made.result["boundary"], strict=True):
+    for row, start, place in zip(last, first, made.results.plain()["boundary"], strict=True):
         at, moved, flat = (
             [float(one[f"{w}{axis}_mm"]) for axis in "xyz"] for one, w in ((row, ""), (row, "u"), (start, ""))
         )

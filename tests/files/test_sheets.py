@@ -12,15 +12,13 @@ from sample_archive import sample_archive, table_archive
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.joints import Joint, joint_parameters
-from rodshell.output import Archive
 from rodshell.output.drawing import LETTER, TEXT, Drawing
 from rodshell.output.drawings import sheet_set
-from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.sheets import MARGIN, fitted, parts, tiled
-from rodshell.output.drawings.titleblock import title_block
+from rodshell.output.drawings.flat import flat_drawing, flat_plan
+from rodshell.output.drawings.sheets import MARGIN, fitted, parts, tiled, title_block
 from rodshell.output.fonts import CAPITAL
-from rodshell.output.plan import flat_plan
-from rodshell.output.takeaway import PAPERS, DrawingStyle
+from rodshell.output.options import PAPERS, DrawingStyle
+from rodshell.results import Archive, Results
 
 
 def sheets(made: Archive) -> list[Drawing]:
@@ -28,7 +26,7 @@ def sheets(made: Archive) -> list[Drawing]:
 
 
 def styled(made: Archive, **style: object) -> Archive:
-    return replace(made, result={**made.result, "drawings": style})
+    return replace(made, results=Results.of({**made.results.plain(), "drawings": style}))
 
 
 @pytest.mark.slow
@@ -99,7 +97,7 @@ def test_the_title_block_names_rods_joints_author_and_date() -> None:
 )
 def test_joints_stand_in_the_title_block_with_their_units(joint: Joint, words: str) -> None:
     made = wished()
-    made = replace(made, result={**made.result, "joint": joint_parameters(joint)})
+    made = replace(made, results=Results.of({**made.results.plain(), "joint": joint_parameters(joint)}))
     assert dict(title_block(made, "").entries)["Joints"] == words
 
 
@@ -128,7 +126,7 @@ def test_dates_that_are_no_days_are_refused() -> None:
 @pytest.mark.slow
 def test_long_names_are_shortened_to_their_place() -> None:
     made = hostile_archive()
-    made = styled(made, **{**made.result["drawings"], "project": "W" * 500, "name": "W" * 500, "paper": "A4"})
+    made = styled(made, **{**made.results.plain()["drawings"], "project": "W" * 500, "name": "W" * 500, "paper": "A4"})
     for sheet in sheets(made):
         for text in sheet.texts:
             if set(text.text) & {"W"} and text.layer == "TITLE":
@@ -136,6 +134,6 @@ def test_long_names_are_shortened_to_their_place() -> None:
 
 
 def test_a_result_without_rod_or_joint_says_so() -> None:
-    bare = {key: value for key, value in sample_archive(3, 2).result.items() if key not in ("rod", "joint")}
-    entries = dict(title_block(replace(sample_archive(3, 2), result=bare), "").entries)
+    bare = {key: value for key, value in sample_archive(3, 2).results.plain().items() if key not in ("rod", "joint")}
+    entries = dict(title_block(replace(sample_archive(3, 2), results=Results.of(bare)), "").entries)
     assert entries["Section"] == entries["Material"] == "not given"

@@ -12,15 +12,14 @@ from hypothesis import strategies as st
 from PIL import Image
 from sample_archive import sample_archive
 
-from rodshell.output import Archive
 from rodshell.output.colour_scale import mixed, scale_of
 from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
+from rodshell.output.grid import rods_of, shape_of
 from rodshell.output.labels import Room, lines_meet
 from rodshell.output.pictures import LAYERS, PAPER, picture
 from rodshell.output.png import drawing_png
-from rodshell.output.rods import rods_of
-from rodshell.output.shapes import shape_of
 from rodshell.output.svg import drawing_svg, number
+from rodshell.results import Archive, Results
 
 numbers = st.floats(-1e6, 1e6).map(lambda x: float(np.round(x, 4))) | st.sampled_from([0.0, -0.001, 100.0, -0.5, 1.005])
 
@@ -191,7 +190,9 @@ def test_gaps_are_shown_in_a_unit_of_their_size(gap: float, unit: str, high: flo
     gaps = np.zeros(len(plain.states["draped"]))
     gaps[7] = -gap
     states = {name: values for name, values in plain.states.items() if not name.startswith("gap_")}
-    archive = replace(plain, states={**states, "gap_draped": gaps}, result={**plain.result, "agreement": {}})
+    archive = replace(
+        plain, states={**states, "gap_draped": gaps}, results=Results.of({**plain.results.plain(), "agreement": {}})
+    )
     scale = scale_of(archive, shape_of(archive, "draped"), "gap")
     assert scale is not None
     assert scale.caption == f"gap to target in {unit}, + outside"
@@ -201,11 +202,11 @@ def test_gaps_are_shown_in_a_unit_of_their_size(gap: float, unit: str, high: flo
 
 def test_what_is_made_of_an_archive_is_made_again_for_another() -> None:
     first = sample_archive(5)
-    second = replace(first, result={**first.result, "rods": first.result["rods"][:3]})
+    second = replace(first, results=first.results.changed(rods=first.results.rods[:3]))
     assert rods_of(first) is rods_of(first)
     assert len(rods_of(first)) == 10
     assert len(rods_of(second)) == 3
-    assert first == replace(second, result=first.result)
+    assert first == replace(second, results=first.results)
 
 
 def test_mixed_colours_lie_between() -> None:

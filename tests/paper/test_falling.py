@@ -16,7 +16,7 @@ from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.methods import Fall
 from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
-from rodshell.output.manifest import read_manifest
+from rodshell.results.folder import read_manifest
 from rodshell.solve.report import Status
 from rodshell.solve.simulate import TimeSeries
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
@@ -79,6 +79,7 @@ def test_explicit_springs_part_by_the_force_over_their_stiffness() -> None:
     assert abs(gaps[0] / gaps[1] - 2.0) < 0.05
 
 
+@pytest.mark.slow
 def test_the_rest_without_friction_is_unstable_sideways_and_says_so() -> None:
     draped = fallen("shared")
     assert draped.rest is not None

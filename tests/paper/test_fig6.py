@@ -11,14 +11,16 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-import rodshell as rs
 from rodshell.formfinding.methods import Fall
+from rodshell.nets import sphere_net_end
 from rodshell.output.view import TOWARDS
-from rodshell.paper import drape_pictures
-from rodshell.paper.drapefigure import DrapeFigure
-from rodshell.paper.drapes import METHODS, Case, Drape, drape_all
-from rodshell.paper.panels import standing
+from rodshell.paper import drapes
+from rodshell.paper.cases import Case
+from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
+from rodshell.paper.plotting import standing
 from tests.paper.falls import HEMISPHERE
+
+pytestmark = pytest.mark.slow
 
 CASE = Case("a", HEMISPHERE, (7, 7), spacing=0.06, edge=0.03)
 
@@ -28,14 +30,14 @@ def figure() -> DrapeFigure:
     return DrapeFigure("fig6", "a title", drape_all([CASE], lambda *told: None, fall=Fall(drag=5.0)))
 
 
-def by(method: str) -> Drape:
+def by(method: str) -> DrapeRun:
     return next(one for one in figure().drapes if one.method == method)
 
 
 @pytest.mark.slow
 def test_the_net_that_g0_is_held_against_is_the_spheres_exact_one() -> None:
     for rod, net in zip(by("paper").trimmed.mesh.grid.rods, by("paper").net, strict=True):
-        np.testing.assert_allclose(np.abs(net), rs.sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
+        np.testing.assert_allclose(np.abs(net), sphere_net_end(0.2, abs(rod.offset)), atol=2e-5)
 
 
 @pytest.mark.slow
@@ -91,8 +93,8 @@ def test_a_footprint_that_was_sought_is_drawn_where_its_rods_are_those_of_the_ca
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def curves(found: np.ndarray | None) -> int:
-        monkeypatch.setattr(drape_pictures, "stored_footprint", lambda name: found)
-        return drape_pictures.rows_svg([by("bound")]).count("<polygon")
+        monkeypatch.setattr(drapes, "stored_footprint", lambda name: found)
+        return drapes.rows_svg([by("bound")]).count("<polygon")
 
     around = np.column_stack([np.cos(np.arange(28)), np.sin(np.arange(28))])
     assert curves(around) == curves(None) + 1

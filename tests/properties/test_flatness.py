@@ -68,8 +68,8 @@ def test_a_plane_is_called_one(name: str) -> None:
 
 
 def test_a_flat_target_in_patches_is_flat_too() -> None:
-    sewn = rs.sew(dome(0.001), [[(-1.0, 0.0), (1.0, 0.0)]], GRID, ROD)
-    result = sewn.archive().result
+    sewn = rs.find_form(dome(0.001), GRID, ROD, seams=[[(-1.0, 0.0), (1.0, 0.0)]])
+    result = sewn.archive().results.plain()
     assert result["target"]["flat"] is True
     assert sewn.warnings[0].startswith("the target is flat, nothing pops up: it rises by 1 mm only")
     assert sum("flat" in words for words in sewn.warnings) == 1
@@ -83,7 +83,7 @@ def test_the_command_line_ends_with_4_on_a_flat_mesh(tmp_path, capsys) -> None:
     printed = capsys.readouterr()
     assert "floor.obj: Not buildable: the target is flat, nothing pops up" in printed.out
     archive = rs.read(out)
-    assert archive.result["target"]["flat"] is True
+    assert archive.results.plain()["target"]["flat"] is True
     assert archive.verdict.level == "unbuildable"
     assert "the target is flat, nothing pops up" in (out / "report.html").read_text()
-    assert "flat" not in rs.find_form(dome(0.1), GRID, ROD).archive().result["target"]
+    assert "flat" not in rs.find_form(dome(0.1), GRID, ROD).archive().results.plain()["target"]

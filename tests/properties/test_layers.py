@@ -7,13 +7,13 @@ import pytest
 from numpy.linalg import norm
 
 import rodshell as rs
+from rodshell.case.rod_ends import read_result
 from rodshell.checks.bending import bending_of
-from rodshell.cli.rodends import read_result
 from rodshell.formfinding.section_limits import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.vectors import unit
 from rodshell.nets.sphere import crossing_angle
-from rodshell.output.rods import joint_places
+from rodshell.output.grid import joint_places
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.report import Status
@@ -144,7 +144,7 @@ def test_the_archive_shows_both_layers_and_joints_between_them():
 def test_seams_join_points_between_the_layers():
     seam = np.array([[0.02, -0.5], [0.05, 0.5]])
     target = rs.Ellipsoid(a=0.3, b=0.2, c=0.12)
-    sewn = rs.sew(target, [seam], layout(0.06), ROD, joint=PIN, ends=("clamped",))
+    sewn = rs.find_form(target, layout(0.06), ROD, seams=[seam], joint=PIN, ends=("clamped",))
     assert sewn.status == "converged"
     assert max(sewn.moved.values()) < 1e-3 * R  # nets of one surface would miss each other by h/R
     for meeting in sewn.meetings:

@@ -13,9 +13,9 @@ import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.formfinding import bound_drape, pipeline
 from rodshell.formfinding.section_limits import section_rotation
-from rodshell.output import read
-from rodshell.output.archive import json_text
-from rodshell.output.verdict import verdict
+from rodshell.results import read
+from rodshell.results.results import json_text
+from rodshell.results.verdict import verdict
 from rodshell.solve.report import Status
 from tests.properties.altered import with_report
 
@@ -68,7 +68,12 @@ def test_a_form_that_was_found_is_converged_and_has_nothing_to_warn_of():
 
 def test_only_the_end_conditions_asked_for_are_popped_up():
     form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=("pinned",))
-    assert list(form.popped) == list(form.result()["pop_up"]) == list(form.result()["agreement"]) == ["pinned"]
+    assert (
+        list(form.popped)
+        == list(form.results().plain()["pop_up"])
+        == list(form.results().plain()["agreement"])
+        == ["pinned"]
+    )
     assert form.status == "converged"
 
 
@@ -84,16 +89,16 @@ def test_a_pop_up_that_stops_early_is_named_and_has_no_agreement(monkeypatch):
     form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD)
     assert form.status == f"pop-up (pinned) {Status.STALLED.sentence}"
     assert form.agreement == {}
-    assert form.result()["pop_up"]["pinned"]["status"] == "stalled"
-    assert form.result()["pop_up"]["pinned"]["stable"] is False
+    assert form.results().plain()["pop_up"]["pinned"]["status"] == "stalled"
+    assert form.results().plain()["pop_up"]["pinned"]["stable"] is False
 
 
 def test_a_popped_up_saddle_is_told_by_the_verdict(monkeypatch):
     monkeypatch.setattr(pipeline, "pop_up", altered_pop_up(negative_modes=2))
     form = rs.find_form(HEMISPHERE, layout_of(edge=0.025), ROD, ends=("pinned",))
     assert form.status == "converged"
-    assert form.result()["pop_up"]["pinned"]["stable"] is False
-    judged = verdict(form.result())
+    assert form.results().plain()["pop_up"]["pinned"]["stable"] is False
+    judged = verdict(form.results().plain())
     assert judged.level == "unbuildable"
     assert judged.reasons[0].startswith("with pinned ends the shell is unstable (2 buckling modes)")
 
@@ -185,22 +190,23 @@ def test_a_layout_beside_the_target_is_refused():
 def test_a_drape_by_weight_that_fails_is_told_of_the_bound_one_once(method, status, times):
     draped = hemisphere_form().draped
     levels = (replace(draped.report, status=status),)
-    form = replace(hemisphere_form(), draped=replace(draped, method=method, levels=levels))
+    lying = replace(hemisphere_form().trimmed, draped=replace(draped, method=method, levels=levels))
+    form = replace(hemisphere_form(), stages=replace(hemisphere_form().stages, lying=lying))
     assert form.status.startswith("drape ")
     assert form.status.count("bound") == times
 
 
 def test_a_wave_that_springs_off_is_advised_seams():
     gap = replace(hemisphere_form().agreement["clamped"], max=0.03 * SIZE)
-    form = replace(hemisphere_form(), agreement={"clamped": gap})
-    (words,) = [text for text in verdict(form.result()).reasons if "off the target" in text]
+    form = replace(hemisphere_form(), stages=replace(hemisphere_form().stages, agreement={"clamped": gap}))
+    (words,) = [text for text in verdict(form.results().plain()).reasons if "off the target" in text]
     assert words.endswith("dips and ridges need seams, graded stiffness or supports")
 
 
 def test_families_that_meet_at_a_small_angle_are_warned_of():
     """A hemisphere and some more: on the diagonal of the net the angle closes as f(uv/R^2)."""
     form = rs.find_form(rs.Cap(SIZE, -0.06), layout_of(edge=0.025), ROD, ends=("clamped",))
-    angle = form.result()["drape"]["min_angle_deg"]
+    angle = form.results().plain()["drape"]["min_angle_deg"]
     assert 10 < angle < 25
     assert any(f"{angle:.1f} degrees" in text for text in form.warnings)
 
@@ -238,9 +244,9 @@ def test_a_drape_that_does_not_converge_leaves_a_partial_result_that_is_saved(tm
     # the bump's radius of curvature at its top, s^2 / A = 8.3 mm, is named, against the spacing of 30 mm
     assert any("radius of curvature" in text and "0.03 m" in text for text in form.warnings)
     kept = read(form.save(tmp_path / "bump"))
-    assert kept.result["status"] == form.status
-    assert kept.result["drape"]["status"] == "stalled"
-    assert kept.result["pop_up"] == {}
+    assert kept.results.plain()["status"] == form.status
+    assert kept.results.plain()["drape"]["status"] == "stalled"
+    assert kept.results.plain()["pop_up"] == {}
     assert kept.final == "draped"
     np.testing.assert_array_equal(kept.states["draped"], form.trimmed.positions)
     assert "Not buildable: it did not converge: drape stopped" in form.summary()
@@ -259,7 +265,7 @@ def test_a_gravity_drape_that_slides_off_is_kept_too(tmp_path):
     form = rs.find_form(HEMISPHERE, layout, ROD, method=rs.Gravity(), anchor=(0.05, 0.02))
     assert form.status == f"drape {Status.LOST_CONTACT.sentence}"
     kept = read(form.save(tmp_path / "slid"))
-    assert kept.result["drape"]["status"] == "lost contact"
+    assert kept.results.plain()["drape"]["status"] == "lost contact"
     assert len(kept.states["draped"]) == len(kept.states["flat"]) == form.draped.mesh.node_count
 
 
@@ -276,10 +282,10 @@ def plain(value):
 def test_save_and_read_give_back_every_number(form, tmp_path):
     form = form()
     kept = read(form.save(tmp_path / "form"))
-    whole, own = plain(form.archive().result), plain(form.result())
-    assert kept.result == whole
+    whole, own = plain(form.archive().results.plain()), plain(form.results().plain())
+    assert kept.results.plain() == whole
     for key in own.keys() - {"rods", "warnings"}:  # these two the checks add to
-        assert kept.result[key] == own[key]
+        assert kept.results.plain()[key] == own[key]
     expected = {
         "flat": form.footprint.mesh.flat,
         "draped": form.trimmed.positions,
@@ -303,13 +309,12 @@ def test_the_kept_case_asks_for_the_same_ends(ends, tmp_path):
     target, layout = rs.Hemisphere(SIZE), rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
     whole, sewn = (
         rs.find_form(target, layout, ROD, ends=ends),
-        rs.sew(target, [[(-1, 0), (1, 0)]], layout, ROD, ends=ends),
+        rs.find_form(target, layout, ROD, seams=[[(-1, 0), (1, 0)]], ends=ends),
     )
     for form in (whole, sewn):
-        (tmp_path / "case.toml").write_text(form.archive(takeaway=rs.Takeaway(stages=0)).case_toml)
+        (tmp_path / "case.toml").write_text(form.archive(options=rs.OutputOptions(stages=0)).case_toml)
         case = load_case(tmp_path / "case.toml")
-        built = case.build_sewn() if form is sewn else case.build()
-        assert built.drape_options["ends"] == form.ends == tuple(form.popped) == ends
+        assert case.build().ends == form.ends == tuple(form.popped) == ends
 
 
 @pytest.mark.slow
@@ -326,7 +331,7 @@ def test_the_kept_case_gives_the_same_form_again(tmp_path):
 
 @every_form
 def test_result_has_the_keys_and_units_of_the_design(form):
-    result = form().result()
+    result = form().results().plain()
     assert [result[key] for key in ("format", "version", "units")] == ["rodshell-result", 1, "SI"]
     assert {
         "status",
@@ -356,7 +361,7 @@ def test_result_has_the_keys_and_units_of_the_design(form):
 @every_form
 def test_rods_of_the_result_are_those_of_the_states(form):
     """Lengths, joints and families read off the flat state alone: a joint is a node that two rods share."""
-    result, archive = form().result(), form().archive()
+    result, archive = form().results().plain(), form().archive()
     flat, nodes = archive.states["flat"], archive.states["rod_nodes"]
     starts = archive.states["rod_start"]
     rods = np.split(nodes, starts[1:])
@@ -387,7 +392,7 @@ def test_rods_of_the_result_are_those_of_the_states(form):
 @every_form
 def test_footprint_and_boundary_are_the_rod_ends_in_turn(form):
     """Material coordinates: rods of family u run along x at y = offset, also where the heading is turned."""
-    result, archive = form().result(), form().archive()
+    result, archive = form().results().plain(), form().archive()
     for k, rod in enumerate(result["rods"]):
         for end, s in ((0, rod["start"]), (1, rod["end"])):
             expected = [s, rod["offset"]] if rod["family"] == "u" else [rod["offset"], s]
@@ -400,7 +405,7 @@ def test_footprint_and_boundary_are_the_rod_ends_in_turn(form):
 
 def test_figures_of_the_result_can_be_had_from_its_states():
     form = hemisphere_form()
-    result, states = form.result(), form.archive().states
+    result, states = form.results().plain(), form.archive().states
     for ends in ("pinned", "clamped"):
         gaps = np.linalg.norm(states[f"popped_{ends}"], axis=1) - SIZE
         np.testing.assert_allclose(states[f"gap_{ends}"], gaps, rtol=0, atol=1e-14)
@@ -416,7 +421,7 @@ def test_figures_of_the_result_can_be_had_from_its_states():
 
 
 def test_dropped_rods_are_named_with_their_reason():
-    result = hemisphere_form().result()
+    result = hemisphere_form().results().plain()
     assert {entry["id"] for entry in result["dropped"]} == {"U01", "U13", "V01", "V13"}
     assert all("fewer than 3 joints" in entry["reason"] for entry in result["dropped"])
     assert not {entry["id"] for entry in result["dropped"]} & {rod["id"] for rod in result["rods"]}
@@ -442,7 +447,7 @@ def test_a_python_function_is_a_target_like_its_formula(tmp_path):
         ours, theirs = (form.popped[ends].positions for form in forms)
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9 * SIZE)
     kept = read(forms[0].save(tmp_path / "ripple"))
-    assert "ripple" in kept.result["target"]["function"]
+    assert "ripple" in kept.results.plain()["target"]["function"]
     assert "ripple" in kept.case_toml  # says that no case file can give it again
 
 
@@ -484,7 +489,7 @@ def test_a_table_with_the_forms_joints_bears_as_much_as_the_form():
     layout = rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
     form = rs.find_form(rs.Hemisphere(SIZE), layout, ROD, joint=rs.Rigid(mass=0.005), ends="pinned")
     table = table_of(form, edge=0.04, joint=form.joint)
-    ours, theirs = (one.archive().result for one in (table, form))
+    ours, theirs = (one.archive().results.plain() for one in (table, form))
     assert ours["joint"] == theirs["joint"]
     assert ours["fabrication"]["total_mass"] == pytest.approx(theirs["fabrication"]["total_mass"], rel=1e-9)
     borne = [one["self_weight"]["pinned"]["load_factor"] for one in (ours, theirs)]
@@ -501,7 +506,7 @@ def test_table_by_default_takes_six_edges_between_joints(tmp_path):
     table = table_of(hemisphere_form())
     lengths = table.footprint.mesh.edge_lengths
     assert lengths.max() == pytest.approx(0.05 / 6, rel=1e-6)
-    result = read(table.save(tmp_path / "table")).result
+    result = read(table.save(tmp_path / "table")).results.plain()
     assert result["status"] == "converged"
     assert list(result["pop_up"]) == ["pinned"]
     assert result["pop_up"]["pinned"]["stable"] is True

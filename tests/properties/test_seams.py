@@ -12,12 +12,12 @@ import rodshell as rs
 from rodshell.checks import self_weight
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
-from rodshell.formfinding.families import LEAVE_OUT, choose_families
-from rodshell.formfinding.patches import carried_heading, patches_of
+from rodshell.formfinding.end_matching import LEAVE_OUT, choose_families
 from rodshell.formfinding.seams import End, in_a_row
+from rodshell.formfinding.target_patches import carried_heading, patches_of
 from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.side_by_side import side_by_side
-from rodshell.output import read
+from rodshell.results import read
 from rodshell.targets.patch import Seam
 
 Floats = NDArray[np.float64]
@@ -50,22 +50,22 @@ def layout_of(spacing: float, **options: float) -> rs.GridLayout:
 
 
 @cache
-def sewn(name: str) -> rs.Sewn:
+def sewn(name: str) -> rs.Form:
     target, seams, spacing = CASES[name]
-    return rs.sew(target, seams, layout_of(spacing, rotate=HEADINGS.get(name, 0.0)), ROD)
+    return rs.find_form(target, layout_of(spacing, rotate=HEADINGS.get(name, 0.0)), ROD, seams=seams)
 
 
 every_case = pytest.mark.parametrize("name", CASES)
 
 
-def place_of(form: rs.Sewn, end: End) -> Floats:
+def place_of(form: rs.Form, end: End) -> Floats:
     """Where the popped-up pinned shell of a patch has an end."""
-    shell = form.found[end.patch]
+    shell = form.stages.found[end.patch]
     rods = [rod.name for rod in shell.footprint.rods]
     return shell.popped["pinned"].positions[shell.footprint.mesh.ends[rods.index(end.rod), end.side]]
 
 
-def off_seams(form: rs.Sewn, x: Floats) -> Floats:
+def off_seams(form: rs.Form, x: Floats) -> Floats:
     """(n,) distance in plan to the nearest seam's line, by dense points along it."""
     dense = []
     for seam in form.seams:
@@ -96,6 +96,7 @@ def test_these_points_lie_on_target_and_seam(name: str) -> None:
     assert off_seams(form, points).max() < 3e-5  # the dense points lie 5e-5 apart
 
 
+@pytest.mark.slow
 @every_case
 def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
     """Each end off the target's own edge belongs to exactly one meeting."""
@@ -103,7 +104,7 @@ def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
     met = [end for meeting in form.meetings for end in meeting.ends]
     assert len(met) == len(set(met)) == 2 * len(form.meetings)
     inside = 0
-    for patch, found in form.found.items():
+    for patch, found in form.stages.found.items():
         ends = found.trimmed.boundary.points
         for k in np.flatnonzero(form.target.margin(ends) > 2e-3 * form.target.size):
             assert End(patch, found.footprint.rods[k // 2].name, int(k % 2)) in met
@@ -111,38 +112,42 @@ def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
     assert inside >= 0.8 * len(met)
 
 
+@pytest.mark.slow
 @every_case
 def test_every_patch_lies_on_the_target_on_its_own_side(name: str) -> None:
     form = sewn(name)
-    for found, laid in zip(form.found.values(), form.laid.values(), strict=True):
+    for found, laid in zip(form.stages.found.values(), form.stages.laid.values(), strict=True):
         x = found.trimmed.positions
         assert np.abs(form.target.gap(x).distance).max() < 1e-9 * form.target.size
         assert laid.patch.margin(x).min() > -3e-3 * form.target.size  # straight chords beside a curved edge
-    assert sum(len(found.footprint.rods) for found in form.found.values()) == len(form.footprint.rods)
+    assert sum(len(found.footprint.rods) for found in form.stages.found.values()) == len(form.footprint.rods)
 
 
+@pytest.mark.slow
 @every_case
 def test_shells_are_stable_and_stay_near(name: str) -> None:
     form = sewn(name)
     for ends, allowed in (("pinned", 0.025), ("clamped", 0.005)):
-        _, report = form.popped[ends]
+        report = form.popped[ends].report
         assert report.stable
         assert form.agreement[ends].rms_relative < allowed
 
 
+@pytest.mark.slow
 @every_case
 def test_ends_hardly_move_to_their_points(name: str) -> None:
     """What the mesh of a patch alone misses them by; second order in its edges."""
-    assert max(sewn(name).moved.values()) < 3e-3 * CASES[name][0].size
+    assert max(sewn(name).stages.moved.values()) < 3e-3 * CASES[name][0].size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dome, aside", "two bumps, in the valley", "vault in three"])
 def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
     """Across the rod; along it the net itself is known to 1e-4 only. Without a correction 4e-6 to 7e-5 are left."""
     form = sewn(name)
     for meeting in form.meetings:
         end = meeting.ends[1]
-        laid = form.laid[end.patch]
+        laid = form.stages.laid[end.patch]
         rod = next(rod for rod in laid.rods if rod.name == end.rod)
         if [other.ends[1].rod for other in form.meetings if other.ends[1].patch == end.patch].count(end.rod) > 1:
             continue
@@ -156,21 +161,22 @@ def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
 def test_a_patch_alone_is_the_same_form() -> None:
     """One job with the patch's boundary and rods; only its ends are not moved (0.1 mm) to where the others are."""
     form = sewn("dome, diagonal")
-    for name, laid in form.laid.items():
+    for name, laid in form.stages.laid.items():
         alone = rs.find_form(laid.patch, laid.layout, ROD, anchor=laid.anchor, ends=("clamped",))
-        found = form.found[name]
+        found = form.stages.found[name]
         held = found.footprint.mesh.ends.ravel()
         free = np.setdiff1d(np.arange(found.footprint.mesh.node_count), held)
         np.testing.assert_array_equal(found.trimmed.positions[free], alone.trimmed.positions[free])
         np.testing.assert_array_equal(found.footprint.points, alone.footprint.points)
         apart = np.linalg.norm(found.popped["clamped"].positions - alone.popped["clamped"].positions, axis=1)
-        assert apart.max() < 2 * form.moved[name] < 4e-4
+        assert apart.max() < 2 * form.stages.moved[name] < 4e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dome, across", "dome, diagonal", "ball"])
 def test_patches_of_a_mirrored_target_mirror_each_other(name: str) -> None:
     form = sewn(name)
-    first, second = form.found.values()
+    first, second = form.stages.found.values()
     swapped = [1, 0, 2] if name == "dome, diagonal" else [0, 1, 2]
     sign = 1 if name == "dome, diagonal" else np.array([1, -1, 1])
     for here, there in ((first, second), (second, first)):
@@ -184,10 +190,10 @@ def test_patches_of_a_mirrored_target_mirror_each_other(name: str) -> None:
 def test_seams_carry_what_the_patches_do_not() -> None:
     """Forces on the seam and at the edge balance; each is the sum of both rods'."""
     form = sewn("two bumps, in the valley")
-    archive = form.archive("")
-    held = archive.result["reactions"]["clamped"]
+    archive = form.archive()
+    held = archive.results.plain()["reactions"]["clamped"]
     forces = np.array(held["forces"])
-    (seam,) = archive.result["seams"]
+    (seam,) = archive.results.plain()["seams"]
     rows = {f"{rod.name}.{side}": 2 * k + side for k, rod in enumerate(form.footprint.rods) for side in (0, 1)}
     both = [[rows[end] for end in meeting["ends"]] for meeting in seam["meetings"]]
     each = np.array(seam["forces"]["clamped"]["each"])
@@ -201,21 +207,23 @@ def test_seams_carry_what_the_patches_do_not() -> None:
 def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> None:
     form = sewn("two bumps, in the valley")
     archive = form.archive()
-    for ends, weighed in archive.result["self_weight"].items():
-        popped = [patch.popped[ends] for patch in form.found.values()]
+    for ends, weighed in archive.results.plain()["self_weight"].items():
+        popped = [patch.popped[ends] for patch in form.patches]
         own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
         assert weighed["load_factor"] == min(one.load_factor for one in own)
     assert archive.summary().count("(weakest patch, its seam held)") == 2
 
 
+@pytest.mark.slow
 def test_a_sphere_beyond_the_nets_limit_is_formed_in_two() -> None:
     with pytest.raises(NetLimitError):
         rs.find_form(BALL, layout_of(0.035), ROD)
     form = sewn("ball")
-    assert min(laid.net.min_angle for laid in form.laid.values()) > np.radians(20)
+    assert min(laid.net.min_angle for laid in form.stages.laid.values()) > np.radians(20)
     assert all("would swing" in why for _, why in form.dropped)
 
 
+@pytest.mark.slow
 def test_a_valley_with_a_seam_holds_the_grid_down() -> None:
     whole = rs.find_form(BUMPS, layout_of(0.032), ROD, ends=("clamped",))
     assert sewn("two bumps, in the valley").agreement["clamped"].rms < 0.3 * whole.agreement["clamped"].rms
@@ -225,24 +233,26 @@ def test_a_valley_with_a_seam_holds_the_grid_down() -> None:
 def test_the_search_leaves_out_no_more_rods_than_the_default_heading() -> None:
     target, seams, spacing = CASES["dome, aside"]
     layout = layout_of(1.2 * spacing)
-    default, found = (rs.sew(target, seams, layout, ROD, ends=(), search=one) for one in (False, True))
+    jobs = [rs.Job(target, layout, ROD, seams=seams, ends=(), rotate=turn) for turn in (None, "auto")]
+    default, found = (job.run(until="pop-up") for job in jobs)
     assert len(found.dropped) < len(default.dropped)
     assert any("rods are left out" in word for word in default.warnings)
 
 
 def test_a_patch_may_have_its_own_spacing_and_anchor() -> None:
     own = {"B": rs.PatchLayout(anchor=(0.1, -0.1), spacing=(0.05, 0.05))}
-    form = rs.sew(DOME, [DIAGONAL], layout_of(0.04), ROD, own=own, ends=())
-    assert form.laid["B"].layout.spacing == (0.05, 0.05)
-    np.testing.assert_allclose(form.laid["B"].anchor, (0.1, -0.1), atol=0.03 * 0.05)
+    form = rs.find_form(DOME, layout_of(0.04), ROD, seams=[DIAGONAL], patches=own, ends=())
+    assert form.stages.laid["B"].layout.spacing == (0.05, 0.05)
+    np.testing.assert_allclose(form.stages.laid["B"].anchor, (0.1, -0.1), atol=0.03 * 0.05)
     assert len(form.meetings) > 10
 
 
+@pytest.mark.slow
 def test_the_strong_bending_of_patches_is_that_of_the_worst() -> None:
     """Here not of the patch whose rods meet at the smallest angle."""
     lath = rs.Rod(rs.RectangularSection(width=1e-3, height=8e-3), rs.Material(youngs_modulus=1e9, density=1e3))
     target, seams, spacing = CASES["two bumps, in the valley"]
-    result = rs.sew(target, seams, layout_of(spacing), lath, joint=rs.Pin(), ends=()).result()
+    result = rs.find_form(target, layout_of(spacing), lath, seams=seams, joint=rs.Pin(), ends=()).results().plain()
     bent = [patch["drape"]["strong_bending"] for patch in result["patches"]]
     assert bent[0]["beyond"] > 1.1 * bent[1]["beyond"]
     assert result["patches"][0]["drape"]["min_angle_deg"] > result["patches"][1]["drape"]["min_angle_deg"]
@@ -265,23 +275,23 @@ def test_running_a_result_again_gives_the_same(tmp_path, monkeypatch) -> None:
     assert first.case_toml == second.case_toml
     for state, positions in first.states.items():
         np.testing.assert_array_equal(positions, second.states[state])
-    assert first.result["patches"][1]["rotate"] == pytest.approx(np.radians(12))
-    assert {rod["id"][:2] for rod in first.result["rods"]} == {"A-", "B-"}
+    assert first.results.plain()["patches"][1]["rotate"] == pytest.approx(np.radians(12))
+    assert {rod["id"][:2] for rod in first.results.plain()["rods"]} == {"A-", "B-"}
     assert (tmp_path / "first/schedule/seams.csv").read_text().count("\n") == 1 + len(
-        first.result["seams"][0]["meetings"]
+        first.results.plain()["seams"][0]["meetings"]
     )
 
 
 @pytest.mark.slow
 def test_an_archive_of_patches_gives_itself_again(tmp_path, capsys) -> None:
-    form = rs.sew(DOME, [DIAGONAL], layout_of(0.06), ROD)
+    form = rs.find_form(DOME, layout_of(0.06), ROD, seams=[DIAGONAL])
     form.save(tmp_path / "dome")
     assert main(["popup", str(tmp_path / "dome"), "--out", str(tmp_path / "popped")]) == 2
     assert "one patch's rods" in capsys.readouterr().err
     assert (
         main(["form", str(tmp_path / "dome/case.toml"), "--out", str(tmp_path / "again"), "--only", "csv", "-q"]) == 0
     )
-    np.testing.assert_array_equal(read(tmp_path / "again").states["popped_clamped"], form.popped["clamped"][0])
+    np.testing.assert_array_equal(read(tmp_path / "again").states["popped_clamped"], form.popped["clamped"].positions)
 
 
 BAD = {
@@ -312,7 +322,7 @@ def test_bad_seams_are_one_sentence(words: str, tmp_path, capsys) -> None:
 )
 def test_patches_that_are_not_there_are_refused(own: dict[str, rs.PatchLayout], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        rs.sew(DOME, [DIAGONAL], layout_of(0.04), ROD, own=own)
+        rs.find_form(DOME, layout_of(0.04), ROD, seams=[DIAGONAL], patches=own)
 
 
 @pytest.mark.parametrize("rotate", [0.0, 0.4])
@@ -394,9 +404,10 @@ def test_points_are_put_in_a_row_along_an_overhanging_curve() -> None:
     assert order.tolist() in (list(range(60)), list(range(59, -1, -1)))
 
 
+@pytest.mark.slow
 def test_grids_side_by_side_are_the_same_grids() -> None:
     form = sewn("vault in three")
-    meshes = {name: found.footprint.mesh for name, found in form.found.items()}
+    meshes = {name: found.footprint.mesh for name, found in form.stages.found.items()}
     both = side_by_side(meshes, 0.05)
     at = 0
     for name, mesh in meshes.items():
@@ -434,35 +445,37 @@ LEFT_OUT = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEFT_OUT)
 def test_hardly_a_rod_is_left_out_where_rods_can_meet(name: str) -> None:
     """Of 40 to 70: those in corners, which have too few joints."""
     assert len(sewn(name).dropped) <= LEFT_OUT[name]
 
 
+@pytest.mark.slow
 def test_figures_of_all_patches_are_joined() -> None:
     form = sewn("two bumps, in the valley")
     for ends, gap in form.agreement.items():
-        parts = [found.agreement[ends] for found in form.found.values()]
+        parts = [found.agreement[ends] for found in form.stages.found.values()]
         assert gap.max == max(part.max for part in parts)
         assert min(part.rms for part in parts) <= gap.rms <= max(part.rms for part in parts)
         np.testing.assert_array_equal(gap.gaps, np.concatenate([part.gaps for part in parts]))
         # the edges' middles count too, so all nodes alone give it nearly
         assert gap.rms == pytest.approx(np.sqrt(np.mean(gap.gaps**2)), rel=0.05)
-        _, report = form.popped[ends]
-        assert report.dofs == sum(found.popped[ends].report.dofs for found in form.found.values())
+        report = form.popped[ends].report
+        assert report.dofs == sum(found.popped[ends].report.dofs for found in form.stages.found.values())
 
 
 @pytest.mark.slow
 def test_the_way_up_of_all_patches_ends_where_they_stand() -> None:
     form = sewn("dome in quarters")
-    archive = form.archive("")
+    archive = form.archive()
     history, share = archive.states["history"], archive.states["history_share"]
     assert len(history) == len(share) > 3
-    np.testing.assert_allclose(history[-1], form.popped["pinned"][0], atol=1e-8)
+    np.testing.assert_allclose(history[-1], form.popped["pinned"].positions, atol=1e-8)
     assert np.ptp(history[0].reshape(-1, 3)[:, 2]) < 1e-3
     assert archive.states["history_curvature"].shape == (len(share), len(archive.states["rod_nodes"]))
     sharpest = archive.states["history_curvature"].max(axis=1)
     np.testing.assert_allclose(
-        [1 / stage["min_radius"] for stage in archive.result["deployment"]["stages"]], sharpest, rtol=1e-5
+        [1 / stage["min_radius"] for stage in archive.results.plain()["deployment"]["stages"]], sharpest, rtol=1e-5
     )

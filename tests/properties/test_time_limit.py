@@ -79,7 +79,7 @@ def test_checks_that_were_not_reached_are_named_and_the_result_is_not_called_con
     form, seconds, kinds = whole_form(), 0, set()
     while True:
         seconds += 1
-        result = form.archive(progress=TimeLimit(silent, seconds - 0.5)).result
+        result = form.finished(TimeLimit(silent, seconds - 0.5)).archive().results.plain()
         if result["status"] == "converged":
             break
         assert result["status"].startswith(f"out of time after {seconds - 0.5:g} s in stage ")
@@ -119,7 +119,7 @@ def whole_sewn():
 
 def sewn_form(**options):
     layout = rs.GridLayout.orthogonal(spacing=0.08, edge=0.04)
-    return rs.sew(HEMISPHERE, [[(-1, 0), (1, 0)]], layout, ROD, **options)
+    return rs.find_form(HEMISPHERE, layout, ROD, seams=[[(-1, 0), (1, 0)]], **options)
 
 
 @pytest.mark.slow
@@ -136,13 +136,13 @@ def test_seams_end_with_the_patches_that_are_finished_or_before_all_have_their_n
             break
         assert form.status.startswith(f"out of time after {seconds:g} s in stage ")
         assert form.status.count("(patch ") == 1
-        assert form.archive().result["status"] == form.status
+        assert form.archive().results.plain()["status"] == form.status
         finished = []
-        for name, one in form.found.items():
-            for ends, shell in one.popped.items():
+        for patch, same in zip(form.patches, whole.patches, strict=True):
+            for ends, shell in patch.popped.items():
                 if shell.report.converged:
-                    np.testing.assert_array_equal(shell.positions, whole.found[name].popped[ends].positions)
-                    finished.append(f"{name} {ends}")
+                    np.testing.assert_array_equal(shell.positions, same.popped[ends].positions)
+                    finished.append(f"{patch.name} {ends}")
         kinds.add(tuple(finished))
     nothing = {kind for kind in kinds if isinstance(kind, str)}
     assert nothing == {"seams (laying patch B)"}
@@ -154,7 +154,7 @@ def test_checks_that_any_patch_did_not_reach_are_named_and_left_out_of_the_joine
     form, seconds, kinds = whole_sewn(), -2.5, set()
     while True:
         seconds += 7
-        result = form.archive(progress=TimeLimit(silent, seconds)).result
+        result = form.finished(TimeLimit(silent, seconds)).archive().results.plain()
         if result["status"] == "converged":
             break
         assert result["status"] in result["warnings"]

@@ -94,7 +94,7 @@ def test_a_net_found_near_another_asks_the_target_less_often(monkeypatch):
         monkeypatch.setattr(rs.HeightField, name, lambda self, x, say=answer: asked.append(len(x)) or say(self, x))
     chebyshev_net(BUMPS, layout)
     cold, asked[:] = len(asked), []
-    chebyshev_net(BUMPS, layout, near=last)
+    chebyshev_net(BUMPS, layout, warm_start=last)
     assert len(asked) < 0.1 * cold  # 16 against 467
 
 
@@ -124,7 +124,7 @@ def test_a_form_found_from_the_last_one_is_the_form_found_from_nothing(change, l
     target, layout, options = CHANGES[change]
     options = {"anchor": (0.02, 0.01)} | options
     cold = rs.find_form(target, layout_of(**layout), ROD, **options)
-    warm = rs.find_form(target, layout_of(**layout), ROD, start=last, **options)
+    warm = rs.find_form(target, layout_of(**layout), ROD, warm_start=last, **options)
     assert cold.status == warm.status == "converged"
     assert [rod.name for rod in warm.footprint.rods] == [rod.name for rod in cold.footprint.rods]
     assert largest(warm.footprint.points - cold.footprint.points) < EXACT
@@ -137,7 +137,7 @@ def test_a_form_found_from_the_last_one_is_the_form_found_from_nothing(change, l
 def test_stiffer_rods_start_with_the_forces_that_they_need(last):
     """The shape does not change: from the last form there is nothing left to do but to see it."""
     stiff = rs.Rod(section=ROD.section, material=rs.Material(youngs_modulus=1e9, density=1e3))
-    warm = rs.find_form(OVAL, layout_of(), stiff, anchor=(0.02, 0.01), start=last)
+    warm = rs.find_form(OVAL, layout_of(), stiff, anchor=(0.02, 0.01), warm_start=last)
     for popped in warm.popped.values():
         assert popped.report.iterations == 1
         assert popped.report.stable
@@ -146,7 +146,7 @@ def test_stiffer_rods_start_with_the_forces_that_they_need(last):
 def test_a_shell_that_springs_off_takes_fewer_steps_from_the_last_one():
     last = rs.find_form(BUMPS, layout_of(), ROD)
     again = layout_of(spacing=0.0505)
-    cold, warm = (rs.find_form(BUMPS, again, ROD, start=start) for start in (None, last))
+    cold, warm = (rs.find_form(BUMPS, again, ROD, warm_start=start) for start in (None, last))
     for ends in cold.popped:
         assert warm.popped[ends].report.factorizations <= 0.75 * cold.popped[ends].report.factorizations
         assert largest(warm.popped[ends].positions - cold.popped[ends].positions) < SETTLED

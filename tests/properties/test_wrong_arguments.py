@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.cli import main
 
 TARGET = rs.Hemisphere(radius=0.2)
 METHODS = r"method must be rodshell.Bound\(\), rodshell.Gravity\(\) or rodshell.Fall\(\)"
@@ -14,12 +15,23 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, start="x"), 'start must be a form that an earlier .*, not "x"'),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, start=LAYOUT), "start must be a form .*, not a GridLayout"),
+        (
+            lambda: rs.find_form(TARGET, LAYOUT, ROD, warm_start="x"),
+            'warm_start must be a form that Job.run .*, not "x"',
+        ),
+        (
+            lambda: rs.find_form(TARGET, LAYOUT, ROD, warm_start=LAYOUT),
+            "warm_start must be a form .*, not a GridLayout",
+        ),
         (lambda: rs.find_form(LAYOUT, TARGET, ROD), "target must be a rodshell Target, not a GridLayout"),
         (lambda: rs.find_form(TARGET, ROD, LAYOUT), "layout must be a rodshell GridLayout, not a Rod"),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD.section), "rod must be a rodshell Rod, not a Circle"),
-        (lambda: rs.sew("dome", [[(-1, 0), (1, 0)]], LAYOUT, ROD), 'target must be a rodshell Target, not "dome"'),
+        (
+            lambda: rs.find_form("dome", LAYOUT, ROD, seams=[[(-1, 0), (1, 0)]]),
+            'target must be a rodshell Target, not "dome"',
+        ),
+        (lambda: rs.Job(TARGET, LAYOUT), "a job needs target, layout and rod; for a case"),
+        (lambda: rs.Job("hemisphere", LAYOUT, ROD), 'target must be a rodshell Target, not "hemisphere"'),
         (lambda: rs.drape(TARGET, LAYOUT, ROD), "layout must be a rodshell GridLayout, not a Hemisphere"),
         (lambda: rs.drape(LAYOUT, ROD, 3.0), "target must be a rodshell Target, not 3.0"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, warm_start="x"), 'warm_start must be what .* rodshell.drape .*"x"'),
@@ -28,13 +40,13 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.drape(LAYOUT, ROD, TARGET, anchor=0.1), "anchor must be two finite numbers x, y in m, not 0.1"),
         (
             lambda: rs.find_form(TARGET, LAYOUT, ROD, ends="clampd"),
-            'ends must be "pinned" or "clamped", not "clampd": did you mean "clamped"?',
+            'ends must be "pinned", "clamped" or "both", not "clampd": did you mean "clamped"?',
         ),
         (
             lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=("pinned", "x")),
-            'ends must be "pinned" or "clamped", not "x"',
+            'ends must be "pinned", "clamped" or "both", not "x"',
         ),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=1), 'one or several of "pinned", "clamped", not 1'),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, ends=1), 'one or several of "pinned", "clamped", "both", not 1'),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, method="bound"), f"{METHODS}, not 'bound'"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, method="gravity"), f"{METHODS}, not 'gravity'"),
         (lambda: rs.drape(LAYOUT, ROD, TARGET, method=None), f"{METHODS}, not None"),
@@ -44,7 +56,10 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.Fall(friction=-0.1), "the fall's friction must be 0 or more, not -0.1"),
         (lambda: rs.Fall(drag=np.nan), "the fall's drag must be 0 or more, not nan 1/s"),
         (lambda: rs.Fall(coupling="implicit"), r"coupling must be rodshell.SharedDofs\(\), .*, not \"implicit\""),
-        (lambda: rs.Fall(coupling=rs.ImplicitPenalty), r"coupling must be rodshell.SharedDofs\(\), .*, not a type"),
+        (
+            lambda: rs.Fall(coupling=rs.ImplicitPenalty),
+            r"coupling must be rodshell.SharedDofs\(\), .*, not the class ImplicitPenalty itself",
+        ),
         (lambda: rs.Fall(stopped="partly"), 'stopped must be "all" or "normal", not "partly"'),
         (lambda: rs.Fall(every=0), "every must be a number of steps, 1 or more, not 0"),
         (lambda: rs.Fall(stream=3), "stream must be the path of a folder, not 3"),
@@ -53,7 +68,7 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
             lambda: rs.drape(LAYOUT, ROD, TARGET, joint=(rs.Pin(),)),
             "joint must be one rodshell .*, not a sequence",
         ),
-        (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint="pin"), r"such as rodshell.Pin\(\), not 'pin'"),
+        (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint="pin"), r"such as rodshell.Pin\(\), not \"pin\""),
         (lambda: rs.find_form(TARGET, LAYOUT, ROD, joint=rs.Pin), "not the class Pin itself"),
         (lambda: rs.pop_up(None, None, ROD, ends="clampd"), 'ends must be "pinned" or "clamped", not "clampd"'),
         (lambda: rs.pop_up(None, None, ROD, start="drapped"), 'not "drapped": did you mean "draped"?'),
@@ -87,8 +102,94 @@ def test_a_saved_form_is_read_again(tmp_path):
     form = rs.find_form(TARGET, LAYOUT, ROD, ends=("clamped",))
     saved = rs.read(form.save(tmp_path / "dome"))
     assert isinstance(saved, rs.Archive)
-    assert saved.result["agreement"]["clamped"]["rms"] == form.agreement["clamped"].rms
+    assert saved.results.plain()["agreement"]["clamped"]["rms"] == form.agreement["clamped"].rms
     np.testing.assert_array_equal(saved.states["popped_clamped"], form.popped["clamped"].positions)
     assert 'kind = "hemisphere"' in saved.case_toml
     with pytest.raises(rs.OutputError):
         rs.read(tmp_path)
+
+
+# The same mistake in Python, in a case file and as an option
+
+
+def job(**options):
+    return rs.Job(TARGET, LAYOUT, ROD, **options)
+
+
+MISUSES = {
+    "ends": (lambda: job(ends="clampd"), "pop_up.ends", "clampd",
+             'must be "pinned", "clamped" or "both", not "clampd": did you mean "clamped"?'),
+    "ends of nothing like": (lambda: job(ends="x"), "pop_up.ends", "x",
+                             'must be "pinned", "clamped" or "both", not "x"'),
+    "objective": (lambda: job(anchor="auto", objective="sheer"), "drape.objective", "sheer",
+                  'must be "shear", "curvature" or "gap", not "sheer": did you mean "shear"?'),
+    "objective of a search": (lambda: rs.search(TARGET, LAYOUT, ROD, objective="gaps"), "drape.objective", "gaps",
+                              'must be "shear", "curvature" or "gap", not "gaps": did you mean "gap"?'),
+}  # fmt: skip
+"""Python, key, value, and the sentence after the name."""
+
+
+@pytest.mark.parametrize("name", MISUSES)
+def test_a_wrong_choice_is_the_same_sentence_in_python_in_a_file_and_as_an_option(name, tmp_path, capsys):
+    call, key, value, words = MISUSES[name]
+    with pytest.raises(rs.InputError) as caught:
+        call()
+    assert str(caught.value) == f"{key.rpartition('.')[2]} {words}"
+    said = f"{key} {words}"
+    (tmp_path / "case.toml").write_text(f'{key} = "{value}"\n')
+    with pytest.raises(rs.InputError) as caught:
+        rs.Job.load(tmp_path / "case.toml")
+    assert str(caught.value) == said
+    for arguments in ([str(tmp_path / "case.toml")], ["hemisphere", f"--{key}", value]):
+        assert main(["form", *arguments, "--out", str(tmp_path / "out")]) == 2
+        assert capsys.readouterr().err == f"rodshell: error: {said}\n"
+
+
+ELSEWHERE = {
+    "a method": ("drape.method", "bond", lambda: job(method="bond"), METHODS,
+                 'must be "bound", "gravity" or "paper", not "bond": did you mean "bound"?'),
+    "gravity that points up": ("drape.gravity", "-5", lambda: rs.Gravity(acceleration=-5), "must be positive, not -5",
+                               'drape.gravity = "-5": must be larger than zero'),
+    "gravity of a method without": ("drape.gravity", "5", lambda: job(method=rs.Bound), "not the class Bound itself",
+                                    'method "bound" has no gravity: leave it out, or set drape.method to'),
+    "a radius in words": ("target.radius", "two", lambda: rs.Hemisphere(radius="two"), 'in m, not "two"',
+                          'target.radius = "two": '),
+    "a joint's kind": ("joint.kind", "pinn", lambda: job(joint="pinn"), r'such as rodshell.Pin\(\), not "pinn"',
+                       '"pin", "spring", "linker" or "rigid", not "pinn": did you mean "pin"?'),
+    "an anchor of one number": ("drape.anchor", "0.1", lambda: job(anchor=0.1), "must be two finite numbers",
+                                'drape.anchor = "0.1": needs two values'),
+    "a material for a section": ("rod.section.kind", "gfrp", lambda: rs.Rod(ROD.material, ROD.section),
+                                 "section must be a circle, .*, not a Material", 'rod.section.kind must be "auto"'),
+}  # fmt: skip
+"""Key, value, Python, the sentence there, and that of a file and an option."""
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_a_wrong_value_is_refused_in_one_sentence_everywhere(name, tmp_path, capsys):
+    key, value, call, python, words = ELSEWHERE[name]
+    with pytest.raises(rs.InputError, match=python):
+        call()
+    (tmp_path / "case.toml").write_text(f'{key} = "{value}"\n')
+    for arguments in ([str(tmp_path / "case.toml")], ["hemisphere", f"--{key}", value]):
+        assert main(["form", *arguments, "--out", str(tmp_path / "out")]) == 2
+        said = capsys.readouterr().err
+        assert words in said
+        assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("table", ["rod.section", "joint", "rod", "drape"])
+def test_a_word_in_place_of_a_table_is_refused(table, tmp_path):
+    with pytest.raises(rs.InputError, match=rf'{table} = "pin": must be a table; \[{table}\] has '):
+        rs.Job.load(f'{table} = "pin"')
+
+
+def test_an_option_that_this_case_does_not_have_is_not_proposed(tmp_path, capsys):
+    def said(*arguments):
+        assert main(["form", *arguments, "--out", str(tmp_path / "out")]) == 2
+        return capsys.readouterr().err
+
+    assert "did you mean --target.height?" not in said("hemisphere", "--target.heigth", "1 m")
+    assert "unknown option --target.heigth: did you mean --target.height?" in said("paraboloid", "--target.heigth", "1")
+    kinds = ("--joint.kind", "pin")
+    assert "did you mean --joint.eccentricity?" in said("hemisphere", *kinds, "--joint.eccentricty", "1 mm")
+    assert "did you mean --joint.eccentricity?" not in said("hemisphere", "--joint.eccentricty", "1 mm")

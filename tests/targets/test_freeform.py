@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.nets import sphere_net_end
 from rodshell.targets import Freeform
 from rodshell.targets.trianglemesh import sound_mesh
 from tests.targets.meshes import PARTS, Floats, Mesh, capped_sphere, disc, lattice, sheet
@@ -232,7 +233,7 @@ def test_an_anchor_may_lie_in_an_opening_and_the_net_keeps_the_symmetry():
     assert {rod.name for rod in net.rods if rod.offset == 0} == {"U08a", "U08b", "V08a", "V08b"}
     for rod in net.rods:
         outer = -rod.start if rod.name.endswith("a") else rod.end
-        assert outer == pytest.approx(rs.sphere_net_end(RADIUS, rod.offset), abs=0.01 * RADIUS)
+        assert outer == pytest.approx(sphere_net_end(RADIUS, rod.offset), abs=0.01 * RADIUS)
         if rod.offset == 0:
             inner = rod.end if rod.name.endswith("a") else -rod.start
             assert -inner == pytest.approx(0.25 * RADIUS, abs=0.01 * RADIUS)

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from pydantic import Field
 
@@ -24,8 +24,11 @@ from rodshell.units import length_text, shown
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
+    from rodshell.formfinding.methods import Method
+    from rodshell.formfinding.popup import Ends
+    from rodshell.joints import Joint
     from rodshell.layout import GridLayout
-    from rodshell.output.takeaway import Takeaway
+    from rodshell.output.options import OutputOptions
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -33,12 +36,21 @@ HEADER = "# The full input of a rodshell job, in SI units. To run it again: rods
 
 
 class Built(NamedTuple):
-    """A case as library objects; `drape_options` are keyword arguments of `formfinding.find_form`."""
+    """A case as library objects.
+
+    Parameters
+    ----------
+    anchor : x, y where the axes cross [m]; None: the default, or one that is searched for.
+    ends : end conditions of the pop-up.
+    """
 
     target: "Target"
     layout: "GridLayout"
     rod: "Rod"
-    drape_options: dict[str, Any]
+    joint: "Joint"
+    method: "Method"
+    anchor: tuple[float, float] | None
+    ends: "tuple[Ends, ...]"
 
 
 class Case(Table):
@@ -56,31 +68,67 @@ class Case(Table):
     drawings: DrawingsTable = DrawingsTable()
 
     @property
-    def held(self) -> dict[str, Held]:
+    def held_objects(self) -> dict[str, Held]:
         """Objects that tables were made of and that their keys do not describe, by the name of the table."""
         tables = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: table._held for name, table in tables.items() if table._held is not None}
+        return {name: table.held for name, table in tables.items() if table.held is not None}
 
     def to_toml(self) -> str:
-        """The full input as a case file with SI numbers: loading it from anywhere gives the same case."""
-        content = self.model_dump(exclude_none=True)
-        for key in ("file", "boundary"):
-            if key in content["target"]:
-                content["target"][key] = str(Path(content["target"][key]).absolute())
-        return toml_text(content)
+        """The full input as a case file with SI numbers: loading it from anywhere gives the same case.
+
+        Raises
+        ------
+        InputError : it holds an object that no case file can describe.
+        """
+        notes = []
+        for name, held in self.held_objects.items():
+            if not held.writable:
+                raise InputError(
+                    f"no case file can describe {held.what} ({name}): keep the Python that makes it, or save the form"
+                )
+            notes += [f"# {held.note}\n"] if held.note else []
+        return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True))
+
+    def text(self) -> str:
+        """As `to_toml`, or a comment on why no case file can give the same again."""
+        if self.target.kind == "table":
+            return ""
+        for held in self.held_objects.values():
+            if not held.writable:
+                return f"# no case file can give {held.what} again\n"
+        return self.to_toml()
+
+    def absolute(self) -> Self:
+        """The same case, whose files are named from the root."""
+        paths = {key: getattr(self.target, key, None) for key in ("file", "boundary")}
+        rooted = {key: str(Path(path).absolute()) for key, path in paths.items() if path is not None}
+        if all(paths[key] == path for key, path in rooted.items()):
+            return self
+        return self.model_copy(update={"target": self.target.model_copy(update=rooted)})
+
+    @property
+    def files(self) -> set[str]:
+        """The files that the target is read from."""
+        paths = (getattr(self.target, key, None) for key in ("file", "boundary"))
+        return {path for path in paths if path is not None}
 
     def rod_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Rod":
         """The rod; material and section that were left to the target are chosen by the bends of its net."""
+        if self.rod.held is not None:
+            rod: Rod = self.rod.held.value
+            return rod
         return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.checks.strength)
 
     def fit_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Fit":
         """What a rod that is left to the target has to fit."""
         from rodshell.checks.sizing import Fit
 
-        return Fit.on(target, layout, anchor=anchor, joint=self.joint.build())
+        return Fit.on(target, layout, anchor=anchor, joint=built(self.joint))
 
     def with_rod(self, rod: "Rod") -> "Case":
         """The same case with this rod spelled out."""
+        if self.rod.held is not None:
+            return self
         return self.model_copy(update={"rod": RodTable.model_validate(rod.parameters())})
 
     @property
@@ -97,29 +145,40 @@ class Case(Table):
         """The same case with its heading [rad]."""
         return self.model_copy(update={"layout": self.layout.model_copy(update={"rotate": rotate})})
 
-    def build(self) -> Built:
-        """The target, layout, rod and drape options.
+    @property
+    def ends(self) -> "tuple[Ends, ...]":
+        """End conditions of the pop-up."""
+        if self.pop_up.held is not None:
+            return ()
+        return ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
+
+    def build(self, target: "Target | None" = None) -> Built:
+        """The objects.
+
+        Parameters
+        ----------
+        target : the target, where it was built before.
 
         Raises
         ------
-        InputError : values that are fine alone do not fit together, or the formula cannot be used.
+        InputError : values that are fine alone do not fit together, the formula or the file cannot be used; with seams,
+            also keys that a form in patches does not have.
         """
-        ends = ("pinned", "clamped") if self.pop_up.ends == "both" else (self.pop_up.ends,)
-        drape = self.drape
-        if drape.objective != "shear" and not self.undecided:
+        if self.seams.lines:
+            self._require_keys_of_patches()
+        elif self.drape.objective != "shear" and not self.undecided:
             raise InputError(
-                f"drape.objective = {shown(drape.objective)}: nothing is searched for: set drape.anchor or "
+                f"drape.objective = {shown(self.drape.objective)}: nothing is searched for: set drape.anchor or "
                 'layout.rotate to "auto", or leave it out'
             )
-        anchor = None if drape.anchor == "auto" else drape.anchor
-        options: dict[str, Any] = {"method": drape.build(), "anchor": anchor, "ends": ends}
-        options["joint"] = self.joint.build()
-        target = self.target.build()
-        layout = self.layout.build(target)
+        anchor = None if self.drape.anchor == "auto" else self.drape.anchor
+        joint, method = built(self.joint), built(self.drape)
+        target = target or built(self.target)
+        layout = built(self.layout, target)
         self._require_stock(layout)
         rod = self.rod_on(target, layout, anchor=anchor)
-        self.takeaway().require_known_stress(rod, options["joint"])
-        return Built(target, layout, rod, options)
+        self.output_options().require_known_stress(rod, joint)
+        return Built(target, layout, rod, joint, method, anchor, self.ends)
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
@@ -131,13 +190,8 @@ class Case(Table):
                 "of which no rod could be spliced: give longer stock"
             )
 
-    def build_sewn(self) -> Built:
-        """The same of a case with seams; the options are those of `rodshell.sew`.
-
-        Raises
-        ------
-        InputError : moreover, keys that a form in patches does not have.
-        """
+    def _require_keys_of_patches(self) -> None:
+        """InputError where a key is set that a form in patches does not have."""
         patches = "each patch of a target cut by seams has its own"
         for key, value, default, instead in (
             ("layout.rods", self.layout.rods, "auto", f'{patches}: use "auto"'),
@@ -149,11 +203,8 @@ class Case(Table):
         ):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")
-        target, layout, rod, options = self.build()
-        kept = {key: options[key] for key in ("joint", "ends")}
-        return Built(target, layout, rod, {"seams": self.seams.lines, "own": self.seams.own(), **kept})
 
-    def takeaway(self) -> "Takeaway":
+    def output_options(self) -> "OutputOptions":
         """What checks, workshop and drawings are told.
 
         Raises
@@ -161,12 +212,12 @@ class Case(Table):
         InputError : a value cannot be used.
         """
         from rodshell.fabrication import Fabrication
-        from rodshell.output.takeaway import DrawingStyle, Takeaway
+        from rodshell.output.options import DrawingStyle, OutputOptions
 
         style = self.drawings.model_dump(exclude={"layers"})
         layers = self.drawings.layers.model_dump(exclude_none=True)
         style["layers"] = {name.upper().replace("_", "-"): shown for name, shown in layers.items()}
-        return Takeaway(
+        return OutputOptions(
             self.checks.strength,
             self.checks.stages,
             Fabrication(**self.fabrication.model_dump()),
@@ -174,6 +225,11 @@ class Case(Table):
             rod_chosen=self.rod.left_open,
             shear_strength=self.checks.shear_strength,
         )
+
+
+def built(table: Table, *arguments: object) -> Any:
+    """The object that a table describes, or the one that it holds."""
+    return table.held.value if table.held is not None else table.build(*arguments)  # type: ignore[attr-defined]
 
 
 def toml_text(case: Mapping[str, Mapping[str, object]]) -> str:

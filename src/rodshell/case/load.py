@@ -97,7 +97,7 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
     ------
     InputError : as of `load_case`; also a key of a table that was made from an object which keys do not describe.
     """
-    held = case.held
+    held = case.held_objects
     for path in overrides:
         table = path.partition(".")[0]
         if table in held and path in case_keys():

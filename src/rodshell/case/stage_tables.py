@@ -35,7 +35,7 @@ from rodshell.units import rounded_down, shown
 
 if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
-    from rodshell.formfinding.sewn import PatchLayout
+    from rodshell.formfinding.patches import PatchLayout
     from rodshell.layout import GridLayout
     from rodshell.targets import Target
 
@@ -146,7 +146,7 @@ class PatchTable(Table):
     spacing: Lengths | None = Field(default=None, description="between neighbouring rods: one length, or u,v")
 
     def build(self) -> "PatchLayout":
-        from rodshell.formfinding.sewn import PatchLayout
+        from rodshell.formfinding.patches import PatchLayout
 
         return PatchLayout(self.anchor, self.rotate, self.spacing)
 

@@ -136,6 +136,12 @@ class HeightsTable(PlacedTable):
         return heights_from(self.file, size=self.size, height=self.height, **self.options())
 
 
+class HeldTarget(Table):
+    """In place of a target that no key describes: a Python function, a mesh made in Python, a table of rods."""
+
+    kind: Literal["python", "table"]
+
+
 TargetTable = (
     HemisphereTable
     | CapTable

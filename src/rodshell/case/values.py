@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import date
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr
 
@@ -25,6 +25,17 @@ class Table(BaseModel):
 
     _held: "Held | None" = PrivateAttr(default=None)
 
+    @property
+    def held(self) -> "Held | None":
+        """The object that the table was made of, where its keys do not describe it."""
+        return self._held
+
+    def holding(self, held: "Held") -> Self:
+        """The same table, which holds an object."""
+        table = self.model_copy()
+        table._held = held
+        return table
+
 
 @dataclass(frozen=True, eq=False)
 class Held:
@@ -36,12 +47,14 @@ class Held:
     what : it in words.
     by_value : whether two such objects are the same that are equal; else only one object is the same as itself.
     writable : whether a case file that leaves out what the keys do not describe gives the same form.
+    note : for such a file.
     """
 
     value: Any
     what: str
     by_value: bool = True
     writable: bool = False
+    note: str = ""
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Held):

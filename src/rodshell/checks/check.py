@@ -29,6 +29,23 @@ WORTH = 0.01  # of the stress: less torsion is not worth a word
 
 
 @dataclass(frozen=True)
+class ShellChecks:
+    """The checks of the shell with one kind of ends.
+
+    Parameters
+    ----------
+    self_weight, other_shapes : None where a time limit came before them, or the shell is not stable.
+    """
+
+    bending: Bending
+    reactions: Reactions
+    joints: JointLoads
+    contact: Contact
+    self_weight: SelfWeight | None
+    other_shapes: OtherShapes | None
+
+
+@dataclass(frozen=True)
 class Checks:
     """What was checked of the shells that converged.
 
@@ -57,6 +74,22 @@ class Checks:
     clamped_from_flat: bool | None = None
     stopped: str = ""
     missing: tuple[str, ...] = ()
+
+    def __getitem__(self, ends: Ends) -> ShellChecks:
+        """The checks of the shell with these ends.
+
+        Raises
+        ------
+        KeyError : there is no such shell, or it did not converge.
+        """
+        return ShellChecks(
+            self.bending[ends],
+            self.reactions[ends],
+            self.joints[ends],
+            self.contact[ends],
+            self.self_weight.get(ends),
+            self.other_shapes.get(ends),
+        )
 
     @property
     def out_of_time(self) -> str:

@@ -64,7 +64,7 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
 @click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"max_content_width": 110})
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
-    help="Print the version and end.",
+    help="Print the version and exit.",
 )  # fmt: skip
 @click.pass_context
 def app(ctx: click.Context) -> None:

@@ -1,26 +1,40 @@
-"""`rodshell export`: files of an earlier result, made again from its archive."""
+"""`rodshell export`: files of an earlier result, made again from its archive; and the JSON Schema of result.json."""
 
+import json
 from pathlib import Path
 
 import click
 
-from rodshell.cli.outcome import force_option, wanted_kinds
-from rodshell.cli.progress import Progress
+from rodshell.cli.options import FORCE, QUIET, wanted_kinds
+from rodshell.cli.reporting import Progress
+
+
+def print_schema(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+    """--schema: print the JSON Schema and exit, as --help does."""
+    if wanted:
+        from rodshell.results.results import json_schema
+
+        click.echo(json.dumps(json_schema(), indent=1, ensure_ascii=False))
+        context.exit()
+
+
+SCHEMA = "Print the JSON Schema of result.json and exit."
 
 
 @click.command()
 @click.argument("folder", metavar="DIR")
 @click.option("--only", metavar="KINDS", help="Such as dxf,csv; default: all but 3dm.")
 @click.option("--out", "-o", metavar="DIR", help="Where to write; default: into the result itself.")
-@force_option
-@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+@click.option("--schema", is_flag=True, is_eager=True, expose_value=False, callback=print_schema, help=SCHEMA)
+@FORCE
+@QUIET
 def command(folder: str, only: str | None, out: str | None, force: bool, quiet: bool) -> int:
     """Write drawings, schedules, models or the report of the result in DIR again.
 
     KINDS are dxf, svg, pdf, csv, obj, gltf, vtp, compas, png, report, and 3dm, which needs the package rhino3dm.
     """
-    from rodshell.output import read
-    from rodshell.output.archive import export
+    from rodshell.output import export
+    from rodshell.results import read
 
     where = Path(out or folder).expanduser()
     with Progress(quiet=quiet) as progress:

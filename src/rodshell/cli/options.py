@@ -1,11 +1,17 @@
-"""Keys of the case file as options of a command."""
+"""Options of the commands: keys of the case file, and those that several commands have."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import click
 
-from rodshell.case import CaseKey, case_keys
+from rodshell.case import CaseKey, case_keys, load_case
+from rodshell.case.keys import BY_KIND
+from rodshell.errors import InputError
 
 ALIASES = {
     "target.radius": "--radius",
@@ -49,7 +55,14 @@ class CaseCommand(click.Command):
         for name, value in pairwise(args):
             if name in options and not options[name].is_flag and value in options:
                 raise click.UsageError(f"{name} needs a value, but {value} follows", ctx)
-        return super().parse_args(ctx, args)
+        given = tuple(args)  # which click consumes
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            known = [name for name, option in options.items() if _exists(option, given)]
+            near = get_close_matches(error.option_name.lstrip("-"), [name.lstrip("-") for name in known], n=1)
+            proposed = [name for name in known if name.lstrip("-") in near]
+            raise click.NoSuchOption(error.option_name, possibilities=proposed, ctx=ctx) from None
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         sections = dict[str, list[tuple[str, str]]]()
@@ -62,6 +75,26 @@ class CaseCommand(click.Command):
                 formatter.write_dl(records, col_max=40)
 
 
+def _exists(option: click.Option, arguments: tuple[str, ...]) -> bool:
+    """Whether the case that a command line names has the key of an option, so that it may be proposed."""
+    if not isinstance(option, CaseOption) or not option.key.kinds:
+        return True
+    kinds = _kinds_of(arguments)
+    return kinds is None or kinds[option.key.table] in option.key.kinds
+
+
+@cache
+def _kinds_of(arguments: tuple[str, ...]) -> dict[str, str] | None:
+    """The kinds of the tables that have several, in the case that a command line names; None where there is none."""
+    given = dict(pairwise(arguments))
+    overrides = {f"{table}.kind": kind for table in BY_KIND if (kind := given.get(f"--{table}.kind"))}
+    try:
+        case = load_case(arguments[0], overrides)
+    except InputError:
+        return None
+    return {"target": case.target.kind, "rod.section": case.rod.section.kind, "joint": case.joint.kind}
+
+
 def case_options(*tables: str) -> list[click.Parameter]:
     """An option for each key, or for each inside some tables such as "rod"."""
     return [CaseOption(key) for key in case_keys().values() if not tables or key.path.split(".")[0] in tables]
@@ -70,3 +103,95 @@ def case_options(*tables: str) -> list[click.Parameter]:
 def overrides_of(values: Mapping[str, str | None]) -> dict[str, object]:
     """What was given to such options, by dotted key."""
     return {path: value for path in case_keys() if (value := values.get(_parameter(path))) is not None}
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What commands that run a job are told of their output.
+
+    Parameters
+    ----------
+    out : folder for the results.
+    kinds : of files besides the archive; None: all that every installation can.
+    limit : longest time for all but the files [s].
+    """
+
+    out: str | None
+    kinds: list[str] | None
+    limit: float | None
+    force: bool
+    as_json: bool
+    quiet: bool
+
+
+FORCE = click.option(
+    "--force",
+    is_flag=True,
+    help="Replace files in DIR that rodshell did not write, or that were changed since, where it has to write.",
+)
+QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+ONLY = "Files besides the archive, such as dxf,csv; see rodshell export --help."
+TIME_LIMIT = 'Longest time such as "60 s" for all but the files; what was found until then is written.'
+
+
+def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The options of `RunOptions`; read them with `read_output_options`.
+
+    out : help of --out.
+    """
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        options = (
+            click.option("--out", "-o", metavar="DIR", help=out),
+            click.option("--only", metavar="KINDS", help=ONLY),
+            click.option("--time-limit", metavar="TIME", help=TIME_LIMIT),
+            FORCE,
+            click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs."),
+            QUIET,
+        )
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+def read_output_options(values: dict[str, Any]) -> RunOptions:
+    """Take these options out of the `values` of a command.
+
+    Raises
+    ------
+    InputError : there is no such kind of file; the time limit is not a time, or not a positive one.
+    """
+    kinds = wanted_kinds(values.pop("only"))
+    limit = seconds_of(values.pop("time_limit"))
+    return RunOptions(
+        kinds=kinds, limit=limit, **{name: values.pop(name) for name in ("out", "force", "as_json", "quiet")}
+    )
+
+
+def wanted_kinds(only: str | None) -> list[str] | None:
+    """The kinds of files that --only names.
+
+    Raises
+    ------
+    InputError : there is no such kind.
+    """
+    from rodshell.output.files import read_kinds
+
+    return None if only is None else read_kinds(only)
+
+
+def seconds_of(given: str | None) -> float | None:
+    """What --time-limit gives [s].
+
+    Raises
+    ------
+    InputError : it is not a time, or not a positive one.
+    """
+    from rodshell.units import parse_quantity
+
+    seconds = None if given is None else parse_quantity(given, "time", "--time-limit")
+    if seconds is not None and seconds <= 0:
+        raise InputError(f'--time-limit = "{given}": must be larger than zero')
+    return seconds

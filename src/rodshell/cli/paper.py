@@ -2,27 +2,26 @@
 
 from contextlib import ExitStack
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from rodshell.cli.outcome import deliver, force_option, output_folder
-from rodshell.cli.progress import Progress, announce_compilation
+from rodshell.cli.options import FORCE, QUIET
+from rodshell.cli.reporting import Progress, announce_compilation, deliver, output_folder
 from rodshell.errors import InputError
-from rodshell.paper import FIGURES, reserved
+from rodshell.paper import FIGURES, figure_maker, reserved
 
 if TYPE_CHECKING:
-    from rodshell.output.folder import ResultFolder
+    from rodshell.results.folder import ResultFolder
 
 
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))
 @click.argument("figure", metavar="FIGURE|all")
 @click.option("--out", "-o", metavar="DIR", help="Folder for the figure; default out/FIGURE; of all: DIR/FIGURE each.")
-@force_option
+@FORCE
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, a line for each figure.")
-@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+@QUIET
 @click.option("--seed", type=click.IntRange(min=0), help="genetic: search anew from this seed, or go on with that.")
 @click.option("--target", metavar="NAME", help="genetic: this target only.")
 @click.option("--jobs", type=click.IntRange(min=1), help="genetic: processes of a search; default 1.")
@@ -45,7 +44,7 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
         codes = []
         for name, place in zip(names, places, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:
-                made = import_module(f"rodshell.paper.{name}").make(progress, **given)
+                made = figure_maker(name)(progress, **given)
             saved = partial(_save, made)
             codes.append(deliver(made, saved, place, progress=progress, as_json=as_json, quiet=quiet))
     return max(codes)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rodshell.cli.progress import UNKEPT, Progress
+from rodshell.cli.options import QUIET
+from rodshell.cli.reporting import UNKEPT, Progress
 from rodshell.errors import InputError
 from rodshell.uncached import kernels_are_kept
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+@QUIET
 def command(quiet: bool) -> int:
     """Compile all kernels now, once, instead of in the first job of each kind.
 
@@ -75,7 +76,7 @@ def _forms() -> None:
     target = rs.Hemisphere(radius=0.2)
     layout = rs.GridLayout.orthogonal(spacing=0.06, edge=0.02)
     form = rs.find_form(target, layout, _rod())
-    rs.find_form(target, layout, _rod(), start=form)
+    rs.find_form(target, layout, _rod(), warm_start=form)
     rs.find_form(rs.HeightField(formula="0.1 - x**2 - y**2", domain=rs.Rectangle((0.4, 0.3))), layout, _rod())
 
 

@@ -4,12 +4,12 @@ from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import drape
 from rodshell.formfinding.draped import Draped, DrapeFigures
 from rodshell.formfinding.methods import Bound, Fall, Gravity, Method
-from rodshell.formfinding.pipeline import FoundForm, PoppedTable, find_stages, pop_up_stages
+from rodshell.formfinding.pipeline import PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, map_back, trim
 
 __all__ = [
-    "Agreement", "Bound", "Boundary", "DrapeFigures", "Draped", "Fall", "Footprint", "FoundForm", "Gravity", "Method",
-    "PopUp", "PoppedTable", "Trimmed", "agreement", "drape", "find_stages", "map_back", "pop_up", "pop_up_stages",
+    "Agreement", "Bound", "Boundary", "DrapeFigures", "Draped", "Fall", "Footprint", "Gravity", "Method",
+    "PopUp", "PatchForm", "Trimmed", "agreement", "drape", "find_stages", "map_back", "pop_up", "pop_up_stages",
     "trim",
 ]  # fmt: skip

@@ -13,7 +13,6 @@ from itertools import pairwise
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.formfinding.families import choose_families
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -33,6 +32,9 @@ ROOM = 0.7  # spacings: an axis of the net that no rod comes closer to is a rod 
 NEAR = 0.5  # spacings between a rod's end and its point before offsets are corrected, at most
 THERE = 0.05  # spacings between them in the end, at most
 UNLIKE = 0.6  # what it costs where a rod is at right angles to the mirror image of the one that it meets
+LEAVE_OUT = 1.5  # what it costs to leave a rod out: as much as rods at 0.3 spacings, or at 3.4
+APART = 4.0  # spacings along the seam that count as one between rods: past them, rods do not crowd
+KEPT = 200  # ways of choosing that are followed at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +126,7 @@ def match_net(
             x, y, _ = interpolated(net.net, shift[:1], shift[1:])[0, 0].tolist()
             anchor = (x, y)
         laid = replace(layout, lines=(_filled(lines, 0, layout.spacing), _filled(lines, 1, layout.spacing)))
-        net = chebyshev_net(target, laid, anchor=anchor, near=net, eccentricity=eccentricity)
+        net = chebyshev_net(target, laid, anchor=anchor, warm_start=net, eccentricity=eccentricity)
         matched, moved = _corrected(net, lines, goals.points)
         if moved < SETTLED * target.size:
             break
@@ -259,3 +261,39 @@ def rod_ends(net: ChebyshevNet, rods: Sequence[FlatRod]) -> Floats:
     """(2m, 3) start and end of each rod in turn on a net [m]."""
     ends = [net.positions(rod, np.array([rod.start, rod.end])) for rod in rods]
     return np.concatenate([np.empty((0, 3)), *ends])
+
+
+def choose_families(place: Floats, points: Floats, price: Floats, spacing: tuple[float, float]) -> Ints:
+    """(n,) family of the rod at each of the points (n, 3) along a seam: 0 u, 1 v, -1 none.
+
+    Rods of one family should lie neither crowded nor far apart, so the sum of the squared logarithms of the distances
+    between neighbours over the spacing is made smallest, together with the prices (n, 2) of u and v at each point: from
+    point to point, by the last rod of either family.
+
+    place : (n, 2) u, v of the points [m]. The offset of a rod of family u is its v.
+    """
+    offset = place[:, ::-1] / np.array(spacing)
+    winding = _running(np.abs(np.diff(offset, axis=0)))
+    run = _running(np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None])[:, 0] / (APART * max(spacing))
+    best: dict[tuple[int, int], tuple[float, tuple[int, ...]]] = {(-1, -1): (0.0, ())}
+    for k in range(len(place)):
+        ahead: dict[tuple[int, int], tuple[float, tuple[int, ...]]] = {}
+        for last, (cost, chosen) in best.items():
+            for family in (0, 1, -1):
+                state, more = last, LEAVE_OUT
+                if family >= 0:
+                    state = (k, last[1]) if family == 0 else (last[0], k)
+                    more = float(price[k, family])
+                    before = last[family]
+                    if before >= 0:
+                        apart = max(winding[k, family] - winding[before, family], run[k] - run[before], 1e-9)
+                        more += float(np.log(apart) ** 2)
+                if cost + more < ahead.get(state, (np.inf,))[0]:
+                    ahead[state] = (cost + more, (*chosen, family))
+        best = dict(sorted(ahead.items(), key=lambda one: one[1][0])[:KEPT])
+    return np.array(min(best.values())[1], dtype=np.intp)
+
+
+def _running(steps: Floats) -> Floats:
+    """Sums (n + 1, k) of the steps (n, k) so far."""
+    return np.vstack([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])

@@ -1,123 +1,338 @@
-"""From seams to patches: which parts a target falls into, and where the middle of each is."""
+"""Several simple gridshells sewn together: a target is cut into patches, each is formed alone, and on the seams the
+rod ends of both sides share their places [HQK 3.4, the outlook]."""
 
-from dataclasses import replace
-from string import ascii_uppercase
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property, partial
+from math import degrees
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats, Ints
-from rodshell.errors import InputError
-from rodshell.geometry.vectors import cross
-from rodshell.nets import geodesics
+from rodshell.arrays import Floats
+from rodshell.errors import InputError, RodshellError
+from rodshell.formfinding.agreement import Agreement
+from rodshell.formfinding.draped import Draped
+from rodshell.formfinding.end_matching import Point
+from rodshell.formfinding.pipeline import PatchForm, find_stages
+from rodshell.formfinding.popup import ENDS, Ends, Start
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.seams import FEWEST, Laid, Meeting, lay_patches
+from rodshell.formfinding.search import HEADINGS
+from rodshell.formfinding.section_limits import flat_warnings
+from rodshell.formfinding.target_patches import carried_heading, patches_of
+from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
+from rodshell.joints import Ball, Joint, require_joint
+from rodshell.layout import GridLayout
+from rodshell.layout.side_by_side import SideBySide, side_by_side
+from rodshell.rods.section import Rod
+from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
+from rodshell.units import shown
+from rodshell.validation import choices_of
 
-RAYS, STEPS = 240, 90  # of the look around a target, from its summit
-FAR = 3.0  # sizes that a ray runs
-BESIDE = 0.09  # of the size: points closer than this are neighbours
-AGAIN = 0.3  # of the size: points that one ray has this much further to than another has been there before
-LEAST = 0.01  # of the target: what is smaller is no patch
-DEEP = 0.05  # of the size: a middle closer to the patch's end is none
+MANY = 0.1  # of the rods: a share left out that is worth a word
+ASTRAY = 0.005  # of the size: ends that are moved further are worth a word
+GAP = 2.0  # spacings between the flat grids of neighbouring patches
 
 
-def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
-    """The patches by their names A, B, ..., from left to right.
+@dataclass(frozen=True)
+class PatchLayout:
+    """What a patch has of its own; None: as the others.
+
+    Parameters
+    ----------
+    anchor : x, y of the point where its axes cross [m]; default: its middle.
+    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the whole's heading at its
+        summit, carried to the anchor.
+    spacing : between its rods, of families u and v [m].
+    """
+
+    anchor: Point | None = None
+    rotate: float | None = None
+    spacing: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class MergedPopUp:
+    """The popped-up shells of all patches as one; the mechanical model is each patch's own.
+
+    Parameters
+    ----------
+    positions : (n, 3) of the nodes of all patches, one after the other [m].
+    report : the figures of all solves together.
+    """
+
+    ends: Ends
+    start: Start
+    footprint: Footprint
+    boundary: Boundary
+    positions: Floats
+    report: SolveReport
+
+
+@dataclass(frozen=True)
+class PatchedForm:
+    """A form in patches.
+
+    Parameters
+    ----------
+    laid, found : of each patch by its name: its rods, and every stage of its form.
+    meetings : where rods of two patches end at one point.
+    moved : of each patch how far rod ends were moved to these points [m]: what its mesh missed them by.
+    ends : the end conditions asked for.
+    """
+
+    target: Target
+    seams: tuple[Seam, ...]
+    layout: GridLayout
+    rod: Rod
+    joint: Joint
+    own: Mapping[str, PatchLayout]
+    laid: dict[str, Laid]
+    found: dict[str, PatchForm]
+    meetings: tuple[Meeting, ...]
+    moved: dict[str, float]
+    ends: tuple[Ends, ...]
+
+    @property
+    def status(self) -> str:
+        """ "converged", or which patch stopped and what to do."""
+        for name, form in self.found.items():
+            if form.status != "converged":
+                return form.status if "(patch " in form.status else f"{form.status} (patch {name})"
+        return "converged"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        whole = set(self.target.warnings)  # said once; and a patch may be flat where the shell is not
+        whole.update(*(flat_warnings(form.trimmed.positions, self.rod) for form in self.found.values()))
+        words = [f"patch {k}: {word}" for k, form in self.found.items() for word in form.warnings if word not in whole]
+        words += [
+            f"patch {k}: rod ends were moved by up to {by:.3g} m to where they meet others: its net does not hold them "
+            "well there, another heading or anchor may"
+            for k, by in self.moved.items()
+            if by > ASTRAY * self.target.size
+        ]
+        share = left_out(self.laid)
+        if share > MANY:
+            words.append(
+                f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
+                "seam: another heading may leave out fewer (layout.rotate, or seams.patches for one patch alone)"
+            )
+        return (*flat_warnings(self.draped, self.rod), *self.target.warnings, *words)
+
+    def parameters(self) -> dict[str, object]:
+        """Seams and what patches have of their own, as they stand in a case file."""
+        own = [{"name": name, **_given(one)} for name, one in self.own.items()]
+        return {"lines": [seam.points.tolist() for seam in self.seams], "patches": own}
+
+    @cached_property
+    def flat(self) -> SideBySide:
+        """The flat grids of all patches in a row."""
+        gap = GAP * max(max(one.layout.spacing) for one in self.laid.values())
+        return side_by_side({name: form.footprint.mesh for name, form in self.found.items()}, gap)
+
+    @property
+    def footprint(self) -> Footprint:
+        return Footprint(self.flat.mesh)
+
+    @cached_property
+    def draped(self) -> Floats:
+        """(n, 3) all patches on the target [m]."""
+        return np.concatenate([form.trimmed.positions for form in self.found.values()])
+
+    @cached_property
+    def boundary(self) -> Boundary:
+        """Of all patches, rod by rod."""
+        parts = [form.trimmed.boundary for form in self.found.values()]
+        points, tangents = (np.concatenate([getattr(part, what) for part in parts]) for what in ("points", "tangents"))
+        return Boundary(points, tangents, self.draped)
+
+    @cached_property
+    def popped(self) -> dict[Ends, MergedPopUp]:
+        """The shells of all patches as one, for each kind of ends that all were popped up with."""
+        forms = list(self.found.values())
+        return {
+            ends: MergedPopUp(
+                ends,
+                "draped",
+                self.footprint,
+                self.boundary,
+                np.concatenate([form.popped[ends].positions for form in forms]),
+                merged_report([form.popped[ends].report for form in forms]),
+            )
+            for ends in forms[0].popped
+            if all(ends in form.popped for form in forms)
+        }
+
+    @property
+    def agreement(self) -> dict[Ends, Agreement]:
+        forms = list(self.found.values())
+        return {
+            ends: merged_agreement([form.agreement[ends] for form in forms])
+            for ends in forms[0].agreement
+            if all(ends in form.agreement for form in forms)
+        }
+
+    @property
+    def dropped(self) -> tuple[tuple[str, str], ...]:
+        """Rods that are not built, with the reason."""
+        return tuple(
+            (f"{name}-{rod}", why)
+            for name, form in self.found.items()
+            for rod, why in (*self.laid[name].dropped, *form.trimmed.dropped)
+        )
+
+
+def find_patched_stages(
+    target: Target,
+    seams: Sequence[Seam],
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    own: Mapping[str, PatchLayout] | None = None,
+    joint: Joint | None = None,
+    ends: Ends | Sequence[Ends] = ENDS,
+    warm_start: PatchedForm | None = None,
+    same_drape: bool = False,
+    progress: Progress = silent,
+) -> PatchedForm:
+    """Cut a target into patches, lay their rods such that they meet, and form each; see `rodshell.find_form`.
+
+    warm_start, same_drape : as of `find_stages`, patches being matched by their names.
+    """
+    ends = choices_of("ends", ends, ENDS)
+    require_joint(joint)
+    own, joint = dict(own or {}), joint or Ball()
+    earlier = warm_start.found if warm_start is not None else {}
+    if warm_start is not None and same_drape:
+        laid, meetings = warm_start.laid, warm_start.meetings
+    else:
+        laid, meetings = _lay(target, seams, layout, own, joint.eccentricity, progress)
+    found, moved = dict[str, PatchForm](), dict[str, float]()
+    for name, patch in laid.items():
+        places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
+
+        def patch_progress(stage: str, detail: str, residual: float, name: str = name) -> None:
+            if stage == "net":
+                return  # which was laid: marched again, it is no reason to lose what is finished
+            progress(stage, f"patch {name}, {detail}", residual)
+
+        found[name] = find_stages(
+            patch.patch, patch.layout, rod,
+            anchor=patch.anchor, joint=joint, ends=ends, warm_start=earlier.get(name), same_drape=same_drape,
+            name=name, cut=partial(cut_with_ends, places=places), progress=patch_progress,
+        )  # fmt: skip
+        moved[name] = _moved(found[name])
+    return PatchedForm(target, tuple(seams), layout, rod, joint, own, laid, found, meetings, moved, ends)
+
+
+def best_heading(
+    target: Target,
+    seams: Sequence[Seam],
+    layout: GridLayout,
+    own: Mapping[str, PatchLayout],
+    *,
+    eccentricity: float = 0.0,
+    progress: Progress = silent,
+) -> float:
+    """The heading at the target's summit [rad] that leaves out the smallest share of the rods, of a few tried.
 
     Raises
     ------
-    InputError : the seams cut off nothing, or there are more patches than letters.
+    RodshellError : none will do; the reason is the first one's.
     """
-    points, areas = _look_around(target)
-    sides = np.array([seam.distance(points) > 0 for seam in seams])  # (seams, n)
-    found = list[Patch]()
-    for part in _connected(points, sides, BESIDE * target.size):
-        if areas[part].sum() > LEAST * areas.sum():
-            signs = tuple(1 if left else -1 for left in sides[:, part[0]])
-            patch = Patch(whole=target, seams=seams, sides=signs, middle=(0.0, 0.0))
-            found.append(replace(patch, middle=_middle(patch, points[part], areas[part])))
-    if len(found) < 2:
-        raise InputError("the seams leave the target in one piece: draw lines that run across it in plan")
-    if len(found) > len(ascii_uppercase):
-        raise InputError(f"the seams cut the target into {len(found)} patches: at most {len(ascii_uppercase)} will do")
-    coarse = 0.05 * target.size  # of middles that are equally far left, the lower one comes first
-    found.sort(key=lambda patch: (round(patch.middle[0] / coarse), patch.middle[1]))
-    return dict(zip(ascii_uppercase, found, strict=False))
+    shares, reasons = dict[float, float](), list[RodshellError]()
+    for heading in HEADINGS:
+        progress("seams", f"trying {degrees(heading):.0f} deg", 0.0)
+        try:
+            laid, _ = _lay(target, seams, replace(layout, rotate=heading), own, eccentricity, silent)
+            shares[heading] = left_out(laid)
+        except RodshellError as reason:
+            reasons.append(reason)
+    if not shares:
+        raise reasons[0]
+    return min(shares, key=lambda heading: round(shares[heading], 2))
 
 
-def carried_heading(target: Target, anchor: tuple[float, float], rotate: float) -> float:
-    """Angle against x, seen from above [rad], of the summit's heading `rotate` where it is carried to an anchor.
-
-    By the turn that takes one normal into the other: of patches that mirror each other, so do the headings.
-    """
-    points = target.lift(np.array([target.summit, anchor]))
-    n, m = target.on_surface(points).normal
-    along = np.array([np.cos(rotate) * n[2], np.sin(rotate) * n[2], -np.cos(rotate) * n[0] - np.sin(rotate) * n[1]])
-    axis = np.cross(n, m)
-    turned = along + np.cross(axis, along) + np.cross(axis, np.cross(axis, along)) / (1.0 + n @ m)
-    return float(np.arctan2(turned[1], turned[0]))
+def left_out(laid: Mapping[str, Laid]) -> float:
+    """The share of the rods that is left out for want of another at a seam."""
+    missing = sum(len(one.layout.left_out) for one in laid.values())
+    return missing / (missing + sum(len(one.rods) for one in laid.values()))
 
 
-def _look_around(target: Target) -> tuple[Floats, Floats]:
-    """Points (n, 3) of a target, each standing for an area (n,) [m2].
-
-    They lie on geodesic rays from the summit, which also see what overhangs. A ray that comes back from below to where
-    others have been before counts no more.
-    """
-    x, y = target.summit
-    top = target.lift(np.array([[x, y]]))
-    normal = target.on_surface(top).normal
-    along = np.array([[normal[0, 2], 0.0, -normal[0, 0]]])
-    along /= np.linalg.norm(along)
-    angle = 2 * np.pi * (np.arange(RAYS)[:, None] + 0.5) / RAYS  # no ray along an axis: a seam may lie there
-    directions = np.cos(angle) * along + np.sin(angle) * cross(normal, along)
-    step = FAR * target.size / STEPS
-    with np.errstate(all="ignore"):
-        rays = np.stack(geodesics(target, np.repeat(top, RAYS, axis=0), directions, [np.full(STEPS, step)] * RAYS))
-    areas = step * np.linalg.norm(np.roll(rays, -1, axis=0) - np.roll(rays, 1, axis=0), axis=2) / 2
-    far = np.broadcast_to(step * np.arange(1, STEPS + 1), areas.shape)
-    known = np.isfinite(rays[..., 0]) & np.isfinite(areas)
-    known[known] = target.margin(rays[known]) > 0
-    points, areas, far = rays[known], areas[known], far[known]
-    first, second = _neighbours(points, BESIDE * target.size).T
-    again = np.zeros(len(points), dtype=bool)
-    again[first] |= far[first] > far[second] + AGAIN * target.size
-    again[second] |= far[second] > far[first] + AGAIN * target.size
-    return points[~again], areas[~again]
+def _lay(
+    target: Target,
+    seams: Sequence[Seam],
+    layout: GridLayout,
+    own: Mapping[str, PatchLayout],
+    eccentricity: float,
+    progress: Progress,
+) -> tuple[dict[str, Laid], tuple[Meeting, ...]]:
+    if layout.rods != "auto" or layout.length != "auto":
+        raise InputError('a target cut by seams counts its rods itself: leave layout rods and length at "auto"')
+    progress("seams", "cutting", 0.0)
+    patches = patches_of(target, tuple(seams))
+    for name in own:
+        if name not in patches:
+            raise InputError(f"there is no patch {shown(name)}: the seams make the patches {', '.join(patches)}")
+    layouts = {name: _own_layout(patch, layout, own.get(name, PatchLayout())) for name, patch in patches.items()}
+    anchors = {name: own[name].anchor if name in own else None for name in patches}
+    return lay_patches(patches, layouts, anchors, eccentricity=eccentricity, progress=progress)
 
 
-def _neighbours(points: Floats, reach: float) -> Ints:
-    """(m, 2) pairs of points (n, 3) no further apart than `reach` [m]."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(points).query_pairs(reach, output_type="ndarray"), dtype=np.intp).reshape(-1, 2)
-
-
-def _connected(points: Floats, sides: Bools, reach: float) -> list[Ints]:
-    """Points (k,) of each part: those within `reach` [m] on the same sides of all seams belong together."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    pairs = _neighbours(points, reach)
-    kept = pairs[(sides[:, pairs[:, 0]] == sides[:, pairs[:, 1]]).all(axis=0)]
-    graph = coo_array((np.ones(len(kept)), (kept[:, 0], kept[:, 1])), shape=(len(points), len(points)))
-    parts, label = connected_components(graph, directed=False)
-    return [np.flatnonzero(label == k) for k in range(parts)]
+def _own_layout(patch: Patch, layout: GridLayout, own: PatchLayout) -> GridLayout:
+    spacing, rotate = own.spacing or layout.spacing, own.rotate
+    if rotate is None:
+        rotate = carried_heading(patch.whole, own.anchor or patch.middle, layout.rotate)
+    return replace(layout, spacing=spacing, edge=min(layout.edge, *spacing), rotate=rotate)
 
 
-def _middle(patch: Patch, points: Floats, areas: Floats) -> tuple[float, float]:
-    """x, y of the patch's centre of area, put on the target; of its deepest point where that is not on the target.
+def cut_with_ends(draped: Draped, places: Mapping[tuple[str, int], Floats]) -> Trimmed:
+    """The trimmed shell, some rod ends, by rod and side, put where their seams have them; ends of rods in layers over
+    or under these points."""
+    trimmed = trim(draped, fewest=FEWEST)
+    mesh, positions = trimmed.mesh, trimmed.positions.copy()
+    for k, rod in enumerate(mesh.grid.rods):
+        for side in (0, 1):
+            if (rod.name, side) in places:
+                node, place = mesh.ends[k, side], places[rod.name, side]
+                lift = mesh.heights[node] * draped.target.on_surface(place[None]).normal[0] if mesh.layered else 0.0
+                positions[node] = place + lift
+    boundary = replace(trimmed.boundary, points=positions[mesh.ends.ravel()], draped=positions)
+    return replace(trimmed, positions=positions, boundary=boundary)
 
-    The centre of a patch that goes around another lies in that one: a net may start there.
-    """
-    centre = patch.closest(np.average(points, axis=0, weights=areas)[None])
-    if not (patch.whole.margin(centre)[0] > DEEP * patch.size and _from_above(patch, centre)[0]):
-        seen = points[_from_above(patch, points)]
-        centre = seen[[np.argmax(patch.margin(seen))]]
-    x, y = centre[0, :2].tolist()
-    return x, y
+
+def _moved(form: PatchForm) -> float:
+    """How far the ends of a patch's rods were moved from where its own drape has them, at most [m]."""
+    own, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
+    return float(np.linalg.norm(own.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0))
 
 
-def _from_above(patch: Patch, points: Floats) -> Bools:
-    """Whether these points (n, 3) are the ones that an anchor's x, y stands for."""
-    z = patch.height_at(points[:, :2])
-    return np.asarray(np.abs(z - points[:, 2]) < 1e-6 * patch.size)
+def _given(own: PatchLayout) -> dict[str, object]:
+    return {key: value for key, value in asdict(own).items() if value is not None}
+
+
+def merged_report(reports: Sequence[SolveReport]) -> SolveReport:
+    """Of solves that have nothing to do with each other."""
+    worst = next((one.status for one in reports if not one.converged), Status.CONVERGED)
+    total = replace(
+        reports[0],
+        status=worst,
+        reason=next((one.reason for one in reports if one.reason), ""),
+        dofs=sum(one.dofs for one in reports),
+        force_residual=max(one.force_residual for one in reports),
+        max_strain=max(one.max_strain for one in reports),
+        negative_modes=sum(one.negative_modes for one in reports),
+    )
+    return total.after(*reports[1:])
+
+
+def merged_agreement(parts: Sequence[Agreement]) -> Agreement:
+    """Of several patches; each counts by its nodes."""
+    worst = max(parts, key=lambda one: one.max)
+    count = np.array([len(one.gaps) for one in parts])
+    square = np.array([one.rms for one in parts]) ** 2
+    rms = float(np.sqrt(np.average(square, weights=count)))
+    return replace(worst, gaps=np.concatenate([one.gaps for one in parts]), rms=rms)

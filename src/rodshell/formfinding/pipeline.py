@@ -40,65 +40,96 @@ LONG_TAIL = 3.0  # spacings past a rod's last joint
 
 
 @dataclass(frozen=True)
-class FoundForm:
-    """Every stage of the main job. A stage that was not reached, because one before did not converge, is missing.
+class PatchForm:
+    """Every stage of one shell: a form in one piece, one patch of a form, or a table of rods.
 
     Parameters
     ----------
-    popped, agreement : by end condition, "pinned" and "clamped".
-    ends : the end conditions asked for.
+    name : of the patch; "" where it is the only one.
+    rod, joint, ends : as they were given; `ends` are the end conditions asked for.
+    footprint : the flat grid, ready to be cut.
+    boundary : where its rod ends go.
+    popped, agreement : by end condition. What was not reached, because a stage before did not converge, is missing.
+    dropped : rods that are not built, with the reason.
+    lying : the draped grid that was cut to its target; None of a table of rods.
     """
 
-    target: Target
-    layout: GridLayout
+    name: str
     rod: Rod
     joint: Joint
-    draped: Draped
-    trimmed: Trimmed
+    ends: tuple[Ends, ...]
     footprint: Footprint
+    boundary: Boundary
     popped: dict[Ends, PopUp]
     agreement: dict[Ends, Agreement]
-    ends: tuple[Ends, ...]
+    dropped: tuple[tuple[str, str], ...]
+    lying: Trimmed | None
+
+    @property
+    def from_table(self) -> bool:
+        """Whether it is a table of rods, which has no target."""
+        return self.lying is None
+
+    @property
+    def trimmed(self) -> Trimmed:
+        """The draped grid cut to its target.
+
+        Raises
+        ------
+        InputError : this is a table of rods.
+        """
+        if self.lying is None:
+            raise InputError("a table of rods has no target, and so it was never draped on one")
+        return self.lying
+
+    @property
+    def draped(self) -> Draped:
+        """The grid on its target, as `trimmed`."""
+        return self.trimmed.draped
+
+    @property
+    def target(self) -> Target:
+        """The shape wanted, of a patch with seams as its end; as `trimmed`."""
+        return self.draped.target
+
+    @property
+    def layout(self) -> GridLayout:
+        """The flat grid asked for, as `trimmed`."""
+        return self.draped.layout
+
+    @property
+    def drape_out_of_time(self) -> bool:
+        """Whether a time limit stopped the drape."""
+        return self.lying is not None and self.draped.report.status is Status.OUT_OF_TIME
+
+    def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, PopUp]:
+        """Those of the pop-ups with these ends that no time limit stopped."""
+        there = [end for end in ends if end in self.popped]
+        return {end: self.popped[end] for end in there if self.popped[end].report.status is not Status.OUT_OF_TIME}
 
     @property
     def status(self) -> str:
         """ "converged", or which stage stopped and what to do."""
-        if self.draped.report.reason:
+        if self.lying is not None and self.draped.report.reason:
             return self.draped.report.reason
-        if not self.draped.converged:
+        if self.lying is not None and not self.draped.converged:
             sentence = self.draped.report.status.sentence
             weighed = not isinstance(self.draped.method, Bound) and "bound" not in sentence
             other = ', or use method = "bound", which asks for no weight' if weighed else ""
             return f"drape {sentence}{other}"
-        return _popped_status(self.popped)
+        for ends, shell in self.popped.items():
+            if not shell.report.converged:
+                return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
+        return "converged"
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read before anything else."""
-        tails = _long_tails(self.trimmed) if self.draped.converged else ()
-        flat = flat_warnings(self.trimmed.positions, self.rod)
+        if self.lying is None:
+            return _rolled(self.popped)
+        tails = _long_tails(self.lying) if self.draped.converged else ()
+        flat = flat_warnings(self.lying.positions, self.rod)
         return (*flat, *self.draped.warnings, *_stretched(self.draped), *tails, *_rolled(self.popped))
-
-
-@dataclass(frozen=True)
-class PoppedTable:
-    """A table of rods, popped up from flat with pinned ends."""
-
-    rod: Rod
-    joint: Joint
-    footprint: Footprint
-    boundary: Boundary
-    popped: dict[Ends, PopUp]
-    dropped: tuple[tuple[str, str], ...]
-
-    @property
-    def status(self) -> str:
-        """ "converged", or what to do."""
-        return _popped_status(self.popped)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        return _rolled(self.popped)
 
 
 def find_stages(
@@ -110,34 +141,53 @@ def find_stages(
     anchor: tuple[float, float] | None = None,
     joint: Joint | None = None,
     ends: Ends | Sequence[Ends] = ENDS,
-    start: FoundForm | None = None,
+    name: str = "",
+    warm_start: PatchForm | None = None,
+    same_drape: bool = False,
     cut: Callable[[Draped], Trimmed] = trim,
     progress: Progress = silent,
-) -> FoundForm:
+) -> PatchForm:
     """Drape, trim, map back, pop up and compare; see `rodshell.find_form`.
 
+    Parameters
+    ----------
+    name : of the patch.
+    warm_start : stages found before, from whose net and shells the new ones start.
+    same_drape : whether nothing that the drape depends on has changed since: then drape and footprint of `warm_start`
+        are taken over, and so are its pop-ups with the same ends, but for what a time limit had stopped.
     cut : how the draped shell is trimmed.
     """
     ends = choices_of("ends", ends, ENDS)
     require_joint(joint)
     joint = joint or Ball()
-    draped = drape(
-        layout, rod, target,
-        method=method, anchor=anchor, joint=joint,
-        warm_start=start.draped if start else None, progress=progress,
-    )  # fmt: skip
-    trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
-    footprint = map_back(trimmed)
-    popped, last = dict[Ends, PopUp](), start.popped if start else {}
+    if warm_start is not None and same_drape and not warm_start.drape_out_of_time:
+        draped, trimmed, footprint = warm_start.draped, warm_start.trimmed, warm_start.footprint
+        popped, compared = warm_start.finished_pop_ups(ends), dict(warm_start.agreement)
+    else:
+        draped = drape(
+            layout, rod, target,
+            method=method, anchor=anchor, joint=joint,
+            warm_start=warm_start.draped if warm_start else None, progress=progress,
+        )  # fmt: skip
+        trimmed = cut(draped) if draped.converged or isinstance(draped.method, Bound) else untrimmed(draped)
+        footprint, popped, compared = map_back(trimmed), dict[Ends, PopUp](), dict[Ends, Agreement]()
+    earlier = warm_start.popped if warm_start else {}
     for end in ends if draped.converged else ():
+        if end in popped:
+            continue
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
-            ends=end, warm_start=last.get(end), joint=joint, progress=progress,
+            ends=end, warm_start=earlier.get(end), joint=joint, progress=progress,
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break
-    compared = {end: agreement(shell, target) for end, shell in popped.items() if shell.report.converged}
-    return FoundForm(target, layout, rod, joint, draped, trimmed, footprint, popped, compared, ends)
+    popped = {end: popped[end] for end in ends if end in popped}
+    compared = {
+        end: compared[end] if end in compared else agreement(shell, target)
+        for end, shell in popped.items()
+        if shell.report.converged
+    }
+    return PatchForm(name, rod, joint, ends, footprint, trimmed.boundary, popped, compared, trimmed.dropped, trimmed)
 
 
 def pop_up_stages(
@@ -148,7 +198,7 @@ def pop_up_stages(
     joint: Joint | None = None,
     edge: float | None = None,
     progress: Progress = silent,
-) -> PoppedTable:
+) -> PatchForm:
     """Pop up rods given by their flat lines and the final places of their ends.
 
     Parameters
@@ -182,7 +232,7 @@ def pop_up_stages(
     boundary = Boundary(points, np.zeros_like(points))
     popped = pop_up(footprint, boundary, rod, ends="pinned", start="flat", joint=joint, progress=progress)
     dropped = tuple((name, f"it has fewer than {FEWEST_JOINTS} joints and would swing") for name in swinging)
-    return PoppedTable(rod, joint, footprint, boundary, {"pinned": popped}, dropped)
+    return PatchForm("", rod, joint, ("pinned",), footprint, boundary, {"pinned": popped}, {}, dropped, None)
 
 
 def _spans(grid: FlatGrid) -> float:
@@ -192,13 +242,6 @@ def _spans(grid: FlatGrid) -> float:
         on_rod = grid.crossings.at[grid.crossings.rods == rod]
         gaps += np.diff(np.sort(on_rod)).tolist()
     return float(np.median(gaps)) if gaps else min(rod.length for rod in grid.rods)
-
-
-def _popped_status(popped: dict[Ends, PopUp]) -> str:
-    for ends, shell in popped.items():
-        if not shell.report.converged:
-            return shell.report.reason or f"pop-up ({ends}) {shell.report.status.sentence}"
-    return "converged"
 
 
 def _stretched(draped: Draped) -> tuple[str, ...]:

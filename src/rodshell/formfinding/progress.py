@@ -3,16 +3,57 @@
 A progress may raise: KeyboardInterrupt ends the job; OutOfTimeError ends the stage, which hands out what it has.
 """
 
+import sys
 from collections.abc import Callable
 from time import monotonic
+from typing import TYPE_CHECKING, Self
 
 from rodshell.errors import InputError, OutOfTimeError
+
+if TYPE_CHECKING:
+    from rich.status import Status
 
 Progress = Callable[[str, str, float], None]
 
 
 def silent(stage: str, detail: str, residual: float) -> None:
     """Says nothing."""
+
+
+class Bar:
+    """A progress for scripts and notebooks: one live line on a terminal, elsewhere a line for each stage.
+
+    `Job.run` and `find_form` enter and leave it as a context manager; without that it prints the stages.
+    """
+
+    def __init__(self) -> None:
+        self._stage = ""
+        self._live: Status | None = None
+
+    def __enter__(self) -> Self:
+        if sys.stderr.isatty():
+            from rich.console import Console  # here, so that the command line's help need not wait for it
+
+            self._live = Console(stderr=True).status("preparing")
+            self._live.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stage = ""
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+
+    def __call__(self, stage: str, detail: str, residual: float) -> None:
+        if self._live is not None:
+            reached = f", residual {residual:.1e}" if residual else ""
+            self._live.update(f"{stage}: {detail}{reached}")
+        elif stage != self._stage:
+            print(f"rodshell: {stage}", file=sys.stderr)
+        self._stage = stage
+
+
+bar = Bar()
 
 
 class TimeLimit:

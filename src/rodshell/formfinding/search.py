@@ -15,7 +15,7 @@ from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.cuts import inside_nodes
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
-from rodshell.units import shown
+from rodshell.validation import choice
 
 Objective = Literal["shear", "curvature", "gap"]
 Auto = Literal["auto"]
@@ -94,8 +94,7 @@ def search(
     ------
     InputError : no trial has a net; an unknown objective.
     """
-    if objective not in get_args(Objective):
-        raise InputError(f'search objective {shown(objective)}: use "shear", "curvature" or "gap"')
+    choice("objective", objective, get_args(Objective))
     coarse = target.size / COARSE
     tried = GridLayout.orthogonal(spacing=coarse, edge=coarse / 3, rotate=layout.rotate)
     points = _spread_anchors(target) if anchors == "auto" else list(anchors)

@@ -7,12 +7,11 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.archive import SHELLS, Archive, made_once
 from rodshell.output.drawing import Pen, Pencil
-from rodshell.output.plan import nice_step, nice_ticks
-from rodshell.output.shapes import Shape, shape_of
+from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import number
-from rodshell.output.wording import MINUS
+from rodshell.results.archive import SHELLS, Archive, made_once
+from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 
 Colour = Literal["gap", "stress"]
@@ -29,13 +28,14 @@ FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
 @dataclass(frozen=True)
 class Scale:
-    """Colours of a shell.
+    """What colours a shell's rods.
 
     Parameters
     ----------
-    values : (k,) at each entry of `rod_nodes`.
+    values : (k,) at each entry of `rod_nodes`, in the unit that the caption names.
     low, high : values at both ends of the map.
-    colours : control points of the map.
+    colours : control points of the map, evenly spaced, "#rrggbb".
+    caption : what the values are, with their unit.
     """
 
     values: Floats
@@ -56,7 +56,10 @@ class Scale:
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
-    """The scale of a shape, one for all shapes of the archive, which are compared; None where nothing colours it."""
+    """The scale of a shape, the same for all shapes of an archive; None where its rods have the colours of families.
+
+    colour : "stress", or "gap": signed distance to the target, or height where there is none.
+    """
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
         return None if shape.stress is None else _stress_scale(archive, shape)
@@ -66,7 +69,7 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
         limit = _rounded_up(max(largest, FINEST) / factor)
         caption = f"gap to target in {unit}, + outside"
         return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
-    if shape.flat or archive.result.get("target"):
+    if shape.flat or archive.results.target:
         return None
     heights = 1e3 * shape.positions[nodes, 2]  # mm, as at the axes of the picture
     low, high = float(heights.min()), float(heights.max())
@@ -74,19 +77,19 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
-    """The largest gap [mm] with its sign, and where (3,) [m]: the agreement's own, which also looks between the nodes.
+    """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too.
 
     shape : one whose gaps are known.
     """
     assert shape.gap is not None
     points, gaps = shape.positions, 1e3 * np.nan_to_num(shape.gap)
     worst = int(np.argmax(np.abs(gaps)))
-    found = (archive.result.get("agreement") or {}).get(shape.name.removeprefix("popped_")) or {}
-    if found.get("where") is None or found.get("max") is None:
+    found = next((gap for ends, gap in archive.results.agreement.items() if shape.name == f"popped_{ends}"), None)
+    if found is None or found.where is None or found.max is None:
         return float(gaps[worst]), points[worst]
-    place = np.array(found["where"], dtype=float)
+    place = np.array(found.where, dtype=float)
     nearest = int(np.argmin(np.linalg.norm(points - place, axis=1)))
-    return float(np.copysign(1e3 * found["max"], gaps[nearest])), place
+    return float(np.copysign(1e3 * found.max, gaps[nearest])), place
 
 
 @made_once
@@ -104,13 +107,13 @@ def length_unit(largest: float) -> tuple[float, str]:
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     """Utilisation where the strength is known, else the stress in a unit of its size."""
     assert shape.stress is not None
-    strength = (archive.result.get("bending") or {}).get("strength")
+    strength = archive.results.bending.strength if archive.results.bending else None
     known = [values for name, values in archive.states.items() if name == "history_stress" or name in STRESSES]
     top = max(float(np.max(values)) for values in known)
     if strength:
         unit, caption = strength / 100, "utilisation in %"
     else:
-        unit, name = next((one for one in PRESSURES if top >= one[0]), PRESSURES[-1])
+        unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
         caption = f"stress in {name}"
     largest = float(np.max(shape.stress)) / unit
     limit = _rounded_up(max(top / unit, FINEST))
@@ -124,7 +127,10 @@ def _rounded_up(largest: float) -> float:
 
 
 def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
-    """The map with its ticks and its caption, ending at x = `right`, ticks' baseline at `y`."""
+    """Draw the map with ticks and caption.
+
+    right : x at which it ends; y : baseline of the numbers [drawing units].
+    """
     length = 200.0
     left, step = right - length, length / BINS
     for k, colour in enumerate(scale.palette):  # each under the next: no seams
@@ -139,7 +145,10 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
 
 
 def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
-    """Colours at `shares` (k,) of the way through a map, 0 to 1."""
+    """Colours "#rrggbb" in a map of evenly spaced control points.
+
+    shares : (k,) 0 (its first point) to 1 (its last).
+    """
     table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
     at = np.linspace(0.0, 1.0, len(points))
     channels = [np.interp(shares, at, table[:, k]) for k in range(3)]

@@ -1,18 +1,86 @@
 """Every file that is made from an archive, by kind: what `rodshell export --only` may ask for."""
 
-from collections.abc import Callable, Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rodshell.errors import InputError
-from rodshell.output.archive import SHELLS, Archive
-from rodshell.output.plan import FlatPlan, flat_plan
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.results.archive import SHELLS, Archive, archive_names, put_archive
+from rodshell.results.folder import ResultFolder, open_folder
 
 if TYPE_CHECKING:
     from rodshell.output.drawing import Drawing
+    from rodshell.output.drawings.flat import FlatPlan
 
 Files = Iterator[tuple[str, str | bytes]]
+
+
+def save(
+    archive: Archive,
+    folder: str | os.PathLike[str] | ResultFolder,
+    kinds: Iterable[str] | None = None,
+    *,
+    force: bool = False,
+    more: Mapping[str, str] | None = None,
+    progress: Progress = silent,
+) -> Path:
+    """Write the whole result folder, replacing an older result's files and no others; returns its absolute path.
+
+    Parameters
+    ----------
+    kinds : of files in addition to the archive (see `KINDS`); default: all but 3dm.
+    force : also replace files that rodshell did not write, or that were changed since, where it has to write.
+    more : other files, by name.
+    progress : called for each file; a time limit does not apply, since what was found is to be kept.
+
+    Raises
+    ------
+    ForeignFileError : such files are there, and `force` is False. OutputError : the folder cannot be written.
+    """
+    wanted = None if kinds is None else list(kinds)
+    names = [*archive_names(archive), *reserved(wanted), *(more or ())]
+    with open_folder(folder, reserved=names, force=force) as place:
+        put_archive(archive, place)
+        for number, (name, content) in enumerate(chain(files_of(archive, wanted), (more or {}).items()), start=1):
+            progress("files", f"{number} written, {name}", 0.0)
+            place.put(name, content)
+        place.commit()
+        return place.path
+
+
+def export(
+    archive: Archive,
+    folder: str | os.PathLike[str],
+    kinds: Iterable[str] | None = None,
+    *,
+    force: bool = False,
+    progress: Progress = silent,
+) -> list[str]:
+    """Write files of some kinds into `folder`, all of them or none; returns their names.
+
+    Parameters
+    ----------
+    kinds : see `KINDS`; default: all but 3dm.
+    force, progress : as of `save`.
+
+    Raises
+    ------
+    InputError : a kind needs a package that is not installed. OutputError : as of `save`.
+    """
+    names = list[str]()
+    wanted = None if kinds is None else list(kinds)
+    with open_folder(folder, reserved=reserved(wanted), force=force) as place:
+        for name, content in files_of(archive, wanted):
+            progress("files", f"{len(names) + 1} written, {name}", 0.0)
+            place.put(name, content)
+            names.append(name)
+        place.commit(keep_others=True)
+    return names
 
 
 @dataclass(frozen=True)
@@ -22,7 +90,9 @@ class Content:
     archive: Archive
 
     @cached_property
-    def plan(self) -> FlatPlan:
+    def plan(self) -> "FlatPlan":
+        from rodshell.output.drawings.flat import flat_plan
+
         return flat_plan(self.archive)
 
     @cached_property
@@ -33,7 +103,7 @@ class Content:
 
 
 def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
-    """Names in the result's folder and contents of the files of some kinds; default: all that every installation can.
+    """Names in the result's folder and contents of the files of some kinds; default: all but 3dm.
 
     Raises
     ------
@@ -54,14 +124,15 @@ def read_kinds(words: str) -> list[str]:
     kinds = [word.strip().lower() for word in words.split(",") if word.strip()]
     unknown = [word for word in kinds if word not in KINDS]
     if unknown or not kinds:
-        raise InputError(f'"{unknown[0] if unknown else words}" is no kind of file: use {", ".join(KINDS)}')
+        raise InputError(f'unknown kind of file "{unknown[0] if unknown else words}": use {", ".join(KINDS)}')
     return kinds
 
 
 def _dxf(content: Content) -> Files:
     from rodshell.output.dxf import drawing_dxf
 
-    names = (content.archive.result.get("drawings") or {}).get("layers")
+    style = content.archive.results.drawings
+    names = style.layers if style else None
     for name, drawing in content.drawings.items():
         yield f"drawings/{name}.dxf", drawing_dxf(drawing, names)
 
@@ -83,26 +154,25 @@ def _pdf(content: Content) -> Files:
 
 def _csv(content: Content) -> Files:
     from rodshell.output import schedules
-    from rodshell.output.csvtext import csv_text
 
-    archive = content.archive
-    made = archive.result.get("fabrication") or {}
+    archive, results = content.archive, content.archive.results
+    fabrication = results.fabrication
     tables: dict[str, Callable[[Archive], schedules.Table]] = {
         "rods": schedules.rods_table,
         "joints": schedules.joints_table,
         "supports": schedules.supports_table,
     }
-    tables |= {"bracing": schedules.bracing_table} if made.get("bracing") else {}
-    tables |= {"stock": schedules.stock_table} if made.get("stock") else {}
-    tables |= {"seams": schedules.seams_table} if archive.result.get("seams") else {}
+    tables |= {"bracing": schedules.bracing_table} if fabrication and fabrication.bracing else {}
+    tables |= {"stock": schedules.stock_table} if fabrication and fabrication.stock else {}
+    tables |= {"seams": schedules.seams_table} if results.seams else {}
     tables |= {"end_paths": schedules.end_paths_table} if "history" in archive.states else {}
     for name, table in tables.items():
         columns, rows = table(archive)
-        yield f"schedule/{name}.csv", csv_text([columns, *rows])
+        yield f"schedule/{name}.csv", schedules.csv_text([columns, *rows])
 
 
 def _obj(content: Content) -> Files:
-    from rodshell.output.models.obj import obj_text
+    from rodshell.output.models import obj_text
 
     archive = content.archive
     for state in _shells(archive):
@@ -110,7 +180,7 @@ def _obj(content: Content) -> Files:
 
 
 def _gltf(content: Content) -> Files:
-    from rodshell.output.models.gltf import glb_bytes
+    from rodshell.output.gltf import glb_bytes
 
     archive = content.archive
     if archive.final and _meshed(archive):
@@ -118,7 +188,7 @@ def _gltf(content: Content) -> Files:
 
 
 def _vtp(content: Content) -> Files:
-    from rodshell.output.models.vtk import time_series, vtp_text
+    from rodshell.output.models import time_series, vtp_text
 
     archive = content.archive
     for state in _shells(archive) if _meshed(archive) else []:
@@ -128,7 +198,7 @@ def _vtp(content: Content) -> Files:
 
 
 def _compas(content: Content) -> Files:
-    from rodshell.output.models.compas import compas_json
+    from rodshell.output.models import compas_json
 
     archive = content.archive
     if archive.final and _meshed(archive):
@@ -136,15 +206,15 @@ def _compas(content: Content) -> Files:
 
 
 def _rhino(content: Content) -> Files:
-    from rodshell.output.models.rhino import rhino_bytes
+    from rodshell.output.models import rhino_bytes
 
     yield "model/rodshell.3dm", rhino_bytes(content.archive, content.plan)
 
 
 def _png(content: Content) -> Files:
+    from rodshell.output.grid import shape_names, shape_of
     from rodshell.output.pictures import picture
     from rodshell.output.png import drawing_png
-    from rodshell.output.shapes import shape_names, shape_of
 
     archive = content.archive
     for name in shape_names(archive) if _meshed(archive) else []:
@@ -166,7 +236,7 @@ def _shells(archive: Archive) -> list[str]:
 
 
 def _meshed(archive: Archive) -> bool:
-    """Whether the archive knows which nodes belong to which rod."""
+    """Whether the archive knows the nodes of each rod."""
     return "rod_nodes" in archive.states
 
 
@@ -174,7 +244,7 @@ KINDS: dict[str, Callable[[Content], Files]] = {
     "dxf": _dxf, "svg": _svg, "pdf": _pdf, "csv": _csv, "obj": _obj, "gltf": _gltf, "vtp": _vtp, "compas": _compas,
     "3dm": _rhino, "png": _png, "report": _report,
 }  # fmt: skip
-DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # which needs another package
+DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
 _SCHEDULES = ("rods", "joints", "supports", "bracing", "stock", "seams", "end_paths")

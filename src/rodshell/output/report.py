@@ -1,29 +1,31 @@
-"""The report: one page that needs nothing else, neither files nor a network."""
+"""The report: one self-contained page."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from rodshell.output.archive import SHELLS, Archive
 from rodshell.output.drawing import Drawing
-from rodshell.output.drawings.titleblock import on_a_page
-from rodshell.output.figures import checks_table, key_figures, levels_table, supports_table
-from rodshell.output.inputs import shown_case
+from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.drawings.sheets import NOTE, on_a_page
+from rodshell.output.grid import CAPTIONS
 from rodshell.output.pictures import picture_svg
-from rodshell.output.plan import NOTE, FlatPlan
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
 from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
-from rodshell.output.shapes import CAPTIONS
 from rodshell.output.svg import drawing_svg, inline
-from rodshell.output.verdict import facts, unknown_below
 from rodshell.output.viewer import viewer_data, viewer_json
-from rodshell.output.wording import percent, stage
+from rodshell.results import Archive, Results, wording
+from rodshell.results.archive import SHELLS
+from rodshell.results.checked import Clearance, Reactions, Stock
+from rodshell.results.inputs import shown_case
+from rodshell.results.records import Agreement, Drape, Ends, PopUp, Record
+from rodshell.results.verdict import ENDS, facts, unknown_below
+from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
 
 IN_PAGE = ("supports", "elevations", "erection")
 FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends{gaps}."
 PARTLY = (
-    "Below {share} of the deployment no stage could be found: nothing is known there. Above, every one is an "
+    "Below {share} of the deployment no stage could be found: nothing is known there. Above, every stage is an "
     "equilibrium of the elastic grid with pinned ends{gaps}."
 )
 SNAPS = "; at {places} of the deployment the shell snaps forward"
@@ -47,31 +49,31 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
     def shown(svg: str) -> Markup:
         return Markup(inline(svg))  # the SVG is ours, its texts are escaped where it is made
 
-    result, tables = archive.result, _tables(archive)
+    results, tables = archive.results, _tables(archive)
     states = [state for state in CAPTIONS if state in archive.states and "rod_nodes" in archive.states]
     return environment.get_template("report.html.j2").render(
         name=archive.name,
         note=NOTE,
         summary=plan.summary,
         verdict=archive.verdict,
-        facts=facts(result),
-        dropped=result.get("dropped") or [],
+        facts=facts(results),
+        dropped=results.dropped,
         view=_view(archive),
-        supports=supports_table(result),
-        checks=checks_table(result),
+        supports=supports_table(results),
+        checks=checks_table(results),
         pictures=[(CAPTIONS[state], shown(picture_svg(archive, state))) for state in states],
         one_scale=sum(state in SHELLS for state in states) > 1,
-        figures=key_figures(result, plan),
-        levels=levels_table(result),
+        figures=key_figures(results, plan),
+        levels=levels_table(results),
         plan=shown(_on_page(drawings["plan"])),
         drawings=[(drawings[name].title, shown(_on_page(drawings[name]))) for name in IN_PAGE if name in drawings],
         tables=[
             (title, ([heading(column) for column in columns], rows), note) for title, (columns, rows), note in tables
         ],
         case=shown_case(archive.case_toml, archive.inputs),
-        version=str(result.get("version_rodshell") or "unknown"),
-        versions=", ".join(f"{name} {number}" for name, number in (result.get("versions") or {}).items()),
-        format_version=str(result.get("version") or "unknown"),
+        version=results.version_rodshell or "unknown",
+        versions=", ".join(f"{name} {number}" for name, number in (results.versions or {}).items()),
+        format_version=results.version,
     )
 
 
@@ -98,15 +100,16 @@ def _view(archive: Archive) -> dict[str, Any] | None:
 
 def _note(archive: Archive) -> str:
     """What the stages of the view are."""
-    unknown = unknown_below(archive.result)
-    if "history" not in archive.states or unknown >= 1:
+    deployment, unknown = archive.results.deployment, unknown_below(archive.results)
+    if deployment is None or "history" not in archive.states or unknown >= 1:
         return NOT_FOLLOWED
-    way, gaps = archive.result.get("deployment") or {}, ""
-    if snaps := way.get("snaps"):
-        gaps += SNAPS.format(places=", ".join(stage(start) for start, _ in snaps))
-    if guided := way.get("guided"):
-        gaps += GUIDED.format(start=stage(guided[0]), stop=stage(guided[1]))
-    return (PARTLY if unknown else FOLLOWED).format(share=stage(unknown), gaps=gaps)
+    gaps = ""
+    if deployment.snaps:
+        gaps += SNAPS.format(places=", ".join(whole_percent(start) for start, _ in deployment.snaps))
+    if deployment.guided:
+        start, stop = deployment.guided
+        gaps += GUIDED.format(start=whole_percent(start), stop=whole_percent(stop))
+    return (PARTLY if unknown else FOLLOWED).format(share=whole_percent(unknown), gaps=gaps)
 
 
 def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
@@ -115,18 +118,206 @@ def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
         ("Rods", rods_table(archive, brief=True), "Where each joint is on its rods: schedule/rods.csv, joints.csv."),
         ("Joints", joints(archive, brief=True), "Named by the rods that meet, a/b. Final: in the popped-up shell."),
     ]
-    if archive.result.get("boundary"):
+    if archive.results.boundary:
         tables.append(("Supports", supports(archive, brief=True), "With reactions: schedule/supports.csv."))
-    if archive.result.get("seams"):
-        tables.append(("Seams", seams_table(archive), "Forces: what a seam carries there, both rods together."))
-    if stock := (archive.result.get("fabrication") or {}).get("stock"):
+    if archive.results.seams:
+        tables.append(("Seams", seams_table(archive), "Forces: the sum of both rods' support forces."))
+    if archive.results.fabrication and (stock := archive.results.fabrication.stock):
         tables.append(("Stock", stock_table(archive), _plan_of(stock)))
     return tables
 
 
-def _plan_of(stock: Mapping[str, Any]) -> str:
+def _plan_of(stock: Stock) -> str:
     """How good a cutting plan is."""
     return (
-        f"First fit decreasing: {len(stock['bars'])} bars, {percent(stock['waste'])} waste. By the pieces' total "
-        f"length alone it takes {stock['fewest']} bars; that is a bound, which no plan need reach."
+        f"First fit decreasing: {len(stock.bars)} bars, {percent(stock.waste)} waste. By the pieces' total "
+        f"length alone it takes {stock.fewest} bars; that is a lower bound, which may not be reachable."
     )
+
+
+# Key figures and tables
+
+Row = tuple[str, str]
+Entry = tuple[str, str, Callable[[Any], str]]  # what it is called, the field of the record, how it is shown
+Columns = list[tuple[str, list[str]]]  # a title, and a value for each column
+
+_AGREEMENT: tuple[Entry, ...] = (
+    ("Largest gap to the target", "max", wording.millimetres),
+    ("\N{EN DASH} over the target's size", "max_relative", wording.percent),
+    ("\N{EN DASH} found at x, y, z", "where", wording.place),
+    ("Root mean square of the gap", "rms", wording.millimetres),
+    ("\N{EN DASH} over the target's size", "rms_relative", wording.percent),
+)
+_POP_UP: tuple[Entry, ...] = (
+    ("Pop-up", "status", str),
+    ("Started from", "start", str),
+    ("Stable equilibrium, unloaded", "stable", wording.yes_or_no),
+    ("Negative modes", "negative_modes", str),
+    ("Largest strain", "max_strain", wording.small),
+    ("Force residual", "force_residual", wording.newtons),
+    ("Degrees of freedom", "dofs", str),
+    ("Iterations", "iterations", str),
+    ("Factorisations", "factorizations", str),
+    ("Time", "seconds", wording.seconds),
+)
+_NET: tuple[Entry, ...] = (
+    ("estimated error of the cuts", "error_estimate", wording.millimetres),
+    ("smallest angle between rods", "min_angle_deg", wording.degrees),
+    ("found at x, y, z", "min_angle_at", wording.place),
+)
+_DRAPE: tuple[Entry, ...] = (
+    ("method", "method", str),
+    ("status", "status", str),
+    ("degrees of freedom", "dofs", str),
+    ("largest gap", "max_gap", wording.millimetres),
+    ("largest strain", "max_strain", wording.small),
+    ("force residual", "force_residual", wording.newtons),
+    ("negative modes", "negative_modes", str),
+    ("smallest angle between rods", "min_angle_deg", wording.degrees),
+    ("time", "seconds", wording.seconds),
+)
+_PRESET: tuple[Entry, ...] = (
+    ("the preset's grade", "grade", str),
+    ("bending strength", "bending_strength", wording.stress),
+    ("shear strength", "shear_strength", wording.stress),
+    ("these strengths are", "strength_note", str),
+    ("source", "source", str),
+)
+_BENDING: tuple[Entry, ...] = (
+    ("Smallest radius of curvature", "min_radius", wording.millimetres),
+    ("\N{EN DASH} largest curvature out of the shell", "normal_curvature", wording.curvature),
+    ("\N{EN DASH} largest curvature within the shell", "geodesic_curvature", wording.curvature),
+    ("Largest twist of a rod", "twist_rate", wording.twist_rate),
+    ("Largest strain, bending and axial", "max_strain", wording.percent),
+    ("Largest stress, bending, axial and torsion", "max_stress", wording.stress),
+    ("\N{EN DASH} of torsion alone", "torsion_stress", wording.stress),
+    ("Utilisation of the strength", "utilisation", wording.percent),
+    ("Sharpest at this share of the deployment", "share", wording.whole_percent),
+)
+_REACTIONS: tuple[Entry, ...] = (
+    ("Largest support force", "largest_force", wording.newtons),
+    ("Largest support moment", "largest_moment", wording.newton_metres),
+    ("Sum of all forces over the largest", "force_imbalance", wording.small),
+    ("Sum of all moments over the largest", "moment_imbalance", wording.small),
+)
+_CLEARANCE: tuple[Entry, ...] = (("Clearance of the nearest rods", "clearance", wording.millimetres),)
+_NET_DEVIATION: tuple[Entry, ...] = (
+    ("drape against net, rod ends: max", "max", wording.millimetres),
+    ("drape against net, rod ends: median", "median", wording.millimetres),
+)
+
+
+def supports_table(results: Results) -> dict[str, Any] | None:
+    """Both end conditions side by side: `ends` and `rows` of (title, a value for each of the ends)."""
+    ends = [end for end in ENDS if end in results.agreement or end in results.pop_up]
+    rounding = rounding_of(results)
+    gaps = [results.agreement.get(end) or Agreement() for end in ends]
+    rows = _side_by_side(_AGREEMENT, gaps, rounding)
+    rows += _weight_rows(results, ends, rounding)
+    rows += _side_by_side(_POP_UP, [results.pop_up.get(end) or PopUp() for end in ends], rounding)
+    return {"ends": ends, "rows": rows} if rows else None
+
+
+def checks_table(results: Results) -> dict[str, Any] | None:
+    """What was checked, by end condition and in the deployment: `columns` and `rows` of (title, values)."""
+    shapes = results.bending.shapes() if results.bending else {}
+    unknown, rounding = unknown_below(results), rounding_of(results)
+    stages = "deployment" if "deployment" in shapes else "pop_up"  # the second with the final shape
+    columns = [shape for shape in (*ENDS, stages) if shape in shapes and (shape in ENDS or unknown < 1)]
+    rows = _side_by_side(_BENDING, [shapes[column] for column in columns], rounding)
+    strength_of = results.bending.strength_of if results.bending else None
+    if strength_of:
+        rows = [(title.replace("the strength", f"{strength_of}'s strength"), values) for title, values in rows]
+    met = results.contact
+    near = [met.of("deployment" if column == stages else column) for column in columns] if met else []
+    rows += _side_by_side(_CLEARANCE, [found or Clearance() for found in near], rounding)
+    held = {str(end): reactions for end, reactions in results.reactions.items()}
+    rows += _side_by_side(_REACTIONS, [held.get(column) or Reactions() for column in columns], rounding)
+    deployment = f"deployment above {whole_percent(unknown)}" if unknown else "deployment"
+    heads = [deployment if column == stages else column for column in columns]
+    return {"columns": heads, "rows": rows} if rows else None
+
+
+def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]:
+    """Groups of key figures; what is not known is left out."""
+    rod, drape = results.rod, results.drape
+    parts: list[Record | None] = [rod.section, rod.material, rod] if rod else []
+    preset = _listed(rod.preset if rod else None, _PRESET, plan.rounding)
+    deviation = _listed(drape.net_deviation if drape else None, _NET_DEVIATION, plan.rounding)
+    groups = [
+        ("Target", wording.case_rows(results.target, plan.rounding)),
+        ("Layout", wording.case_rows(results.layout, plan.rounding)),
+        ("Cut list", _cut_list(plan)),
+        ("Rod", [row for part in parts for row in wording.case_rows(part)] + preset),
+        ("Net", _listed(results.net, _NET, plan.rounding)),
+        ("Drape", _drape_rows(drape, plan.rounding) + deviation),
+    ]
+    return [(title, rows) for title, rows in groups if rows]
+
+
+def levels_table(results: Results) -> dict[str, Any] | None:
+    """The drape's levels: `columns` and `rows` of whatever was recorded."""
+    levels = [level.plain() for level in results.drape.levels] if results.drape else []
+    columns = list(dict.fromkeys(name for level in levels for name in level))
+    rows = [[wording.plain(level.get(name)) for name in columns] for level in levels]
+    return {"columns": [column.replace("_", " ") for column in columns], "rows": rows} if levels else None
+
+
+def _shown(show: Callable[[Any], str], value: Any, rounding: Rounding) -> str:
+    """A value in words; a length no finer than the result's rounding."""
+    if value is None:
+        return wording.UNKNOWN
+    if show is wording.millimetres:
+        return wording.millimetres(value, rounding=rounding)
+    return wording.place(value, rounding) if show is wording.place else show(value)
+
+
+def _side_by_side(listed: tuple[Entry, ...], records: Sequence[Record], rounding: Rounding) -> Columns:
+    """A row for each figure that is known of at least one record."""
+    rows = Columns()
+    for title, name, show in listed:
+        values = [getattr(record, name) for record in records]
+        if any(value is not None for value in values):
+            rows.append((title, [_shown(show, value, rounding) for value in values]))
+    return rows
+
+
+def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> Columns:
+    """How much of its own weight the shell bears with each end condition."""
+    found = [results.self_weight.get(end) for end in ends]
+    if not any(found):
+        return []
+    shares = [wording.share_of_weight(weight) if weight else wording.UNKNOWN for weight in found]
+    deflections = [_shown(wording.millimetres, weight.deflection if weight else None, rounding) for weight in found]
+    whose = "the weakest patch, its seam held," if results.patches else "it"
+    rows = [(f"Own weight that {whose} bears", shares)]
+    return (
+        rows
+        if set(deflections) == {wording.UNKNOWN}
+        else [*rows, ("Largest deflection under its own weight", deflections)]
+    )
+
+
+def _listed(record: Record | None, listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:
+    """The figures of a record that are known."""
+    known = [(title, getattr(record, name), show) for title, name, show in listed] if record else []
+    return [(title, _shown(show, value, rounding)) for title, value, show in known if value is not None]
+
+
+def _drape_rows(drape: Drape | None, rounding: Rounding) -> list[Row]:
+    """Figures of the drape; `max_gap` of a grid that rests on the target is how deep a node lies inside it."""
+    rests = drape is not None and drape.method not in (None, "bound")
+    words = {"largest gap": "deepest inside the target"} if rests else {}
+    return [(words.get(title, title), value) for title, value in _listed(drape, _DRAPE, rounding)]
+
+
+def _cut_list(plan: FlatPlan) -> list[Row]:
+    lengths = [rod.length for rod in plan.rods]
+    bare = ", without allowances" if plan.allowances else ""
+    return [
+        ("rods", str(len(plan.rods))),
+        ("joints", str(len(plan.joints))),
+        (f"all rods together{bare}", f"{sum(lengths):.1f} m"),
+        (f"longest rod{bare}", f"{plan.rounding.mm(max(lengths, default=None)) or wording.UNKNOWN} mm"),
+        (f"shortest rod{bare}", f"{plan.rounding.mm(min(lengths, default=None)) or wording.UNKNOWN} mm"),
+    ]

@@ -1,16 +1,24 @@
-"""Schedules as tables and as CSV: what to cut, where to drill, where each end goes. Millimetres, degrees, kg, MPa."""
+"""Schedules as tables and as CSV: what to cut, where to drill, where each end goes. Millimetres, degrees, kg, MPa.
 
-from collections.abc import Callable, Iterator, Mapping
+In CSV, a spreadsheet must not take a text for a formula [OWASP, "CSV Injection"]: cells that begin with = + - @ (also
+as full-width letters), a tab or a line break are run by Excel, LibreOffice and Google Sheets. They get an apostrophe,
+which tells a spreadsheet that what follows is text.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import pi
-from typing import Any
 
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.output.archive import Archive
-from rodshell.output.rods import RodRecord, joints_of, rods_of
-from rodshell.output.rounding import FINEST, Rounding, rounding_of
-from rodshell.output.verdict import ENDS
+from rodshell.output.grid import GridRod, joints_of, rods_of
+from rodshell.results import Archive, Results
+from rodshell.results.records import Meeting, printable
+from rodshell.results.verdict import ENDS
+from rodshell.results.wording import FINEST, Rounding, rounding_of
 
 Rows = list[list[str]]
 Table = tuple[list[str], Rows]
@@ -37,30 +45,30 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
 
     Splices and joints are measured from the cut end of the rod's start, as on the strips.
 
-    Bending is that of the final shape; where a column is named `pop_up`, the worst of all shapes, the way up included.
+    Bending is that of the final shape; in columns named `pop_up` it is the worst of all shapes of the deployment.
     """
-    final, mm = archive.final, rounding_of(archive.result).mm
-    columns: list[tuple[str, bool, Callable[[RodRecord], str]]] = [
+    final, mm = archive.final, rounding_of(archive.results).mm
+    columns: list[tuple[str, bool, Callable[[GridRod], str]]] = [
         ("id", True, lambda rod: rod.id),
         ("family", False, lambda rod: rod.family),
-        ("layer", True, lambda rod: _whole(rod.layer)),
-        ("offset_mm", False, lambda rod: mm(rod.offset)),
-        ("start_mm", False, lambda rod: mm(rod.start)),
-        ("end_mm", False, lambda rod: mm(rod.end)),
+        ("layer", True, lambda rod: "" if rod.record.layer is None else str(rod.record.layer)),
+        ("offset_mm", False, lambda rod: mm(rod.record.offset)),
+        ("start_mm", False, lambda rod: mm(rod.record.start)),
+        ("end_mm", False, lambda rod: mm(rod.record.end)),
         ("length_mm", True, lambda rod: mm(rod.length)),
         ("cut_length_mm", True, lambda rod: mm(rod.cut_length)),
-        ("mass_kg", True, lambda rod: _significant(rod.more.get("mass"))),
+        ("mass_kg", True, lambda rod: _significant(rod.record.mass)),
         ("joints", True, lambda rod: str(len(rod.joints))),
-        ("min_radius_mm", True, lambda rod: _significant(rod.more.get("min_radius"), 1e3)),
-        ("max_normal_curvature_per_m", False, lambda rod: _significant(rod.more.get("normal_curvature"))),
-        ("max_geodesic_curvature_per_m", False, lambda rod: _significant(rod.more.get("geodesic_curvature"))),
-        ("max_twist_deg_per_m", False, lambda rod: _significant(rod.more.get("twist_rate"), 180 / pi)),
-        ("max_strain", True, lambda rod: _number(rod.more.get("max_strain"), 6)),
-        ("max_stress_MPa", True, lambda rod: _mpa(rod.more.get("max_stress"))),
-        ("max_torsion_stress_MPa", False, lambda rod: _mpa(rod.more.get("torsion_stress"))),
-        ("max_stress_pop_up_MPa", True, lambda rod: _mpa((rod.more.get("pop_up") or {}).get("max_stress"))),
-        ("utilisation_pop_up", True, lambda rod: _number((rod.more.get("pop_up") or {}).get("utilisation"), 3)),
-        ("splices_from_cut_end_mm", True, lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.splices)),
+        ("min_radius_mm", True, lambda rod: _significant(rod.record.min_radius, 1e3)),
+        ("max_normal_curvature_per_m", False, lambda rod: _significant(rod.record.normal_curvature)),
+        ("max_geodesic_curvature_per_m", False, lambda rod: _significant(rod.record.geodesic_curvature)),
+        ("max_twist_deg_per_m", False, lambda rod: _significant(rod.record.twist_rate, 180 / pi)),
+        ("max_strain", True, lambda rod: _number(rod.record.max_strain, 6)),
+        ("max_stress_MPa", True, lambda rod: _mpa(rod.record.max_stress)),
+        ("max_torsion_stress_MPa", False, lambda rod: _mpa(rod.record.torsion_stress)),
+        ("max_stress_pop_up_MPa", True, lambda rod: _mpa(rod.record.pop_up.max_stress if rod.record.pop_up else None)),
+        ("utilisation_pop_up", True, lambda rod: _number(_utilisation(rod), 3)),
+        ("splices_from_cut_end_mm", True, lambda rod: "; ".join(mm(rod.from_cut_end(at)) for at in rod.record.splices)),
         *_ends(mm, "flat", 2, lambda rod: rod.flat),
         ("final_state", False, lambda rod: final or "" if len(rod.nodes) else ""),
         *_ends(
@@ -74,12 +82,12 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
 
 
 def joints_table(archive: Archive, *, brief: bool = False) -> Table:
-    """One row a joint: where it is on both rods, in plan and in space, the angle between them, and which is over.
+    """One row a joint: where it is on both rods, in plan and in space, the angle between them, and the upper rod.
 
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines. Each entry of
     `columns` is a name and what it says of a joint: more may be added there.
     """
-    rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.result).mm
+    rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
     placed = [_joints_in_space(archive, rod, final) for rod in rods]
     loads = _joint_loads(archive, final)
     rows, columns = list[list[str]](), dict[str, str]()
@@ -102,90 +110,86 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
             "flat_deg": f"{flat:.2f}",
             "final_deg": "" if angle is None else f"{angle:.2f}",
             **({} if brief else {"scissor_deg": "" if angle is None else f"{round(angle - flat, 2) + 0.0:.2f}"}),
-            **({} if brief else loads.get((a.id, b.id), dict.fromkeys(_CARRIED, "") if loads else {})),
+            **({} if brief else loads.get((a.id, b.id), dict.fromkeys(_LOADS, "") if loads else {})),
         }  # fmt: skip
         rows.append(list(columns.values()))
     return list(columns), rows
 
 
-_CARRIED = ("force_N", "normal_force_N", "shear_moment_Nm", "out_of_plane_moment_Nm")
+_LOADS = ("force_N", "normal_force_N", "shear_moment_Nm", "out_of_plane_moment_Nm")
 
 
 def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], dict[str, str]]:
     """By the two rods: what the joint carries, as the second rod feels it."""
-    table = (archive.result.get("joint_loads") or {}).get((final or "").removeprefix("popped_"), [])
-    return {
-        tuple(one["rods"]): {
-            "force_N": f"{np.linalg.norm(one['force']):.6g}",
-            **{f"{name}_{unit}": f"{one[name]:.6g}" for name, unit in _LOADS},
-        }
-        for one in table
-    }
-
-
-_LOADS = (("normal_force", "N"), ("shear_moment", "Nm"), ("out_of_plane_moment", "Nm"))
+    ends = next((ends for ends in ENDS if final == f"popped_{ends}"), None)
+    loads = archive.results.joint_loads.get(ends, ()) if ends else ()
+    found = dict[tuple[str, str], dict[str, str]]()
+    for load in loads:
+        force = None if load.force is None else float(np.linalg.norm(np.array(load.force, dtype=float)))
+        values = (force, load.normal_force, load.shear_moment, load.out_of_plane_moment)
+        found[load.rods] = {name: _six(value) for name, value in zip(_LOADS, values, strict=True)}
+    return found
 
 
 def supports_table(archive: Archive, *, brief: bool = False) -> Table:
     """One row a rod end: its place on the final boundary, its outward direction, and its reactions."""
-    boundary, tangents = archive.result.get("boundary") or [], archive.result.get("end_tangents") or []
-    reactions, mm = archive.result.get("reactions") or {}, rounding_of(archive.result).mm
+    results, mm = archive.results, rounding_of(archive.results).mm
     columns = ["id", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"tangent_{a}" for a in "xyz")]
-    columns += [f"{kind}_{a}_{unit}_{ends}" for ends in reactions for kind, unit in _FORCES for a in "xyz"]
+    columns += [f"{kind}_{a}_{unit}_{ends}" for ends in results.reactions for kind, unit in _REACTIONS for a in "xyz"]
     names = [(rod.id, end) for rod in rods_of(archive) for end in (0, 1)]
     rows = []
-    for k, ((name, end), place) in enumerate(zip(names, boundary, strict=False)):
+    for k, ((name, end), place) in enumerate(zip(names, results.boundary, strict=False)):
         row = [f"{name}.{end}", name, str(end), *map(mm, place)]
-        row += [f"{round(t, 5) + 0.0:.5f}" for t in tangents[k]] if k < len(tangents) else [""] * 3
-        for held in reactions.values():
-            row += [f"{value:.6g}" for kind in ("forces", "moments") for value in held[kind][k]]
+        tangent = results.end_tangents[k] if k < len(results.end_tangents) else (None, None, None)
+        row += ["" if t is None else f"{round(t, 5) + 0.0:.5f}" for t in tangent]
+        for held in results.reactions.values():
+            row += [_six(value) for kind in (held.forces, held.moments) for value in kind[k]]
         rows.append(row)
     if brief:
         columns, rows = [columns[0], *columns[3:9]], [[row[0], *row[3:9]] for row in rows]
     return columns, rows
 
 
-_FORCES = (("force", "N"), ("moment", "Nm"))
+_REACTIONS = (("force", "N"), ("moment", "Nm"))
 
 
-def seam_meetings(result: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Every place where rods meet, with its number: the seam's, and its own along the result."""
-    for number, seam in enumerate(result.get("seams") or [], start=1):
-        for k, meeting in enumerate(seam["meetings"], start=1):
+def seam_meetings(results: Results) -> Iterator[tuple[str, Meeting]]:
+    """Every place where rods of two patches meet, with its number: that of the seam and that along the seam."""
+    for number, seam in enumerate(results.seams, start=1):
+        for k, meeting in enumerate(seam.meetings, start=1):
             yield f"{number}.{k}", meeting
 
 
 def seams_table(archive: Archive) -> Table:
     """One row a meeting: the two rod ends (0 start, 1 end), their place, and the sum of both rods' support forces."""
-    seams = archive.result.get("seams") or []
-    ends = [end for end in ENDS if all(end in (seam.get("forces") or {}) for seam in seams)]
+    seams, mm = archive.results.seams, rounding_of(archive.results).mm
+    ends = [end for end in ENDS if all(end in seam.forces for seam in seams)]
     columns = ["meeting", "first_end", "second_end", "x_mm", "y_mm", "z_mm"]
     columns += [f"{end}_f{axis}_N" for end in ends for axis in "xyz"]
-    mm = rounding_of(archive.result).mm
-    rows = [[number, *meeting["ends"], *map(mm, meeting["point"])] for number, meeting in seam_meetings(archive.result)]
-    carried = [
-        [force for end in ends for force in seam["forces"][end]["each"][k]]
+    rows = [[number, *meeting.ends, *map(mm, meeting.point)] for number, meeting in seam_meetings(archive.results)]
+    forces = [
+        [_six(force) for end in ends for force in seam.forces[end].each[k]]
         for seam in seams
-        for k in range(len(seam["meetings"]))
+        for k in range(len(seam.meetings))
     ]
-    return columns, [[*row, *(f"{force:.6g}" for force in forces)] for row, forces in zip(rows, carried, strict=True)]
+    return columns, [[*row, *of_row] for row, of_row in zip(rows, forces, strict=True)]
 
 
 def bracing_table(archive: Archive) -> Table:
     """One row a diagonal."""
-    braces = (archive.result.get("fabrication") or {}).get("bracing", [])
-    mm = rounding_of(archive.result).mm
-    rows = [[brace["from"], brace["to"], mm(brace["flat"]), mm(brace["final"])] for brace in braces]
+    braces = archive.results.fabrication.bracing if archive.results.fabrication else ()
+    mm = rounding_of(archive.results).mm
+    rows = [[brace.start, brace.end, mm(brace.flat), mm(brace.final)] for brace in braces]
     return ["from", "to", "flat_mm", "final_mm"], rows
 
 
 def stock_table(archive: Archive) -> Table:
     """One row a bar of stock: its pieces, named rod.number from the datum end, and what is left of it."""
-    stock = (archive.result.get("fabrication") or {}).get("stock") or {"bars": []}
-    mm = rounding_of(archive.result).mm
+    stock = archive.results.fabrication.stock if archive.results.fabrication else None
+    mm = rounding_of(archive.results).mm
     rows = [
-        [str(k), "; ".join(f"{one['piece']} {mm(one['length'])}" for one in bar["pieces"]), mm(bar["left"])]
-        for k, bar in enumerate(stock["bars"], start=1)
+        [str(k), "; ".join(f"{piece.piece} {mm(piece.length)}" for piece in bar.pieces), mm(bar.left)]
+        for k, bar in enumerate(stock.bars if stock else (), start=1)
     ]
     return ["bar", "pieces_mm", "left_mm"], rows
 
@@ -207,19 +211,19 @@ def end_paths_table(archive: Archive) -> Table:
     return columns, rows
 
 
-def _joints_at(rod: RodRecord, mm: Show) -> str:
+def _joints_at(rod: GridRod, mm: Show) -> str:
     return "; ".join(
         f"{other} {mm(rod.from_cut_end(at))}" for other, at in sorted(rod.joints, key=lambda joint: joint[1])
     )
 
 
 def _ends(
-    mm: Show, name: str, axes: int, places: Callable[[RodRecord], Any]
-) -> list[tuple[str, bool, Callable[[RodRecord], str]]]:
+    mm: Show, name: str, axes: int, places: Callable[[GridRod], Floats | None]
+) -> list[tuple[str, bool, Callable[[GridRod], str]]]:
     """Columns of the coordinates of both ends."""
 
-    def cell(end: int, axis: int) -> Callable[[RodRecord], str]:
-        def show(rod: RodRecord) -> str:
+    def cell(end: int, axis: int) -> Callable[[GridRod], str]:
+        def show(rod: GridRod) -> str:
             found = places(rod)
             return "" if found is None else mm(found[end][axis])
 
@@ -235,7 +239,7 @@ def _pruned(table: Table, brief: bool) -> Table:
     return [columns[k] for k in keep], [[row[k] for k in keep] for row in rows]
 
 
-def _joints_in_space(archive: Archive, rod: RodRecord, state: str | None) -> dict[str, tuple[Floats, Floats]]:
+def _joints_in_space(archive: Archive, rod: GridRod, state: str | None) -> dict[str, tuple[Floats, Floats]]:
     """Position (3,) [m] and a tangent (3,) of a rod at its joints, by the rod that is met; empty if not known."""
     if state is None or len(rod.nodes) < 2 or "flat" not in archive.states:
         return {}
@@ -268,5 +272,31 @@ def _number(value: float | None, digits: int) -> str:
     return "" if value is None else f"{value:.{digits}f}"
 
 
-def _whole(value: int | None) -> str:
-    return "" if value is None else str(value)
+def _six(value: float | None) -> str:
+    """Forces and moments, to six figures."""
+    return "" if value is None else f"{value:.6g}"
+
+
+def _utilisation(rod: GridRod) -> float | None:
+    """In all shapes, those of the deployment included."""
+    return rod.record.pop_up.utilisation if rod.record.pop_up else None
+
+
+# CSV
+
+NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+RUN = "=+\\-@\uff1d\uff0b\uff0d\uff20"  # what a formula begins with, the last four full-width
+WHOLE = re.compile(NUMBER)
+FORMULA = re.compile(rf'(^[\s"]*|[;,][\s"]*(?!{NUMBER}\s*(?:[;,]|$)))(?=[{RUN}])')
+
+
+def csv_text(rows: Iterable[Sequence[object]]) -> str:
+    """Rows as CSV; a number stays as it is, a text that a spreadsheet would run gets an apostrophe."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([[safe_cell(str(cell)) for cell in row] for row in rows])
+    return stream.getvalue()
+
+
+def safe_cell(cell: str) -> str:
+    """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons."""
+    return cell if WHOLE.fullmatch(cell) else FORMULA.sub(r"\1'", printable(cell))

@@ -7,9 +7,8 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.output.colour_scale import mixed
 from rodshell.output.drawing import Pen, Pencil
-from rodshell.output.plan import nice_ticks
 from rodshell.output.svg import number
-from rodshell.output.wording import MINUS
+from rodshell.results.wording import MINUS, nice_ticks
 
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(27.0)  # of the eye
 _C, _S, _CE, _SE = np.cos(AZIMUTH), np.sin(AZIMUTH), np.cos(ELEVATION), np.sin(ELEVATION)

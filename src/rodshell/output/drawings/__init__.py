@@ -2,18 +2,24 @@
 
 from functools import cache
 
-from rodshell.output.archive import Archive
 from rodshell.output.drawing import TEXT, Drawing
-from rodshell.output.drawings.bracing import bracing_drawing
-from rodshell.output.drawings.final import elevations_drawing, erection_drawing
-from rodshell.output.drawings.flat import flat_drawing
-from rodshell.output.drawings.sheets import SCALES, Compose, Sheet, bound, fitted, parts, room, table
-from rodshell.output.drawings.strips import per_sheet, strips_drawing
-from rodshell.output.drawings.supports import supports_drawing
-from rodshell.output.drawings.titleblock import title_block, with_title
-from rodshell.output.plan import FlatPlan
+from rodshell.output.drawings.flat import FlatPlan, flat_drawing, per_sheet, strips_drawing
+from rodshell.output.drawings.sheets import (
+    SCALES,
+    Compose,
+    Sheet,
+    bound,
+    fitted,
+    parts,
+    room,
+    table,
+    title_block,
+    with_title,
+)
+from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing, erection_drawing, supports_drawing
+from rodshell.output.options import PAPERS
 from rodshell.output.schedules import bracing_table, joints_table, rods_table, seams_table, stock_table, supports_table
-from rodshell.output.takeaway import PAPERS
+from rodshell.results import Archive
 
 __all__ = ["drawing_set", "sheet_set"]
 
@@ -31,7 +37,8 @@ def drawing_set(archive: Archive, plan: FlatPlan) -> dict[str, Drawing]:
 
 def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[float, float]]:
     """All sheets in mm of paper, and the paper's size."""
-    paper = PAPERS[(archive.result.get("drawings") or {}).get("paper", "A3")]
+    results = archive.results
+    paper = PAPERS[results.drawings.paper if results.drawings else "A3"]
 
     @cache  # the same text sizes are tried for one sheet and for its parts
     def flat(text: float) -> Drawing:
@@ -50,9 +57,9 @@ def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[fl
             sheets += table("Bracing", bracing_table(archive), paper)
     sheets += table("Rods", rods_table(archive, brief=True), paper)
     sheets += table("Joints", joints_table(archive, brief=True), paper)
-    if archive.result.get("seams"):
+    if results.seams:
         sheets += table("Seams", seams_table(archive), paper)
-    if (archive.result.get("fabrication") or {}).get("stock"):
+    if results.fabrication and results.fabrication.stock:
         sheets += table("Stock", stock_table(archive), paper)
     return bound(sheets, title_block(archive, plan.summary), paper), paper
 
@@ -64,19 +71,19 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, Compose]:
         return makers
     makers["supports"] = lambda text: supports_drawing(archive, plan, text)
     makers["elevations"] = lambda text: elevations_drawing(archive, text)
-    if (archive.result.get("fabrication") or {}).get("bracing"):
+    if archive.results.fabrication and archive.results.fabrication.bracing:
         makers["bracing"] = lambda text: bracing_drawing(archive, text)
-    if "history" in archive.states and archive.result.get("deployment"):
+    if "history" in archive.states and archive.results.deployment:
         makers["erection"] = lambda text: erection_drawing(archive, text)
     return makers
 
 
 def _strips(plan: FlatPlan, paper: tuple[float, float]) -> list[Sheet]:
-    """The strips at the largest scale at which the longest rod fits, as many to a sheet as find room."""
+    """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low
     longest = max((1e3 * rod.cut_length for rod in plan.rods), default=1.0)
-    scale = next((one for one in SCALES if (longest + 12 * one * TEXT) / one <= width), SCALES[-1])
+    scale = next((scale for scale in SCALES if (longest + 12 * scale * TEXT) / scale <= width), SCALES[-1])
     count = per_sheet(height, TEXT)
     groups = [plan.rods[k : k + count] for k in range(0, len(plan.rods), count)]
     sheets = []

@@ -1,5 +1,12 @@
-"""Flat plan: both families as cut, their joints, labels, the footprint, and what it is set out by."""
+"""Drawings for the workshop: the flat plan of both families as cut, and a strip for each rod.
 
+The plan has rods, joints, labels, the footprint, and the diagonals by which the grid is set out. On a strip all
+distances start at one end, so that errors do not add up.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -8,18 +15,104 @@ from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats
 from rodshell.layout.outline import opens
-from rodshell.output.callouts import callouts, outward
-from rodshell.output.drawing import INK, LETTER, LINE, SMALL, Drawing, Pen, Pencil
-from rodshell.output.labels import Label, Room, closed_segments, lines_meet, place, take
-from rodshell.output.plan import FlatPlan, nice_ticks
-from rodshell.output.rods import outlines_of
+from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
+from rodshell.output.grid import GridJoint, GridRod, joints_of, outlines_of, rods_of
+from rodshell.output.labels import Label, Room, callouts, closed_segments, lines_meet, outward, place, spread, take
+from rodshell.output.schedules import Show
+from rodshell.results import Archive
+from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
-TITLE = "Flat plan"
+FLAT_TITLE = "Flat plan"
 ROD = 0.18  # width of a rod's line, in text sizes
 LARGEST = 0.85  # size of a joint's id at most, in text sizes
 GAP = 0.06  # from an id to a rod, in text sizes
 CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
+STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
+STRIPS_LEGEND = (
+    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice. "
+    "Open triangle: support."
+)
+TALL = 15.0  # text sizes from strip to strip
+
+
+@dataclass(frozen=True)
+class FlatPlan:
+    """The content of the flat plan.
+
+    Parameters
+    ----------
+    rods, joints : as in the result [m].
+    lines : (r, 2, 2) start and end of each rod on the footprint [mm].
+    cuts : (r, 2, 2) start and end of each rod as it is cut, with its allowances [mm].
+    marks : (c, 2) the joints, in the order of `joints` [mm].
+    footprint : closed curves (f, 2) through the rod ends, around the grid and around each opening [mm].
+    boundary : closed curves (f, 3) through the final rod ends [mm], vertex by vertex those of `footprint`; none if they
+        are not known.
+    rounding : how finely lengths are shown.
+    """
+
+    name: str
+    rods: list[GridRod]
+    joints: list[GridJoint]
+    lines: Floats
+    cuts: Floats
+    marks: Floats
+    footprint: list[Floats]
+    boundary: list[Floats]
+    rounding: Rounding
+
+    @cached_property
+    def extent(self) -> float:
+        """The longer side of the plan [mm]."""
+        return float(np.ptp(self.lines.reshape(-1, 2), axis=0).max()) if len(self.lines) else 1.0
+
+    @cached_property
+    def spacing(self) -> float:
+        """The median distance of neighbouring joints on a rod [mm]."""
+        steps = [np.diff(np.sort([at for _, at in rod.joints])) for rod in self.rods]
+        steps = [step[step > 1e-6] for step in steps]
+        known = np.concatenate(steps) if steps else np.empty(0)
+        return float(1e3 * np.median(known)) if len(known) else self.extent / 10
+
+    @cached_property
+    def text(self) -> float:
+        """Size of the rods' labels at 1:1 [mm]: joint ids find room between the rods."""
+        longest = max((len(joint.id) for joint in self.joints), default=1)
+        return min(self.spacing / (SMALL * LETTER * longest + 0.95), 0.25 * self.spacing, 0.015 * self.extent)
+
+    @cached_property
+    def summary(self) -> str:
+        """The cut list in one line; lengths as cut."""
+        lengths = [rod.cut_length for rod in self.rods]
+        return (
+            f"{len(self.rods)} rods, {len(self.joints)} joints, {sum(lengths):.1f} m in total, "
+            f"longest {self.rounding.mm(max(lengths, default=0.0))} mm"
+            + (", with allowances" if self.allowances else "")
+        )
+
+    @property
+    def allowances(self) -> bool:
+        """Whether rods are cut longer than they are between their supports."""
+        return any(rod.allowance for rod in self.rods)
+
+
+def flat_plan(archive: Archive) -> FlatPlan:
+    """The flat plan of an archive."""
+    rods = rods_of(archive)
+    joints = joints_of(rods)
+    lines = np.array([rod.flat for rod in rods]).reshape(-1, 2, 2)
+    cuts = np.array([[rod.point(-rod.allowance), rod.point(rod.length + rod.allowance)] for rod in rods])
+    marks = np.array([rods[joint.rods[0]].point(joint.at[0]) for joint in joints]).reshape(-1, 2)
+    footprint = np.array(archive.results.footprint or lines.reshape(-1, 2), dtype=float).reshape(-1, 2)
+    boundary = np.array(archive.results.boundary, dtype=float).reshape(-1, 3)
+    loops = outlines_of(rods)
+    return FlatPlan(
+        archive.name, rods, joints, 1e3 * lines, 1e3 * cuts.reshape(-1, 2, 2), 1e3 * marks,
+        [1e3 * footprint[loop] for loop in loops],
+        [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
+        rounding_of(archive.results),
+    )  # fmt: skip
 
 
 def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
@@ -36,7 +129,7 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     for a, b in across:
         _dimension(pencil, plan, a, b, text)
     _axes(pencil, plan, text)
-    return pencil.done("plan", TITLE, text)
+    return pencil.done("plan", FLAT_TITLE, text)
 
 
 def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
@@ -53,7 +146,7 @@ def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
 
 
 def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: Floats) -> None:
-    """A mark at each joint, and its id in a corner of the mesh beside it, nearer to it than to the next joint.
+    """A mark at each joint, and its id in a corner of the mesh next to it, nearer to it than to the next joint.
 
     It is clear of all `lines` (m, 2, 2), and of those `across` (d, 2, 2) if it can be.
     An id that finds no room, or only in letters too small to read, is left to the mark's note and the schedule.
@@ -80,7 +173,7 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
-    """Each rod's at its ends, on its own line; in an opening, around it."""
+    """Each rod's label at its ends, on its line; in an opening, around it."""
     names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
     inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
     outside = np.ones(2 * len(names), dtype=bool)
@@ -109,12 +202,10 @@ def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
     """
     found = []
     for patch in _patches(plan):
-        x, y = (np.unique(np.round([float(plan.rods[pair[k]].offset or 0.0) for pair in patch], 9)) for k in (1, 0))
+        x, y = (np.unique(np.round([_offset(plan.rods[pair[k]]) for pair in patch], 9)) for k in (1, 0))
         met = np.zeros((len(y), len(x)), dtype=bool)
         for u, v in patch:
-            row, column = (
-                int(np.abs(offsets - float(plan.rods[k].offset or 0.0)).argmin()) for offsets, k in ((y, u), (x, v))
-            )
+            row, column = (int(np.abs(offsets - _offset(plan.rods[k])).argmin()) for offsets, k in ((y, u), (x, v)))
             met[row, column] = True
         best = _largest_full(met, x, y)
         if best is not None:
@@ -122,6 +213,10 @@ def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
             found.append((np.array([left, low]), np.array([right, high])))
             found.append((np.array([left, high]), np.array([right, low])))
     return found
+
+
+def _offset(rod: GridRod) -> float:
+    return rod.record.offset or 0.0
 
 
 def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
@@ -132,7 +227,7 @@ def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     first, second = np.array(pairs).T
     graph = coo_array((np.ones(len(pairs)), (first, second)), shape=(len(plan.rods),) * 2)
     patch = connected_components(graph, directed=False)[1][first]
-    return [[pair for pair, own in zip(pairs, patch, strict=True) if own == one] for one in dict.fromkeys(patch)]
+    return [[pair for pair, k in zip(pairs, patch, strict=True) if k == name] for name in dict.fromkeys(patch)]
 
 
 def _largest_full(met: Bools, x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
@@ -169,7 +264,7 @@ def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float
 
 def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     """A frame with millimetre ticks along its lower and left side, and a scale bar of one tick."""
-    corners = np.concatenate([plan.cuts.reshape(-1, 2), *(one.box() for one in pencil.texts), np.zeros((1, 2))])
+    corners = np.concatenate([plan.cuts.reshape(-1, 2), *(label.box() for label in pencil.texts), np.zeros((1, 2))])
     low, high = corners.min(axis=0) - text, corners.max(axis=0) + text
     frame = [low, (high[0], low[1]), high, (low[0], high[1])]
     pencil.line(frame, "DIM", closed=True)
@@ -184,3 +279,65 @@ def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
             pencil.write(f"{value:g}", foot + shift, 0.8 * text, "DIM", anchor=anchor)
         end = np.array([high[0], low[1] - 1.1 * text]) if axis == 0 else np.array([low[0] - 0.4 * text, high[1] - text])
         pencil.write(name, end, 0.8 * text, "DIM", anchor="end")
+
+
+# Strips
+
+
+def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None = None) -> Drawing:
+    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0."""
+    pencil = Pencil()
+    layer = {rod.id: rod.record.layer for rod in plan.rods}
+    chosen = plan.rods if rods is None else rods
+    for k, rod in enumerate(chosen):
+        _strip(pencil, rod, -k * TALL * text, text, layer, plan.rounding.mm)
+    pencil.write(STRIPS_LEGEND, (0.0, -len(chosen) * TALL * text + 5 * text), text, "DIM")
+    return pencil.done("strips", STRIPS_TITLE, text)
+
+
+def per_sheet(height: float, text: float) -> int:
+    """How many strips find room in a height [mm]."""
+    return max(int((height / text - 3) // TALL), 1)
+
+
+def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str, int | None], mm: Show) -> None:
+    """One rod: above it the distances, below it the rods that are met."""
+    cut, start = 1e3 * rod.cut_length, 1e3 * rod.from_cut_end(0.0)
+    pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=f"{rod.id}: {mm(rod.cut_length)} mm")
+    words = [rod.id, f"cut {mm(rod.cut_length)}", f"layer {rod.record.layer}" if rod.record.layer is not None else ""]
+    if start > 0:
+        words.append(f"with {mm(rod.allowance)} at each end for the supports")
+    pencil.write("   ".join(filter(None, words)), (0.0, y + 7.2 * text), 1.1 * text, "LABEL", bold=True)
+    joints = ((1e3 * rod.from_cut_end(at), other, "joint") for other, at in rod.joints)
+    stops = [(0.0, "", ""), *joints, (cut, "", "")]
+    stops += [(1e3 * rod.from_cut_end(at), "S", "splice") for at in rod.record.splices]
+    if start > 0:
+        stops += [(start, "", "support"), (cut - start, "", "support")]
+    stops.sort(key=lambda stop: stop[0])
+    places = spread([at for at, _, _ in stops], 1.15 * text)
+    for (at, name, kind), x in zip(stops, places, strict=True):
+        _stop(pencil, rod, at, float(x), y, text, name, kind, layer, mm)
+
+
+def _stop(
+    pencil: Pencil, rod: GridRod, at: float, x: float, y: float, text: float, name: str, kind: str,
+    layer: dict[str, int | None], mm: Show,
+) -> None:  # fmt: skip
+    """A mark at `at`, its texts at `x`."""
+    shift = 0.35 * text
+    for side, far in ((1, 2.2), (-1, -1.6)):
+        if side > 0 or name:
+            way = [(at, y + 0.4 * side * text), (at, y + 0.7 * side * text), (x, y + 0.85 * far * text)]
+            pencil.line(way if abs(x - at) > 1e-6 else way[::2], "DIM")
+    pencil.write(mm(1e-3 * at), (x + shift, y + 2.0 * text), text, "LABEL", angle=np.pi / 2)
+    if name:
+        pencil.write(name, (x + shift, y - 1.6 * text), text, "LABEL", anchor="end", angle=np.pi / 2)
+    if kind == "joint":
+        here, other = rod.record.layer, layer.get(name)
+        below = here is not None and other is not None and other > here
+        pencil.mark((at, y), 0.35 * text, "MARK", pen=Pen("#b3372c", 0.07 * text, fill="#b3372c" if below else PAPER))
+    elif kind == "splice":
+        pencil.line([(at, y - 0.5 * text), (at, y + 0.5 * text)], "MARK", pen=Pen(INK, 0.2 * text))
+    elif kind == "support":
+        corners = [(at, y), (at - 0.4 * text, y - 0.7 * text), (at + 0.4 * text, y - 0.7 * text)]
+        pencil.line(corners, "MARK", closed=True, pen=Pen(INK, 0.07 * text))

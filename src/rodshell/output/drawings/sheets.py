@@ -1,18 +1,32 @@
-"""Sheets of paper: a frame with a title block, drawings at a standard scale, split where they are too large."""
+"""Sheets of paper: a frame with a title block, drawings at a standard scale, split where they are too large.
 
+The title block says what a drawing is, of which rods, by whom, when, to which tolerance, and what it is not.
+"""
+
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, date, datetime
 from math import ceil
 from textwrap import wrap
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.drawing import INK, LETTER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text
-from rodshell.output.drawings.titleblock import TitleBlock, scale_bar, shortened, write_entries
+from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text
 from rodshell.output.labels import Room
 from rodshell.output.schedules import Table, head
+from rodshell.results import Archive
+from rodshell.results.checked import Drawings
+from rodshell.results.inputs import input_hash
+from rodshell.results.records import Joint, Material, RodType, Section
+from rodshell.results.results import json_text
+from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress
 
+NOTE = "Design aid, not code compliance"
+NOT_GIVEN = "not given"
+COLUMNS = 4  # of entries, side by side
+TRUE_SIZE = ", 1:1"  # after the title of a drawing in a separate file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
@@ -21,6 +35,141 @@ MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
 LEADING = 1.9 * FINE  # from line to line of a table
 OVERLAP = 10.0  # mm of paper that a sheet shows beyond its match lines
 MOST_TILES = 12  # sheets that the parts of one drawing may take
+
+
+@dataclass(frozen=True)
+class TitleBlock:
+    """What every drawing of a set says.
+
+    Parameters
+    ----------
+    entries : what it is called and what it is: project, author, date, section, material, ...
+    summary : the cut list in one line.
+    """
+
+    name: str
+    entries: tuple[tuple[str, str], ...]
+    summary: str
+
+    def notes(self, drawing: Drawing) -> list[str]:
+        """The lines below the entries of a drawing; the last names what it leaves out."""
+        left_out = f"Left out for lack of room: {'; '.join(drawing.left_out)}." if drawing.left_out else ""
+        return [f"{self.summary}. {NOTE}.", *filter(None, [left_out])]
+
+
+def title_block(archive: Archive, summary: str) -> TitleBlock:
+    """The title block of an archive."""
+    results = archive.results
+    given, rod = results.drawings or Drawings(), results.rod or RodType()
+    kept = results.plain()
+    source = archive.case_toml or json_text({key: kept.get(key) for key in ("rods", "boundary")})
+    entries = (
+        ("Project", given.project or NOT_GIVEN),
+        ("Drawn by", given.author or NOT_GIVEN),
+        ("Date", given.date or today().isoformat()),
+        ("Revision", given.revision or "-"),
+        ("Section", _section(rod.section) or NOT_GIVEN),
+        ("Material", _material(rod.material) or NOT_GIVEN),
+        ("Joints", _joint(results.joint)),
+        ("Rods", f"{len(results.rods)}"),
+        ("Units", f"mm, shown to {rounding_of(results).words}"),
+        ("Tolerance", NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
+        ("Input", input_hash(source, archive.inputs)),
+        ("Made by", f"rodshell {results.version_rodshell or '(version unknown)'}"),
+    )
+    return TitleBlock(given.name or archive.name, entries, summary)
+
+
+def today() -> date:
+    """The date of writing in UTC; that of SOURCE_DATE_EPOCH, seconds since 1970, where it is set."""
+    try:
+        return datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), UTC).date()
+    except (KeyError, ValueError, OverflowError, OSError):
+        return datetime.now(UTC).date()
+
+
+def _section(section: Section | None) -> str:
+    """ "circle, radius 1 mm"."""
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in case_rows(section))
+
+
+def _material(material: Material | None) -> str:
+    """ "larch, E 11 GPa, 470 kg/m3": its name where it has one."""
+    if material is None:
+        return ""
+    words = [material.preset] if material.preset else []
+    if material.youngs_modulus is not None:
+        words.append(f"E {stress(material.youngs_modulus)}")
+    if material.density is not None:
+        words.append(f"{rounded(material.density, 4)} kg/m\N{SUPERSCRIPT THREE}")
+    return ", ".join(words)
+
+
+def _joint(joint: Joint | None) -> str:
+    """ "pin, eccentricity 42 mm"; without a word about them, joints are balls, free to turn."""
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in joint_rows(joint)) or "ball"
+
+
+def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
+    """The drawing with its title block and a scale bar below: for a sheet without a frame."""
+    (left, bottom), (right, _) = drawing.box()
+    size, pencil = drawing.text, Pencil()
+    y = bottom - 2.6 * size
+    pencil.line([(left, y + 1.6 * size), (right, y + 1.6 * size)], "TITLE")
+    pencil.write(f"{block.name}: {drawing.title.lower()}{TRUE_SIZE}", (left, y), 1.4 * size, "TITLE", bold=True)
+    rows = [block.entries[k : k + COLUMNS] for k in range(0, len(block.entries), COLUMNS)]
+    lines = [" \N{MIDDLE DOT} ".join(f"{label}: {value}" for label, value in row) for row in rows] + block.notes(
+        drawing
+    )
+    for k, line in enumerate(lines, start=1):
+        pencil.write(line, (left, y - 1.5 * k * size), size, "TITLE")
+    end = left + max(right - left, 0.25 * (right - left) + 4 * size)
+    scale_bar(pencil, end, y - (1.5 * len(lines) + 2) * size, 0.25 * (right - left), size, 1.0)
+    return drawing + pencil.done("", "", size)
+
+
+def on_a_page(drawing: Drawing) -> Drawing:
+    """A drawing for a page, which shows it in any size: its title claims no scale, only its bar is right there."""
+    return replace(
+        drawing,
+        texts=tuple(
+            replace(text, text=text.text.removesuffix(TRUE_SIZE)) if text.layer == "TITLE" and text.bold else text
+            for text in drawing.texts
+        ),
+    )
+
+
+def write_entries(
+    pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
+) -> float:
+    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line."""
+    step = width / COLUMNS
+    for k, (label, value) in enumerate(block.entries):
+        x, down = left + step * (k % COLUMNS), y - line * (k // COLUMNS)
+        pencil.write(label, (x, down), size, "TITLE", colour=SOFT)
+        start = 9.5 * LETTER * size  # after the longest label
+        pencil.write(shortened(value, step - start - 2.0, size), (x + start, down), size, "TITLE")
+    return y - line * len(range(0, len(block.entries), COLUMNS))
+
+
+def shortened(text: str, width: float, size: float) -> str:
+    """A text that takes at most a width [mm] in a size; what is cut off is shown by dots."""
+    letters = int(width / (LETTER * size))
+    return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
+
+
+def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
+    """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`."""
+    length = nice_step(scale * longest, 2) * 2 / scale
+    for k in range(4):
+        x = right - length + k * length / 4
+        corners = np.array([[x, y], [x + length / 4, y], [x + length / 4, y + 0.4 * text], [x, y + 0.4 * text]])
+        pencil.line(corners, "TITLE", closed=True, pen=Pen(INK, 0.06 * text, fill=INK if k % 2 == 0 else PAPER))
+    pencil.write("0", (right - length, y - text), 0.8 * text, "TITLE", anchor="middle")
+    pencil.write(f"{scale * length:g} mm", (right, y - text), 0.8 * text, "TITLE", anchor="end")
+
+
+# Sheets
 
 
 @dataclass(frozen=True)
@@ -41,7 +190,7 @@ def fitted(compose: Compose, paper: tuple[float, float]) -> Sheet:
     """A drawing on one sheet, in the middle, at the largest standard scale at which it fits."""
     low, high = room(paper)
     bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
-    for scale in (one for one in SCALES if np.all(bare / one <= high - low)):
+    for scale in (scale for scale in SCALES if np.all(bare / scale <= high - low)):
         drawing = compose(TEXT * scale)
         bottom, top = drawing.box()
         if np.all((top - bottom) / scale <= high - low):
@@ -57,7 +206,7 @@ def parts(compose: Compose, paper: tuple[float, float], whole: Sheet, *, true_si
     true_size : at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """
     bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
-    possible = [one for one in SCALES if one < whole.scale and _tiles(bare / one, paper).prod() <= MOST_TILES]
+    possible = [scale for scale in SCALES if scale < whole.scale and _tiles(bare / scale, paper).prod() <= MOST_TILES]
     best = list(tiled(compose, paper)) if true_size and 1 in possible else []
     if best or not whole.content.left_out:
         yield from best
@@ -100,20 +249,22 @@ def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Ite
 def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
     """A table over as many sheets as it takes, in as many columns side by side as fit."""
     (columns, rows), (low, high) = content, room(paper)
+    if not columns:
+        return
     cells = [max((len(row[k]) for row in rows), default=0) for k in range(len(columns))]
     heads = [_wrapped(*head(column), width) for column, width in zip(columns, cells, strict=True)]
     widths = [max(width, *map(len, words)) for width, words in zip(cells, heads, strict=True)]
     steps = FINE * (LETTER * np.array(widths) + 1.2)
     width = float(steps.sum()) + 2 * FINE
-    beside = max(int((high[0] - low[0] + 2 * FINE) // width), 1)
+    abreast = max(int((high[0] - low[0] + 2 * FINE) // width), 1)
     tall = int((high[1] - low[1]) // LEADING) - max(map(len, heads)) - 1
-    per_sheet = tall * beside
+    per_sheet = tall * abreast
     pages = max(ceil(len(rows) / per_sheet), 1)
     for page in range(pages):
         pencil = Pencil()
-        mine = rows[page * per_sheet : (page + 1) * per_sheet]
-        for block in range(ceil(len(mine) / tall) or 1):
-            _block(pencil, heads, mine[block * tall : (block + 1) * tall], low[0] + block * width, high[1], steps)
+        rows_here = rows[page * per_sheet : (page + 1) * per_sheet]
+        for block in range(ceil(len(rows_here) / tall) or 1):
+            _block(pencil, heads, rows_here[block * tall : (block + 1) * tall], low[0] + block * width, high[1], steps)
         many = f", {page + 1} of {pages}" if pages > 1 else ""
         yield Sheet(title + many, pencil.done("table", title, TEXT), 0)
 
@@ -180,7 +331,7 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
 
 
 def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, texts: Sequence[Text]) -> Drawing:
-    """Lines along which a sheet meets its neighbours, and which these are, clear of the `texts` there."""
+    """Lines along which a sheet meets its neighbours, with their names, clear of the `texts` there."""
     pencil, (row, column), free = Pencil(), here, Room(20.0)
     for text in texts:
         free.take(text.box())

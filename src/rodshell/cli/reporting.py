@@ -1,0 +1,274 @@
+"""What a command says and writes: progress while a job runs, its result when it is there, and the exit code."""
+
+import json
+import os
+import shutil
+import sys
+import threading
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+import click
+
+from rodshell.cli.interruption import Interruption
+from rodshell.uncached import kernels_are_kept
+
+if TYPE_CHECKING:
+    from rich.status import Status
+
+    from rodshell.case import Case
+    from rodshell.cli.options import RunOptions
+    from rodshell.form import Form
+    from rodshell.results import Archive
+    from rodshell.results.folder import ResultFolder
+
+UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one"
+SILENCE = 10.0  # s: the longest without a word, away from a terminal
+TICK = 0.5  # s, on a terminal
+FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
+
+
+class Progress:
+    """Says where a job is: stage, iteration, share, residual, elapsed time.
+
+    On a terminal that is one live line; else one short line for each stage, and a long one after each `SILENCE`.
+    Called as progress(stage, detail, residual) at each iteration; use it in a `with`, or in several in turn.
+
+    Raises
+    ------
+    KeyboardInterrupt : the job was interrupted, and the interrupt was lost.
+    """
+
+    def __init__(self, *, quiet: bool = False) -> None:
+        self._quiet = quiet
+        self._begun = self._spoken = monotonic()
+        self._stage, self._where = "", "preparing"
+        self._live: Status | None = None
+        self._over = threading.Event()
+        self._voice: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        if self._quiet:
+            return self
+        if sys.stderr.isatty():
+            from rich.console import Console
+
+            self._live = Console(stderr=True).status(self._where)
+            self._live.start()
+        self._over.clear()
+        self._voice = threading.Thread(target=self._speak, args=(TICK if self._live else SILENCE / 10,), daemon=True)
+        self._voice.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        if self._voice is not None:
+            self._voice.join()
+            self._voice = None
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+
+    def __call__(self, stage: str, detail: str, residual: float) -> None:
+        Interruption.check()
+        reached = f", residual {residual:.1e}" if residual else ""
+        self._where = f"{stage}: {detail}{reached}"
+        if stage != self._stage and not self._quiet and self._live is None:
+            self._say(stage)
+        self._stage = stage
+
+    def _speak(self, every: float) -> None:
+        """Say where the job is, however long it has not called."""
+        while not self._over.wait(every):
+            where = f"{self._where}, {monotonic() - self._begun:.0f} s"
+            if self._live is not None:
+                from rich.text import Text
+
+                self._live.update(Text(where))
+            elif monotonic() - self._spoken >= SILENCE:
+                self._say(where)
+
+    def _say(self, words: str) -> None:
+        self._spoken = monotonic()
+        click.echo(f"rodshell: {words}", err=True)
+
+
+def announce_compilation(*, quiet: bool = False) -> None:
+    """Before the first run, say what it will wait for; and before each one, where nothing can be kept."""
+    if quiet:
+        return
+    if not kernels_are_kept():
+        click.echo(f"rodshell: compiling kernels anew, about 20 s: {UNKEPT}", err=True)
+    elif not compiled_before():
+        click.echo("rodshell: compiling kernels, once, about 20 s (rodshell warmup compiles all ahead)", err=True)
+
+
+def compiled_before() -> bool:
+    """Whether an earlier run of this Python left kernels where Numba keeps them."""
+    import numba
+    from numba.misc.appdirs import user_cache_dir
+
+    import rodshell
+
+    if numba.config.DISABLE_JIT:
+        return True
+    index = f"*.py{sys.version_info.major}{sys.version_info.minor}.nbi"
+    own = os.environ.get("NUMBA_CACHE_DIR")
+    places = [own] if own else [Path(rodshell.__file__).parent, user_cache_dir("numba", appauthor=False)]
+    return any(next(Path(place).rglob(index), None) for place in places)
+
+
+class Result(Protocol):
+    """What every job returns. `status` is "converged" or says why not."""
+
+    @property
+    def status(self) -> str: ...
+    def summary(self) -> str:
+        """One screen of text."""
+        ...
+
+    def result(self) -> dict[str, Any]:
+        """What result.json holds."""
+        ...
+
+
+@dataclass(frozen=True)
+class Kept:
+    """An archive as a result; `kinds` of files are written with it (None: all), and `more` by name."""
+
+    archive: "Archive"
+    kinds: list[str] | None = None
+    more: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def status(self) -> str:
+        return self.archive.results.status
+
+    def summary(self) -> str:
+        return self.archive.summary()
+
+    def result(self) -> dict[str, Any]:
+        return self.archive.results.plain()
+
+    def save(self, folder: "ResultFolder", progress: Progress) -> Path:
+        from rodshell.output.files import save
+
+        return save(self.archive, folder, self.kinds, more=self.more, progress=progress)
+
+
+def run_and_deliver(
+    case: "Case",
+    name: str,
+    output: "RunOptions",
+    names: Iterable[str],
+    *,
+    pictures: "Callable[[Form], dict[str, str]]" = lambda form: {},
+) -> int:
+    """Run the job of a case and write its form; the exit code.
+
+    Parameters
+    ----------
+    name : of the folder out/NAME.
+    names : patterns of the files that are written besides result.json, states.npz and those of the kinds.
+    pictures : more files of the form, by name.
+    """
+    from rodshell.output.files import reserved
+
+    reserved_names = ["result.json", "states.npz", *names, *reserved(output.kinds)]
+    with output_folder(output.out, name, reserved_names, force=output.force) as place:
+        announce_compilation(quiet=output.quiet)
+        from rodshell.job import Job
+
+        progress = Progress(quiet=output.quiet)
+        form = Job.of_case(case).run(
+            progress=progress,
+            time_limit=output.limit,
+            announce=None if output.quiet else _announce,
+            frames_in=place.new,
+        )
+        archive = form.archive()
+        if form.search is not None and not (output.quiet or output.as_json):
+            click.echo(form.search.table())
+        kept = Kept(archive, output.kinds, pictures(form))
+        return deliver(kept, kept.save, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+
+
+def _announce(sentence: str) -> None:
+    click.echo(f"rodshell: {sentence}", err=True)
+
+
+def output_folder(
+    out: str | None, name: str, names: Iterable[str], *, force: bool
+) -> "AbstractContextManager[ResultFolder]":
+    """The folder for a result, by default out/NAME; opened before the job starts.
+
+    names : patterns of what will be written there.
+
+    Raises
+    ------
+    OutputError : it cannot be written, or holds files of these names that rodshell did not write.
+    """
+    from rodshell.results.folder import open_folder
+
+    return open_folder(out or Path("out") / Path(name).stem, reserved=names, force=force)
+
+
+def deliver(
+    result: Result,
+    save: "Callable[[ResultFolder, Progress], object]",
+    place: "ResultFolder",
+    *,
+    progress: Progress,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Save a result, print its summary, and return the exit code; not converged wins over not buildable."""
+    Interruption.check()
+    with progress:
+        folder = _saved(lambda where: save(where, progress), place)
+    if as_json:
+        click.echo(json.dumps({"out": str(folder), **result.result()}))
+    elif not quiet:
+        click.echo(result.summary())
+        click.echo(f"written to {folder}")
+    if result.status != "converged":
+        late = result.status.startswith("out of time")
+        said = result.status if late else f"NOT CONVERGED: {result.status}"
+        click.echo(f"rodshell: {said}; partial results are in {folder}", err=True)
+        return NOT_CONVERGED
+    verdict = result.result().get("verdict")
+    if verdict and verdict["level"] == "unbuildable":
+        click.echo(f"rodshell: NOT BUILDABLE: {verdict['reasons'][0]}; results are in {folder}", err=True)
+        return UNBUILDABLE
+    return FOUND
+
+
+def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:
+    """Where a result was saved: beside its place, if somebody put files there while the job ran."""
+    from rodshell.results.folder import ForeignFileError, open_folder
+
+    try:
+        save(place)
+        for name in place.kept:
+            click.echo(f"rodshell: kept {place.path / name}: it was changed since an earlier run wrote it", err=True)
+        return place.path
+    except KeyboardInterrupt:
+        if not place.committed:
+            raise
+        raise KeyboardInterrupt(f"the new result in {place.path} is complete") from None
+    except ForeignFileError as error:
+        names = (place.path.with_name(f"{place.path.name}-{k}") for k in count(2))
+        free = next(path for path in names if not path.exists())
+        with open_folder(free) as other:
+            shutil.copytree(place.new, other.new, dirs_exist_ok=True)
+            other.commit()
+        click.echo(f"rodshell: written to {free} instead: {error}", err=True)
+        return free

@@ -1,0 +1,368 @@
+"""A job as a value: everything that decides a form, and the one way to run it.
+
+The command line, a studio, a sweep or a script load or make a `Job`, change it, and run it; none of them knows a stage.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from os import PathLike
+from pathlib import Path
+from typing import Literal, Self, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rodshell.case import Case, load_case
+from rodshell.case.case import built
+from rodshell.case.from_objects import case_of, case_of_rod_ends
+from rodshell.case.load import changed_case, flattened
+from rodshell.case.rod_ends import RodEnds, read_result, read_table
+from rodshell.errors import InputError
+from rodshell.form import Form
+from rodshell.formfinding import Bound, Method
+from rodshell.formfinding.methods import require_method
+from rodshell.formfinding.patches import PatchLayout
+from rodshell.formfinding.popup import ENDS, Ends
+from rodshell.formfinding.progress import Progress, limited, silent
+from rodshell.formfinding.search import Objective
+from rodshell.joints import Ball, Joint, require_joint
+from rodshell.layout import FlatGrid, GridLayout
+from rodshell.output.options import OutputOptions
+from rodshell.results.folder import reading
+from rodshell.rods.section import Rod
+from rodshell.run import Announce, Run
+from rodshell.targets import Target
+from rodshell.units import length_text, shown
+from rodshell.validation import choice, choices_of, instance, point
+
+Auto = Literal["auto"]
+AskedEnds = Literal["pinned", "clamped", "both"]
+
+FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
+OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
+
+
+class Job:
+    """Everything that decides a form: a value that can be compared, hashed, changed, written and run.
+
+    It is its resolved case. Make one of objects by its constructor, or load one: `Job.load("roof.toml")`.
+
+    Parameters
+    ----------
+    target : the shape wanted.
+    layout : the flat grid asked for.
+    rod : section and material of every rod.
+    method : of the drape: `Bound()`, `Gravity()` or `Fall()`, see `drape`.
+    anchor : x, y of the point of the target where the axes of the grid cross [m]; "auto": the best found; default: the
+        target's highest point.
+    rotate : heading in place of the layout's [rad]; "auto": the best found.
+    objective : what an "auto" anchor or heading makes smallest, see `search`.
+    joint : what the rods do to each other where they cross, see `pop_up`; default: ball joints.
+    ends : end conditions of the pop-up: "pinned", "clamped", or "both"; also in a tuple, which may be empty.
+    seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches; each
+        goes on straight past its ends, unless it is closed. Rods and length of the layout are then "auto", its heading
+        is that at the target's summit, and "auto" is the one that leaves out the fewest rods.
+    patches : what patches, by their names A, B, ... from left to right, have of their own.
+    options : of checks, fabrication and drawings.
+
+    Raises
+    ------
+    InputError : a value is of the wrong kind; a target too is missing.
+    """
+
+    __slots__ = ("_case", "_target")
+    _case: Case
+    _target: Target | None
+
+    def __init__(
+        self,
+        target: Target | None = None,
+        layout: GridLayout | None = None,
+        rod: Rod | None = None,
+        *,
+        method: Method = Bound(),
+        anchor: tuple[float, float] | Auto | None = None,
+        rotate: float | Auto | None = None,
+        objective: Objective = "shear",
+        joint: Joint | None = None,
+        ends: AskedEnds | Sequence[AskedEnds] = "both",
+        seams: Iterable[ArrayLike] = (),
+        patches: Mapping[str, PatchLayout] | None = None,
+        options: OutputOptions | None = None,
+    ) -> None:
+        if target is None or layout is None or rod is None:
+            raise InputError(OBJECTS)
+        for name, value, kind in (("target", target, Target), ("layout", layout, GridLayout), ("rod", rod, Rod)):
+            instance(name, value, kind)
+        require_method(method)
+        require_joint(joint)
+        if anchor is not None and anchor != "auto":
+            point("anchor", anchor)
+        if options is not None:
+            instance("options", options, OutputOptions)
+        for name, patch in (patches or {}).items():
+            instance(f"patches {name}", patch, PatchLayout)
+        case = case_of(
+            target, layout, rod,
+            joint=joint or Ball(), method=method, anchor=anchor, rotate=rotate,
+            objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
+            seams=seams, patches=patches or {}, options=options or OutputOptions(),
+        )  # fmt: skip
+        self._set(case, target)
+
+    @classmethod
+    def load(
+        cls,
+        source: "str | PathLike[str] | Mapping[str, object]",
+        overrides: Mapping[str, object] | None = None,
+        /,
+        **more: object,
+    ) -> Self:
+        """The job of a case, with some keys set anew: `Job.load("hemisphere", layout__rotate="45 deg")`.
+
+        Parameters
+        ----------
+        source : the name of a built-in case; the path of a case file, or of a surface; the text of a case file; its
+            content as a mapping.
+        overrides, more : values by dotted key; in Python's names two underscores stand for the dot.
+
+        Raises
+        ------
+        InputError : no such case or file, an unknown key, a value that cannot be used; in one sentence.
+        """
+        return cls.of_case(load_case(source, flattened({**(overrides or {}), **more})))
+
+    @classmethod
+    def of_case(cls, case: Case) -> Self:
+        """The job of a case that was loaded before; of an earlier form: `Job.of_case(form.case)`."""
+        job = cls.__new__(cls)
+        job._set(case, None)
+        return job
+
+    @classmethod
+    def of_table(
+        cls,
+        source: "str | PathLike[str] | RodEnds",
+        overrides: Mapping[str, object] | None = None,
+        /,
+        *,
+        unit: str | None = None,
+        rod: Rod | None = None,
+        joint: Joint | None = None,
+        **more: object,
+    ) -> Self:
+        """The job of popping up rods that are given by where their ends lie flat and where they go.
+
+        Parameters
+        ----------
+        source : a CSV table; the folder of an earlier result; or the ends themselves.
+        overrides, more : as of `load`, of the tables rod, checks, fabrication and drawings.
+        unit : of a table's coordinates, unless its columns end in _mm.
+        rod : section and material; default: those of the result, or a rod that is chosen to fit.
+        joint : where rods cross, without eccentricity; default: that of the result, or ball joints.
+
+        Raises
+        ------
+        InputError : the source cannot be read, or a value cannot be used. OutputError : there is no such result.
+        """
+        require_joint(joint)
+        if rod is not None:
+            instance("rod", rod, Rod)
+        ends, case = _ends_and_case(source, unit, flattened({**(overrides or {}), **more}))
+        given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
+        tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
+        return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))
+
+    def changed(self, overrides: Mapping[str, object] | None = None, /, **more: object) -> Self:
+        """The same job with some keys set anew: `job.changed(layout__rotate="10 deg")`; arguments as of `load`.
+
+        Raises
+        ------
+        InputError : as of `load`; also a key of a table that was made from an object which no key describes.
+        """
+        changes = flattened({**(overrides or {}), **more})
+        job = type(self).of_case(changed_case(self._case, changes))
+        if job._case.target == self._case.target:
+            job._set(job._case, self._target)
+        return job
+
+    @property
+    def case(self) -> Case:
+        """Everything that decides the job, in SI."""
+        return self._case
+
+    def to_toml(self) -> str:
+        """The job as a case file, in SI; `Job.load` of it gives an equal job.
+
+        Raises
+        ------
+        InputError : it holds an object that no case file can describe, such as a Python function as its target.
+        """
+        return self._case.to_toml()
+
+    def run(
+        self,
+        *,
+        warm_start: Form | None = None,
+        progress: Progress = silent,
+        time_limit: float | None = None,
+        announce: Announce | None = None,
+        until: Literal["pop-up", "fabrication"] = "fabrication",
+        frames_in: str | PathLike[str] = "",
+    ) -> Form:
+        """Find the form: target, drape, trim, pop-up, checks, fabrication.
+
+        Parameters
+        ----------
+        warm_start : an earlier form. Only the stages from the first one on whose part of the case has changed are run
+            again, see `STAGES`; `Form.reused` names the others. Where a stage runs again, the earlier form is its first
+            guess: its net is where the new net is looked for (with `Bound()`), and where its shells went from their
+            draped states is where the new ones start, rods being matched by their place in the lattice. Any form will
+            do; what does not help is left, and the result is the same as without, to the solver's tolerance. A shell
+            that has several equilibria stays with the one that it is in.
+        progress : called as progress(stage, detail, residual) at every iteration.
+        time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
+        announce : called with a sentence for each thing that the job decided itself, before the form is searched.
+        until : the last stage that is run now; the checks and all after them are else run when they are asked for.
+        frames_in : folder in which a fall's folder of frames (drape.frames) is made; default: the current one.
+
+        Returns
+        -------
+        The form. Its `status` is "converged", or says which stage stopped, or was out of time; nothing is raised for
+        that.
+
+        Raises
+        ------
+        InputError : values do not fit together. NetLimitError : no net covers the target from this anchor and heading.
+        OutOfTimeError : the time limit came before there was a net.
+        """
+        if warm_start is not None:
+            instance("warm_start", warm_start, Form, FOUND)
+        choice("until", until, ("pop-up", "fabrication"))
+        run = Run(self._case, self._target, warm_start, limited(progress, time_limit), announce, Path(frames_in))
+        entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
+        with entered:
+            form = run.table_form() if self._case.target.kind == "table" else run.form()
+            return form if until == "pop-up" else form.finished(run.progress)
+
+    def __repr__(self) -> str:
+        case = self._case
+        if case.target.kind == "table":
+            return f"<rodshell.Job: pop up {case.target.held.what}>"
+        what = case.drawings.name or (case.target.held.what if case.target.held else case.target.kind)
+        source = getattr(case.target, "file", None)
+        spacing = "auto" if case.layout.spacing == "auto" else " x ".join(map(length_text, case.layout.spacing))
+        seams = f", {len(case.seams.lines)} seams" if case.seams.lines else ""
+        return (
+            f"<rodshell.Job: {what}{f' {source}' if source else ''}, spacing {spacing}{seams}, "
+            f"{case.drape.method} drape, {case.joint.kind} joints, ends {' and '.join(case.ends) or 'none'}>"
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return self._case.absolute() == other._case.absolute() if isinstance(other, Job) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._case.absolute())
+
+    def __getstate__(self) -> Case:
+        return self._case
+
+    def __setstate__(self, case: Case) -> None:
+        self._set(case, None)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a Job is a value: use job.changed(...) in place of setting {name}")
+
+    def _set(self, case: Case, target: Target | None) -> None:
+        object.__setattr__(self, "_case", case)
+        object.__setattr__(self, "_target", target)
+
+
+def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
+    """The end conditions asked for, in their order."""
+    words = choices_of("ends", given, ("pinned", "clamped", "both"))
+    return ENDS if "both" in words else tuple(end for word in words for end in ENDS if end == word)
+
+
+def _ends_and_case(
+    source: "str | PathLike[str] | RodEnds", unit: str | None, overrides: dict[str, object]
+) -> tuple[RodEnds, Case]:
+    """The rods of a table or a result; and the result's case, or an empty one, with `overrides`."""
+    if isinstance(source, RodEnds):
+        return source, load_case(None, overrides)
+    path = Path(source)
+    if path.is_dir():
+        if unit is not None:
+            raise InputError(f"unit = {shown(unit)}: {path} is a result, which is in SI: leave it out")
+        earlier = read_result(path)
+        with reading(path) as file:
+            case = file("case.toml") if file("case.toml").is_file() else None
+            joint = {f"joint.{key}": value for key, value in earlier.joint.items()}
+            return earlier.ends, load_case(case, joint | overrides, otherwise={"rod": earlier.rod})
+    if not path.exists():
+        raise InputError(f"there is no file named {shown(str(path))}: give a table of rods, or the folder of a result")
+    return read_table(path, unit), load_case(None, overrides)
+
+
+def find_form(
+    target: Target,
+    layout: GridLayout,
+    rod: Rod,
+    *,
+    method: Method = Bound(),
+    anchor: tuple[float, float] | Auto | None = None,
+    joint: Joint | None = None,
+    ends: AskedEnds | Sequence[AskedEnds] = "both",
+    seams: Iterable[ArrayLike] = (),
+    patches: Mapping[str, PatchLayout] | None = None,
+    warm_start: Form | None = None,
+    progress: Progress = silent,
+    time_limit: float | None = None,
+) -> Form:
+    """From a target to the flat grid that pops up into it, with the proof: a `Job` of these objects, run.
+
+    Checks and fabrication are made when they are first asked for.
+
+    Parameters
+    ----------
+    target, layout, rod, method, anchor, joint, ends, seams, patches : as of `Job`.
+    warm_start, progress, time_limit : as of `Job.run`.
+
+    Raises
+    ------
+    InputError, NetLimitError, OutOfTimeError : as of `Job` and `Job.run`.
+    """
+    job = Job(
+        target, layout, rod,
+        method=method, anchor=anchor, joint=joint, ends=ends, seams=seams, patches=patches,
+    )  # fmt: skip
+    return job.run(warm_start=warm_start, progress=progress, time_limit=time_limit, until="pop-up")
+
+
+def pop_up_table(
+    grid: FlatGrid,
+    finals: ArrayLike,
+    rod: Rod,
+    *,
+    joint: Joint | None = None,
+    edge: float | None = None,
+    progress: Progress = silent,
+    time_limit: float | None = None,
+) -> Form:
+    """Pop up rods from elsewhere, pinned, from flat: a `Job` of a table of rods, run.
+
+    Parameters
+    ----------
+    grid : the rods, flat (see `straight_rods`).
+    finals : (m, 2, 3) where the ends of each rod go [m].
+    rod : section and material of every rod.
+    joint : where rods cross, see `pop_up`, without eccentricity; ball joints without.
+    edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
+    progress, time_limit : as of `Job.run`.
+
+    Raises
+    ------
+    InputError : `finals` does not fit `grid`; no rod has three joints; the joint is eccentric.
+    """
+    job = Job.of_table(RodEnds(grid, np.asarray(finals, dtype=float), edge), rod=rod, joint=joint)
+    return job.run(progress=progress, time_limit=time_limit, until="pop-up")

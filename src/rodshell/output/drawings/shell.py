@@ -1,0 +1,282 @@
+"""Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rodshell.arrays import Bools, Floats, Ints
+from rodshell.output.drawing import (
+    BELOW,
+    INK,
+    LAYERS,
+    LETTER,
+    LINE,
+    PALE,
+    SMALL,
+    SOFT,
+    Drawing,
+    Pen,
+    Pencil,
+    Text,
+)
+from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.grid import joint_places, outlines_of, rods_of
+from rodshell.output.labels import Room, callouts, closed_segments, outward, runs_through, upright
+from rodshell.output.schedules import seam_meetings
+from rodshell.results import Archive
+from rodshell.results.wording import Rounding, nice_ticks, rounding_of
+
+SUPPORTS_LEGEND = (
+    "Red: where each rod ends and how it goes on. A thin line leads to its name: rod.0 its start, rod.1 its end.",
+    "Blue: straight lines from rod end to rod end{seams}; the edge itself may run outside them.",
+)
+RADIUS, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
+NUMBER_SIZES = (1.0, 0.9, 0.82, SMALL)  # sizes of a number that are tried, in text sizes
+CLEAR = 0.2  # of its size, between a number and the middle of its cell
+SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, and its baseline off it in its sizes
+
+
+def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
+    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m]."""
+    return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
+
+
+def elevations_drawing(archive: Archive, text: float) -> Drawing:
+    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
+    pencil, final = Pencil(), archive.final
+    assert final is not None
+    curves = rod_curves(archive, archive.states[final])
+    heights = np.concatenate(curves)[:, 2]
+    tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.results)
+    for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
+        flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
+        for curve in flat:
+            pencil.line(thinned(curve), "CUT", pen=Pen(INK, 0.08 * text))
+        cloud = np.concatenate(flat)
+        low, high = cloud.min(axis=0), cloud.max(axis=0)
+        _span(pencil, (low[0], low[1] - 1.5 * text), (high[0], low[1] - 1.5 * text), high[0] - low[0], text, rounding)
+        _span(pencil, (low[0] - 1.5 * text, low[1]), (low[0] - 1.5 * text, high[1]), high[1] - low[1], text, rounding)
+        pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
+        pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
+    return pencil.done("elevations", "Elevations", text)
+
+
+def erection_drawing(archive: Archive, text: float) -> Drawing:
+    """Ways of the rod ends from flat to their supports, seen from above, and the shell's side at each stage."""
+    pencil, history = Pencil(), archive.states["history"]
+    assert archive.results.deployment is not None
+    stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
+    ends = np.concatenate([rod.nodes[[0, -1]] for rod in rods_of(archive) if len(rod.nodes) > 1])
+    ways = 1e3 * history[:, ends, :2]
+    for way in ways.transpose(1, 0, 2):
+        pencil.line(way[[0, -1]], "DIM", pen=Pen("#b08a2e", 0.1 * text))
+    for k, places in enumerate(ways):
+        last = k == len(ways) - 1
+        for at in places:
+            pencil.mark(at, (0.3 if last else 0.12) * text, "MARK" if last else "DIM", pen=Pen(SOFT, 0.05 * text))
+    low, high = ways.reshape(-1, 2).min(axis=0), ways.reshape(-1, 2).max(axis=0)
+    pencil.write("Ways of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
+    left, top = high[0] + 8 * text, high[1]
+    for k, (stage, positions) in enumerate(zip(stages, history, strict=True)):
+        if k == len(stages) // 2 + 1:
+            left, top = left + high[0] - low[0] + 8 * text, high[1]
+        curves = [curve[:, [0, 2]] for curve in rod_curves(archive, positions)]
+        cloud = np.concatenate(curves)
+        tall = float(np.ptp(cloud[:, 1]))
+        shift = np.array([left - low[0], top - tall - cloud[:, 1].min()])
+        for curve in curves:
+            pencil.line(thinned(curve) + shift, "CUT", pen=Pen(INK, 0.04 * text))
+        words = f"{k}: deployment {100 * stage.share:.0f} %, {mm(stage.height)} mm high"
+        pencil.write(words, (left, top - tall - 1.8 * text), text, "LABEL")
+        top -= tall + 5 * text
+    return pencil.done("erection", "Erection stages, front elevations", text)
+
+
+def thinned(curve: Floats) -> Floats:
+    """A curve by about every third of its nodes, its ends kept."""
+    return curve[np.unique(np.append(np.arange(0, len(curve), 3), len(curve) - 1))]
+
+
+def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
+    """The rods of the final shape, pale."""
+    assert archive.final is not None
+    for curve in rod_curves(archive, archive.states[archive.final]):
+        pencil.line(thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
+
+
+def _span(
+    pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, rounding: Rounding
+) -> None:
+    """A dimension line with its length [mm] next to it."""
+    start, end = np.array(a), np.array(b)
+    along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    across = 0.4 * text * np.array([-along[1], along[0]])
+    pencil.line([start, end], "DIM")
+    for place_ in (start, end):
+        pencil.line([place_ - across, place_ + across], "DIM")
+    angle = float(np.arctan2(along[1], along[0]))
+    side = 0.5 * text * np.array([-along[1], along[0]]) if angle else np.array([0.0, -1.4 * text])
+    pencil.write(rounding.mm(1e-3 * length), 0.5 * (start + end) + side, text, "DIM", anchor="middle", angle=angle)
+
+
+def axes(pencil: Pencil, text: float) -> None:
+    """Ticks of x and y [mm] along two sides of all that is there."""
+    low, high = pencil.done("", "", text).box()
+    low, high = low - text, high + text
+    pencil.line([(low[0], high[1]), low, (high[0], low[1])], "DIM")
+    for value in nice_ticks(low[0], high[0], 6):
+        pencil.line([(value, low[1]), (value, low[1] + 0.4 * text)], "DIM")
+        pencil.write(f"{value:g}", (value, low[1] - 1.1 * text), 0.8 * text, "DIM", anchor="middle")
+    for value in nice_ticks(low[1], high[1], 6):
+        pencil.line([(low[0], value), (low[0] + 0.4 * text, value)], "DIM")
+        pencil.write(f"{value:g}", (low[0] - 0.4 * text, value - 0.3 * text), 0.8 * text, "DIM", anchor="end")
+
+
+# Supports
+
+
+def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
+    """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
+    pencil, final = Pencil(), archive.final
+    assert final is not None
+    seen_from_above(pencil, archive, text)
+    drawn = [rod for rod in plan.rods if len(rod.nodes) > 1]
+    curves = [curve[:, :2] for curve in rod_curves(archive, archive.states[final])]
+    ends = np.array([curve[[0, -1]] for curve in curves]).reshape(-1, 2)
+    arrives = np.array([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).reshape(-1, 2)
+    arrives /= np.maximum(np.linalg.norm(arrives, axis=1), 1e-9)[:, None]
+    names = [f"{rod.id}.{end}" for rod in drawn for end in (0, 1)]
+    room, tick = Room(4 * text), Pen(LAYERS["MARK"].colour, 0.12 * text)
+    for name, end, way in zip(names, ends, arrives, strict=True):
+        pencil.mark(end, RADIUS * text, "MARK", note=name)
+        pencil.line([end, end + TICK * text * way], "MARK", pen=tick)
+        room.take(end + RADIUS * text * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
+    lines = np.concatenate([_segments(thinned(thinned(curve))) for curve in curves])  # what names keep clear of
+    alone = ~np.isin(names, list(_sewn(archive)))
+    for seam in (run for loop in outlines_of(drawn) for run in _runs(loop, ~alone) if len(run) > 1):
+        pencil.line(ends[seam], "BOUNDARY-FINAL")
+    walks, left_out = list(_walks(outlines_of(drawn), ends, alone)), 0
+    for walk in walks:
+        if len(walk) > 1:
+            pencil.line(ends[walk], "BOUNDARY-FINAL", closed=True)
+            lines = np.concatenate([lines, closed_segments(ends[walk])])
+    for walk in walks:
+        away = outward(ends[walk])
+        away = np.where(np.any(away, axis=1, keepdims=True), away, arrives[walk])
+        found = callouts([names[end] for end in walk], ends[walk], away, text, room, lines)
+        left_out += len(walk) - len(found)
+        for callout in found:
+            pencil.texts.append(callout.written)
+            pencil.line(callout.line, "DIM")
+    pencil.leave_out(left_out, int(alone.sum()), "names of rod ends (table Supports has their places)")
+    _meetings(pencil, archive, text, room)
+    axes(pencil, text)
+    low, _ = pencil.done("", "", text).box()
+    for k, line in enumerate(SUPPORTS_LEGEND, start=1):
+        written = line.format(seams="" if alone.all() else ", and seams")
+        pencil.write(written, low - (0.0, 1.5 * k * text), text, "DIM")
+    return pencil.done("supports", "Support plan", text)
+
+
+def _walks(outlines: list[Ints], ends: Floats, alone: Bools) -> Iterator[Ints]:
+    """The ends that are `alone`, not sewn, in their order around the whole shell, its openings, and what is by itself.
+
+    outlines : the ends around each grid and its openings. Where a seam ends, a walk goes on along the next patch.
+    """
+    runs = [run for loop in outlines for run in _runs(loop, alone)]
+    while runs:
+        walk = [runs.pop(0)]
+        while True:
+            starts = np.array([ends[run[0]] for run in (walk[0], *runs)])
+            nearest = int(np.linalg.norm(starts - ends[walk[-1][-1]], axis=1).argmin())
+            if nearest == 0:
+                break
+            walk.append(runs.pop(nearest - 1))
+        yield np.concatenate(walk)
+    on_none = np.setdiff1d(np.flatnonzero(alone), np.concatenate([[], *outlines]).astype(np.intp))
+    yield from on_none[:, None]
+
+
+def _runs(loop: Ints, alone: Bools) -> list[Ints]:
+    """The ends of an outline that are `alone`, run by run between the others; all of it where there are none."""
+    turned = np.roll(loop, -int(np.argmin(alone[loop])))
+    parts = [run[alone[run]] for run in np.split(turned, np.flatnonzero(~alone[turned]))]
+    return [run for run in parts if len(run)]
+
+
+def _sewn(archive: Archive) -> set[str]:
+    """The rod ends on seams; these have the number of their meeting instead of a name."""
+    return {end for seam in archive.results.seams for meeting in seam.meetings for end in meeting.ends}
+
+
+def _segments(curve: Floats) -> Floats:
+    """(k - 1, 2, 2) the parts of a polyline (k, 2)."""
+    return np.stack([curve[:-1], curve[1:]], axis=1)
+
+
+def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None:
+    """The numbers of the places on seams where rods meet, as in the table of the seams, where there is room."""
+    size, left_out = SMALL * text, 0
+    for number, meeting in seam_meetings(archive.results):
+        at = 1e3 * np.array(meeting.point[:2])
+        for corner in ((0.5, 0.4), (-0.5, 0.4), (0.5, -1.1), (-0.5, -1.1)):
+            anchor = "start" if corner[0] > 0 else "end"
+            pencil.write(number, at + text * np.array(corner), size, "LABEL", anchor=anchor)
+            if room.claim(pencil.texts[-1].box()):
+                break
+            pencil.texts.pop()
+        else:
+            left_out += 1
+    pencil.leave_out(left_out, sum(1 for _ in seam_meetings(archive.results)), "numbers of meetings (table Seams)")
+
+
+# Bracing
+
+
+def bracing_drawing(archive: Archive, text: float) -> Drawing:
+    """The diagonals of the cells in the final shape, seen from above, with their true lengths.
+
+    Each number stands off all rods and diagonals of its cell, as large as finds room; where there is none the table
+    has it.
+    """
+    pencil, final = Pencil(), archive.final
+    assert final is not None
+    seen_from_above(pencil, archive, text)
+    places = joint_places(archive, archive.states[final])
+    known = archive.results.fabrication.bracing if archive.results.fabrication else ()
+    cells = zip(known[::2], known[1::2], strict=True)  # both diagonals of a cell follow each other
+    drawn = [cell for cell in cells if all({brace.start, brace.end} <= places.keys() for brace in cell)]
+    braces = [brace for cell in drawn for brace in cell]
+    ends = 1e3 * np.array([[places[end][:2] for end in (brace.start, brace.end)] for brace in braces])
+    ends = ends.reshape(-1, 2, 2)
+    for brace, line in zip(braces, ends, strict=True):
+        pencil.line(line, "DIM", pen=Pen("#b08a2e", 0.07 * text), note=f"{brace.start} to {brace.end}")
+    other = ends.reshape(-1, 2, 2, 2)[:, ::-1].reshape(-1, 2, 2)
+    mm = rounding_of(archive.results).mm
+    found = _numbers([mm(brace.final) for brace in braces], ends, other, text)
+    pencil.texts += found
+    pencil.leave_out(len(braces) - len(found), len(braces), "lengths of diagonals (table Bracing)")
+    axes(pencil, text)
+    return pencil.done("bracing", "Bracing, true lengths in the final shape", text)
+
+
+def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list[Text]:
+    """The numbers that find room along the diagonals (n, 2, 2) of cells with the `other` diagonals (n, 2, 2)."""
+    (a, b), (c, d) = ends.transpose(1, 0, 2), other.transpose(1, 0, 2)
+    angle = np.array([upright(float(direction)) for direction in np.arctan2(*(b - a).T[::-1])])
+    along, above = (np.column_stack(pair) for pair in ((np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))))
+    middle, wide = 0.5 * (a + b), LETTER * np.array([len(word) for word in words], dtype=float)
+    lines = np.stack([[a, c], [c, b], [b, d], [d, a], [a, b], [c, d]]).transpose(2, 0, 1, 3) - middle[:, None, None]
+    seen = np.einsum("nkpi,jni->nkpj", lines, np.stack([along, above]))  # along and across the diagonal
+    room, found = Room(3 * text), dict[int, Text]()
+    for size, (side, up) in ((text * share, side) for share in NUMBER_SIZES for side in SIDES):
+        off = side * (CLEAR + 0.5 * wide) * size
+        centre = np.column_stack([off, np.full(len(words), (up + 0.5 * LINE - BELOW) * size)])
+        half = 0.5 * size * np.column_stack([wide, np.full(len(words), LINE)])
+        met = runs_through((seen - centre[:, None, None]) / half[:, None, None]).any(axis=1)
+        for k in np.flatnonzero(~met).tolist():
+            at = middle[k] + off[k] * along[k] + up * size * above[k]
+            written = Text(words[k], at, size, "LABEL", "middle", float(angle[k]), colour="#6b5212")
+            if k not in found and room.claim(written.box()):
+                found[k] = written
+    return list(found.values())

@@ -1,0 +1,213 @@
+"""The grid of an archive: its rods and joints in the flat plan, and its shapes from flat to popped up."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import OutputError
+from rodshell.layout.outline import outlines
+from rodshell.results.archive import BENT, GAPS, SHELLS, Archive, made_once
+from rodshell.results.records import Rod
+
+CAPTIONS = {
+    "flat": "Flat, as cut and laid out",
+    "draped": "Draped on the target",
+    "popped_pinned": "Popped up, pinned ends (free to turn)",
+    "popped_clamped": "Popped up, clamped ends (directions held)",
+}
+STAGE = "stage_"
+
+
+@dataclass(frozen=True)
+class GridRod:
+    """One rod of a result, with its geometry.
+
+    Parameters
+    ----------
+    record : what the result knows of it.
+    flat : (2, 2) x, y of its two ends in the flat state [m].
+    nodes : (k,) its nodes in the states, from start to end; empty if the states do not hold them.
+    """
+
+    record: Rod
+    flat: Floats
+    nodes: Ints
+
+    @property
+    def id(self) -> str:
+        return self.record.id
+
+    @property
+    def family(self) -> str:
+        return self.record.family
+
+    @property
+    def length(self) -> float:
+        """Between its supports [m]."""
+        return self.record.end - self.record.start if self.record.length is None else self.record.length
+
+    @property
+    def joints(self) -> tuple[tuple[str, float], ...]:
+        """Of each joint the id of the rod that is met, and the distance from the start [m]."""
+        return tuple((joint.other, joint.at) for joint in self.record.joints)
+
+    @property
+    def cut_length(self) -> float:
+        """With its end allowances [m]."""
+        return self.length if self.record.cut_length is None else self.record.cut_length
+
+    @property
+    def allowance(self) -> float:
+        """Length that is added at each end [m]."""
+        return 0.5 * (self.cut_length - self.length)
+
+    def from_cut_end(self, at: float) -> float:
+        """Distance from the cut end of the start [m] of what lies at the distance `at` from the start."""
+        return at + self.allowance
+
+    def point(self, at: float) -> Floats:
+        """(2,) x, y [m] of the flat point at the distance `at` from the start."""
+        along = self.flat[1] - self.flat[0]
+        return np.asarray(self.flat[0] + at / np.linalg.norm(along) * along)
+
+
+@dataclass(frozen=True)
+class GridJoint:
+    """Where two rods meet: rod indices, and the distance from each rod's start [m]."""
+
+    rods: tuple[int, int]
+    at: tuple[float, float]
+    id: str
+
+    def over(self, rods: list[GridRod]) -> str:
+        """The id of the rod that lies above, or "" where the layers are not known."""
+        low, high = (rods[k].record for k in self.rods)
+        if low.layer is None or high.layer is None:
+            return ""
+        return low.id if low.layer > high.layer else high.id
+
+
+@made_once
+def rods_of(archive: Archive) -> list[GridRod]:
+    """All rods, in the order of the result."""
+    nodes = _nodes(archive)
+    flat = archive.states.get("flat")
+    return [
+        _grid_rod(rod, nodes[k] if k < len(nodes) else np.empty(0, dtype=np.intp), flat)
+        for k, rod in enumerate(archive.results.rods)
+    ]
+
+
+def joints_of(rods: list[GridRod]) -> list[GridJoint]:
+    """Every joint once, in the order of the rods; the rod that comes first is named first."""
+    index = {rod.id: k for k, rod in enumerate(rods)}
+    back = {(rod.id, other): at for rod in rods for other, at in rod.joints}
+    return [
+        GridJoint((k, index[other]), (at, back[other, rod.id]), f"{rod.id}/{other}")
+        for k, rod in enumerate(rods)
+        for other, at in rod.joints
+        if index.get(other, -1) > k and (other, rod.id) in back
+    ]
+
+
+def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
+    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods."""
+    return {name: positions[nodes].mean(axis=0) for name, nodes in _joint_nodes(archive).items()}
+
+
+def outlines_of(rods: list[GridRod]) -> list[Ints]:
+    """Rod ends along each outline of the flat grid, see `outlines`."""
+    return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
+
+
+@made_once
+def _joint_nodes(archive: Archive) -> dict[str, list[int]]:
+    """The nodes of each joint that has some, on both of its rods, by its id: one node twice, or one in either layer."""
+    rods, flat = rods_of(archive), archive.states.get("flat")
+    nodes = dict[str, list[int]]()
+    if flat is None:
+        return nodes
+    stations = [np.linalg.norm(flat[rod.nodes] - flat[rod.nodes[:1]], axis=1) for rod in rods]
+    for joint in joints_of(rods):
+        if all(len(rods[k].nodes) for k in joint.rods):
+            pairs = zip(joint.rods, joint.at, strict=True)
+            nodes[joint.id] = [int(rods[k].nodes[np.abs(stations[k] - at).argmin()]) for k, at in pairs]
+    return nodes
+
+
+@lru_cache(maxsize=4)
+def _outlines(flat: bytes) -> list[Ints]:
+    """Kept for the next drawing of the same grid."""
+    return outlines(np.frombuffer(flat).reshape(-1, 2, 2))
+
+
+def _nodes(archive: Archive) -> list[Ints]:
+    if "rod_nodes" not in archive.states or "rod_start" not in archive.states:
+        return []
+    return np.split(archive.states["rod_nodes"].astype(np.intp), archive.states["rod_start"][1:])
+
+
+def _grid_rod(rod: Rod, nodes: Ints, flat: Floats | None) -> GridRod:
+    if rod.family == "u" and rod.offset is not None:
+        ends = np.array([[rod.start, rod.offset], [rod.end, rod.offset]])
+    elif rod.family == "v" and rod.offset is not None:
+        ends = np.array([[rod.offset, rod.start], [rod.offset, rod.end]])
+    elif flat is not None and len(nodes):
+        ends = np.asarray(flat[nodes[[0, -1]], :2], dtype=np.float64)
+    else:
+        ends = np.array([[rod.start, 0.0], [rod.end, 0.0]])
+    return GridRod(rod, ends, nodes)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One shape of the grid.
+
+    Parameters
+    ----------
+    name : "flat", "draped", "popped_pinned", "popped_clamped", or "stage_1", ... of the deployment.
+    positions : (n, 3) [m].
+    gap : (n,) signed distances to the target [m], where known.
+    stress : (k,) [Pa] and curvature : (k,) [1/m] at each entry of `rod_nodes`, where known.
+    """
+
+    name: str
+    caption: str
+    positions: Floats
+    gap: Floats | None = None
+    stress: Floats | None = None
+    curvature: Floats | None = None
+
+    @property
+    def flat(self) -> bool:
+        return self.name == "flat"
+
+
+def shape_names(archive: Archive) -> list[str]:
+    """All shapes, in the order in which they come about."""
+    stages = [f"{STAGE}{k}" for k in range(1, len(archive.states.get("history_share", ())) - 1)]
+    states = archive.states
+    return [name for name in ("flat", *stages, *SHELLS) if name.startswith(STAGE) or name in states]
+
+
+def shape_of(archive: Archive, name: str) -> Shape:
+    """A shape by its name.
+
+    Raises
+    ------
+    OutputError : the archive has no such shape.
+    """
+    known, states = shape_names(archive), archive.states
+    if name not in known:
+        raise OutputError(f"no state {name!r} in this result: it has {', '.join(known) or 'none'}")
+    if name.startswith(STAGE):
+        k = int(name.removeprefix(STAGE))
+        caption = f"Deployment at {100 * states['history_share'][k]:.0f} %"
+        curvature, stress = (states[f"history_{what}"][k] if f"history_{what}" in states else None for what in BENT)
+        return Shape(name, caption, np.asarray(states["history"][k], dtype=float), None, stress, curvature)
+    ends = name.removeprefix("popped_")
+    curvature, stress = (states.get(f"{what}_{ends}") for what in BENT)
+    gap = states.get(GAPS.get(name, ""))
+    return Shape(name, CAPTIONS[name], np.asarray(states[name], dtype=float), gap, stress, curvature)

@@ -1,0 +1,189 @@
+"""The shell in space for other programs: OBJ and VTK polylines, COMPAS, Rhino.
+
+Rhino files are in millimetres, all others in metres. In VTK two rods share no points, so that a joint can have the
+stress of both; arrays are binary (base64, packed). COMPAS JSON is plain JSON, so that COMPAS need not be installed:
+`compas.json_load("popped_clamped.json")` gives {"rods": [Polyline, ...], "grid": Graph}.
+"""
+
+import base64
+import json
+import tempfile
+import zlib
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
+from rodshell.output.drawings.flat import FlatPlan
+from rodshell.output.grid import STAGE, Shape, joint_places, joints_of, rods_of, shape_names, shape_of
+from rodshell.output.svg import tag
+from rodshell.results import Archive
+
+COMPRESSION = 3  # half the time of 6, for files that are 5 % longer
+COLOURS = {"CUT": (34, 40, 47), "MARK": (179, 55, 44), "FINAL": (31, 95, 139), "BOUNDARY-FINAL": (43, 122, 75)}
+
+
+def obj_text(archive: Archive, state: str) -> str:
+    """All nodes [m], then one object with one polyline for each rod."""
+    lines = [
+        f"# rodshell, {state}, metres",
+        *(f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in archive.states[state]),
+    ]
+    for rod in rods_of(archive):
+        if len(rod.nodes) > 1:
+            lines += [f"o {' '.join(rod.id.split()) or 'rod'}", "l " + " ".join(map(str, rod.nodes + 1))]
+    return "\n".join(lines) + "\n"
+
+
+def vtp_text(archive: Archive, name: str) -> str:
+    """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`."""
+    shape = shape_of(archive, name)
+    rods = [(k, rod.nodes) for k, rod in enumerate(rods_of(archive)) if len(rod.nodes) > 1]
+    nodes = archive.states["rod_nodes"]
+    offsets = np.cumsum([len(nodes_of_rod) for _, nodes_of_rod in rods], dtype=np.int64)
+    counts = {"Points": len(nodes), "Lines": len(rods), "Verts": 0, "Strips": 0, "Polys": 0}
+    piece = tag(
+        "Piece",
+        tag("PointData", *(_data_array(key, values) for key, values in _known(shape, nodes)), ""),
+        tag("CellData", _data_array("rod", np.array([k for k, _ in rods], dtype=np.int64))),
+        tag("Points", _data_array("Points", shape.positions[nodes], NumberOfComponents="3")),
+        tag("Lines", _data_array("connectivity", np.arange(len(nodes))), _data_array("offsets", offsets)),
+        **{f"NumberOf{key}": str(count) for key, count in counts.items()},
+    )
+    return _vtk_file("PolyData", tag("PolyData", piece))
+
+
+def time_series(archive: Archive) -> Iterator[tuple[str, str]]:
+    """Names and contents of the stages from flat to popped, and of the collection that ParaView opens."""
+    stages = [name for name in shape_names(archive) if name.startswith(STAGE)]
+    if not stages:
+        return
+    shares = archive.states["history_share"]
+    last = "popped_pinned"
+    entries = []
+    for share, name in zip(shares.tolist(), ["flat", *stages, last], strict=True):
+        yield f"pop_up/{name}.vtp", vtp_text(archive, name)
+        entries.append(tag("DataSet", timestep=f"{share:.6f}", group="", part="0", file=f"pop_up/{name}.vtp"))
+    yield "pop_up.pvd", _vtk_file("Collection", tag("Collection", *entries))
+
+
+def _known(shape: Shape, nodes: Ints) -> Iterator[tuple[str, Floats]]:
+    if shape.gap is not None and np.isfinite(shape.gap).all():
+        yield "gap", shape.gap[nodes]
+    for key, values in (("stress", shape.stress), ("curvature", shape.curvature)):
+        if values is not None:
+            yield key, np.asarray(values, dtype=np.float64)
+
+
+def _data_array(name: str, values: NDArray[np.generic], **attributes: str) -> str:
+    kind = {"f": "Float64", "i": "Int64"}[values.dtype.kind]
+    data = np.ascontiguousarray(values).tobytes()
+    packed = zlib.compress(data, COMPRESSION)
+    header = np.array([1, len(data), len(data), len(packed)], dtype=np.uint32).tobytes()
+    text = (base64.b64encode(header) + base64.b64encode(packed)).decode()
+    return tag("DataArray", text, type=kind, Name=name, format="binary", **attributes)
+
+
+def _vtk_file(kind: str, body: str) -> str:
+    head = {"version": "1.0", "byte_order": "LittleEndian", "compressor": "vtkZLibDataCompressor"}
+    words = " ".join(f'{key}="{value}"' for key, value in head.items())
+    return f'<?xml version="1.0"?>\n<VTKFile type="{kind}" {words} header_type="UInt32">{body}</VTKFile>\n'
+
+
+def compas_json(archive: Archive, state: str) -> str:
+    """A state of the shell; the graph's nodes are joints, its edges the rods between them."""
+    positions, rods = archive.states[state], rods_of(archive)
+    places = joint_places(archive, positions)
+    lines = [
+        {
+            "dtype": "compas.geometry/Polyline",
+            "data": {"points": positions[rod.nodes].tolist()},
+            "name": rod.id,
+        }
+        for rod in rods
+        if len(rod.nodes) > 1
+    ]
+    node = {repr(name): dict(zip("xyz", at.tolist(), strict=True)) for name, at in places.items()}
+    edge: dict[str, dict[str, Any]] = {name: {} for name in node}
+    on_rod: dict[int, list[tuple[float, str]]] = {}
+    for joint in joints_of(rods):
+        for rod_index, at in zip(joint.rods, joint.at, strict=True):
+            on_rod.setdefault(rod_index, []).append((at, repr(joint.id)))
+    for rod_index, row in on_rod.items():
+        for (_, a), (_, b) in pairwise(sorted(row)):
+            edge[a][b] = {"rod": rods[rod_index].id}
+    graph = {
+        "dtype": "compas.datastructures/Graph",
+        "data": {
+            "attributes": {},
+            "default_node_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
+            "default_edge_attributes": {},
+            "node": node,
+            "edge": edge,
+            "max_node": -1,
+        },
+        "name": archive.name,
+    }
+    return json.dumps({"rods": lines, "grid": graph}, ensure_ascii=False) + "\n"
+
+
+def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
+    """The whole model.
+
+    Raises
+    ------
+    InputError : rhino3dm is not installed.
+    """
+    try:
+        import rhino3dm as r
+    except ImportError as error:
+        raise InputError('a 3dm file needs the package rhino3dm: pip install "rodshell[rhino]"') from error
+
+    model: Any = r.File3dm()
+    model.Settings.ModelUnitSystem = r.UnitSystem.Millimeters
+    layers = {}
+    for name, colour in COLOURS.items():
+        layer = r.Layer()
+        layer.Name, layer.Color = name, (*colour, 255)
+        layers[name] = model.Layers.Add(layer)
+
+    def about(where: str, name: str, figures: dict[str, str] | None = None):  # type: ignore[no-untyped-def]
+        attributes: Any = r.ObjectAttributes()
+        attributes.Name, attributes.LayerIndex = name, layers[where]
+        for key, value in (figures or {}).items():
+            attributes.SetUserString(key, value)
+        return attributes
+
+    def polyline(points: np.ndarray):  # type: ignore[no-untyped-def]
+        result = r.Point3dList()
+        for x, y, z in points.tolist():
+            result.Add(x, y, z)
+        return result
+
+    mm = plan.rounding.mm
+    for rod, cut in zip(plan.rods, plan.cuts, strict=True):
+        figures = {"length_mm": mm(rod.length), "cut_length_mm": mm(rod.cut_length)}
+        joints = " ".join(f"{other}:{mm(rod.from_cut_end(at))}" for other, at in rod.joints)
+        figures |= {"layer": str(rod.record.layer), "joints_from_cut_end_mm": joints}
+        (x0, y0), (x1, y1) = cut.tolist()
+        model.Objects.AddLine(r.Point3d(x0, y0, 0.0), r.Point3d(x1, y1, 0.0), about("CUT", rod.id, figures))
+        if archive.final and len(rod.nodes) > 1:
+            curve = 1e3 * archive.states[archive.final][rod.nodes]
+            model.Objects.AddPolyline(polyline(curve), about("FINAL", rod.id, figures))
+    for joint, (x, y) in zip(plan.joints, plan.marks.tolist(), strict=True):
+        model.Objects.AddPoint(r.Point3d(x, y, 0.0), about("MARK", joint.id))
+    if archive.final:
+        for name, at in joint_places(archive, archive.states[archive.final]).items():
+            model.Objects.AddPoint(r.Point3d(*(1e3 * at).tolist()), about("MARK", name))
+    for outline in plan.boundary:
+        closed = np.vstack([outline, outline[:1]])
+        model.Objects.AddPolyline(polyline(closed), about("BOUNDARY-FINAL", "boundary"))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.3dm"
+        model.Write(str(path), 7)
+        return path.read_bytes()

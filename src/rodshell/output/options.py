@@ -1,0 +1,132 @@
+"""Options of checks, fabrication and drawings: all that does not decide the form."""
+
+import datetime
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from rodshell.errors import InputError
+from rodshell.fabrication import Fabrication
+from rodshell.joints import Joint
+from rodshell.output.drawing import LAYERS
+from rodshell.output.dxf import FORBIDDEN
+from rodshell.rods.section import Rod
+from rodshell.rods.section_stress import VON_MISES, require_known_stress
+
+PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
+MOST_STAGES = 1000
+
+
+@dataclass(frozen=True)
+class DrawingStyle:
+    """What the drawings of a set have in common.
+
+    Parameters
+    ----------
+    paper : of the PDF's sheets, landscape: A4 to A0.
+    project, revision : for the title block.
+    tolerance : of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
+        the title block says that it is not given.
+    layers : for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name.
+    name : of the drawings; "": the target's. author : for the title block.
+    date : for the title block, "2026-11-22"; "": the day on which the drawings are written.
+    """
+
+    paper: str = "A3"
+    project: str = ""
+    revision: str = ""
+    tolerance: float | None = None
+    layers: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
+    author: str = ""
+    date: str = ""
+
+    def __post_init__(self) -> None:
+        if self.paper not in PAPERS:
+            raise InputError(f'unknown paper size "{self.paper}": use {", ".join(PAPERS)}')
+        if self.tolerance is not None and not self.tolerance > 0:
+            raise InputError(f"the tolerance of drawings must be positive, not {self.tolerance} m")
+        try:
+            datetime.date.fromisoformat(self.date or "2000-01-01")
+        except ValueError:
+            raise InputError(f'the date of drawings cannot be "{self.date}": write a day as "2026-11-22"') from None
+        for layer, name in self.layers.items():
+            if layer not in LAYERS:
+                raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')
+            if not name.strip() or any(letter in FORBIDDEN or not letter.isprintable() for letter in name):
+                raise InputError(f'a layer cannot be called "{name}": a name has none of {FORBIDDEN}')
+        shown = [self.layers.get(layer, layer).upper() for layer in LAYERS]
+        if len(set(shown)) < len(shown):
+            twice = next(name for name in shown if shown.count(name) > 1)
+            raise InputError(f'two layers would be called "{twice}": give each its own name')
+
+    def parameters(self) -> dict[str, Any]:
+        """As it is kept in a result."""
+        return asdict(self) | {"layers": dict(self.layers)}
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """What is checked, made and drawn.
+
+    Parameters
+    ----------
+    strength : of the rods' material [Pa], by which utilisation is counted; None: it is not counted.
+    stages : equilibria of the deployment from flat; 0: it is not followed.
+    rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
+    shear_strength : of the rods' material [Pa], in addition to `strength`; None: stress is counted by von Mises.
+    strength_of : the preset material that the strengths are of, where they were not given.
+    """
+
+    strength: float | None = None
+    stages: int = 8
+    fabrication: Fabrication = field(default_factory=Fabrication)
+    drawings: DrawingStyle = field(default_factory=DrawingStyle)
+    rod_chosen: tuple[str, ...] = ()
+    shear_strength: float | None = None
+    strength_of: str | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("strength", self.strength), ("shear strength", self.shear_strength)):
+            if value is not None and not value > 0:
+                raise InputError(f"the {name} must be positive, not {value} Pa")
+        if self.shear_strength is not None and self.strength is None:
+            raise InputError(
+                f"a shear strength of {self.shear_strength:g} Pa does not say what bending may be: "
+                "give the strength too (checks.strength), or leave it out"
+            )
+        if not 0 <= self.stages <= MOST_STAGES:
+            raise InputError(f"the deployment can have 0 to {MOST_STAGES} stages, not {self.stages}")
+
+    @property
+    def shear_weight(self) -> float:
+        """Strength over shear strength; that of von Mises where no shear strength is given."""
+        if self.strength is None or self.shear_strength is None:
+            return VON_MISES
+        return self.strength / self.shear_strength
+
+    def judged_by(self, rod: Rod) -> "OutputOptions":
+        """The same with the strengths of the rod's preset material, where none was given."""
+        material = rod.material
+        if self.strength is not None or material is None or material.bending_strength is None:
+            return self
+        return replace(
+            self,
+            strength=material.bending_strength,
+            shear_strength=material.shear_strength,
+            strength_of=material.name,
+        )
+
+    def require_known_stress(self, rod: Rod, joint: Joint) -> None:
+        """InputError where a strength is given and the stress that it stands against cannot be known."""
+        if self.strength is not None:
+            require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)
+
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """As it stands in a case file."""
+        layers = {name.lower().replace("-", "_"): shown for name, shown in self.drawings.layers.items()}
+        return {
+            "checks": {"strength": self.strength, "stages": self.stages, "shear_strength": self.shear_strength},
+            "fabrication": asdict(self.fabrication),
+            "drawings": self.drawings.parameters() | {"layers": layers},
+        }

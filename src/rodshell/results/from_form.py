@@ -1,0 +1,350 @@
+"""From the stages of a job to what is kept of it: the records of result.json and the arrays of states.npz.
+
+This is the only file of the folder that knows the forms: in one piece, in patches, and from a table of rods.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from importlib.metadata import version
+from math import degrees
+from platform import python_version
+from typing import Any
+
+import numba
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from rodshell.arrays import Floats
+from rodshell.checks import Checks
+from rodshell.formfinding import Agreement as FoundAgreement
+from rodshell.formfinding import Draped, Footprint, PatchForm
+from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.patches import PatchedForm
+from rodshell.formfinding.seams import End
+from rodshell.formfinding.section_limits import is_flat
+from rodshell.joints import joint_parameters
+from rodshell.joints.joint import Joint as JointModel
+from rodshell.nets import ChebyshevNet
+from rodshell.results.records import (
+    Agreement,
+    Drape,
+    Dropped,
+    Joint,
+    Layout,
+    Meeting,
+    Net,
+    NetDeviation,
+    Patch,
+    PopUp,
+    Rest,
+    Rod,
+    RodJoint,
+    RodType,
+    Seam,
+    SeamForces,
+    Solve,
+    StrongBending,
+    Target,
+)
+from rodshell.results.results import Results, plain
+from rodshell.rods.materials import PRESETS
+from rodshell.rods.section import Rod as RodModel
+from rodshell.solve.report import SolveReport
+from rodshell.targets import Target as TargetSurface
+
+States = dict[str, NDArray[Any]]
+
+
+def results_of(stages: PatchForm | PatchedForm) -> Results:
+    """The results of a form, before it is checked."""
+    if isinstance(stages, PatchedForm):
+        return patches_results(stages)
+    return table_results(stages, "popup") if stages.from_table else form_results(stages)
+
+
+def states_of(stages: PatchForm | PatchedForm) -> States:
+    """The states of a form, before it is checked."""
+    if isinstance(stages, PatchedForm):
+        return patches_states(stages)
+    return table_states(stages) if stages.from_table else form_states(stages)
+
+
+def form_results(form: PatchForm) -> Results:
+    """The results of a form in one piece, before it is checked."""
+    found = Results(
+        **_head(form.target.name, form.status, form.warnings),
+        target=_target(form.target, flat=is_flat(form.trimmed.positions, form.rod)),
+        layout=Layout.model_validate(form.layout.parameters()),
+        rod=rod_type(form.rod),
+        joint=_joint(form.joint),
+        **_grid(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
+        end_tangents=form.trimmed.boundary.tangents.tolist(),
+        agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
+        drape=_drape(form.draped),
+        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
+    )
+    return found if form.draped.net is None else found.changed(net=_net(form.draped.net))
+
+
+def form_states(form: PatchForm) -> States:
+    """The states of a form in one piece."""
+    states = _mesh_states(form.footprint)
+    states["draped"] = form.trimmed.positions
+    states["gap_draped"] = form.target.gap(form.trimmed.positions).distance - form.trimmed.mesh.heights
+    for ends, shell in form.popped.items():
+        states[f"popped_{ends}"] = shell.positions
+        if ends in form.agreement:
+            states[f"gap_{ends}"] = form.agreement[ends].gaps
+    return states
+
+
+def table_results(table: PatchForm, name: str) -> Results:
+    """The results of a table of rods that was popped up, before it is checked."""
+    return Results(
+        **_head(name, table.status, table.warnings),
+        rod=rod_type(table.rod),
+        joint=_joint(table.joint),
+        **_grid(table.footprint, table.boundary.points, table.dropped),
+        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in table.popped.items()},
+    )
+
+
+def table_states(table: PatchForm) -> States:
+    """The states of a table of rods that was popped up."""
+    return _mesh_states(table.footprint) | {f"popped_{ends}": shell.positions for ends, shell in table.popped.items()}
+
+
+def patches_results(form: PatchedForm) -> Results:
+    """The results of a form in patches, before it is checked: those of one shell, with `patches` and `seams`."""
+    nets = [laid.net for laid in form.laid.values()]
+    tightest = min(nets, key=lambda net: net.min_angle)
+    return Results(
+        **_head(form.target.name, form.status, form.warnings),
+        target=_target(form.target, flat=is_flat(form.draped, form.rod)),
+        layout=Layout.model_validate(form.layout.parameters()),
+        rod=rod_type(form.rod),
+        joint=_joint(form.joint),
+        patches=tuple(_patch(form, name) for name in form.found),
+        seams=tuple(_seam(form, k) for k in range(len(form.seams))),
+        net=_net(tightest).changed(error_estimate=max(net.error_estimate for net in nets)),
+        **_grid(form.footprint, form.boundary.points, form.dropped),
+        end_tangents=form.boundary.tangents.tolist(),
+        agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
+        drape=_drape_of_all([_drape(found.draped) for found in form.found.values()]),
+        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
+    )
+
+
+def patches_states(form: PatchedForm) -> States:
+    """The states of a form in patches."""
+    states = _mesh_states(form.footprint)
+    states["draped"] = form.draped
+    states["gap_draped"] = form.target.gap(form.draped).distance
+    for ends, shell in form.popped.items():
+        states[f"popped_{ends}"] = shell.positions
+        if ends in form.agreement:
+            states[f"gap_{ends}"] = form.agreement[ends].gaps
+    return states
+
+
+def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Results:
+    """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces."""
+    row = {rod.name: k for k, rod in enumerate(form.footprint.rods)}
+    seams = []
+    for k, seam in enumerate(results.seams):
+        ends = [[_end_index(row, end) for end in meeting.ends] for meeting in form.meetings if meeting.seam == k]
+        index = np.array(ends, dtype=np.intp).reshape(-1, 2)
+        forces = {support: _seam_forces(held.forces[index].sum(axis=1)) for support, held in checks.reactions.items()}
+        seams.append(seam.changed(forces=forces))
+    return results.changed(seams=tuple(seams))
+
+
+def rod_type(rod: RodModel) -> RodType:
+    """Section, material and stiffnesses."""
+    first, second = rod.bend_stiffnesses
+    name = rod.material.name if rod.material is not None else None
+    known: dict[str, Any] = {**rod.parameters()}
+    if name is not None:
+        known["preset"] = {"name": name, **asdict(PRESETS[name])}
+    known |= {"EI": first} if first == second else {"EI1": first, "EI2": second}
+    return RodType.model_validate(
+        known | {"EA": rod.stretch_stiffness, "GJ": rod.twist_stiffness, "mass_per_length": rod.mass_per_length}
+    )
+
+
+def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
+    """What every result begins with."""
+    versions = {module.__name__: module.__version__ for module in (np, scipy, numba)}
+    return {
+        **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
+        "version_rodshell": version("rodshell"),
+        "versions": {"python": python_version(), **versions},
+        "name": name,
+        "status": status,
+        "warnings": tuple(warnings),
+    }
+
+
+def _target(target: TargetSurface, *, flat: bool) -> Target:
+    """The target's parameters, its size, and whether it is too flat for its rods to bend."""
+    known = {**plain(target.parameters()), "reference_size": target.size}
+    return Target.model_validate(known | ({"flat": True} if flat else {}))
+
+
+def _joint(joint: JointModel) -> Joint:
+    return Joint.model_validate(plain(joint_parameters(joint)))
+
+
+def _net(net: ChebyshevNet) -> Net:
+    return Net.model_validate(shape_of_net(net))
+
+
+def _drape(draped: Draped) -> Drape:
+    """Figures of a drape."""
+    more: dict[str, Any] = {}
+    if draped.rest is not None:
+        more["fall"] = Rest(**asdict(draped.rest))
+    if draped.eccentricity:
+        more["eccentricity"] = draped.eccentricity
+    if draped.figures.strong_bending is not None:
+        more["strong_bending"] = StrongBending(**asdict(draped.figures.strong_bending))
+    if draped.figures.net_deviation is not None:
+        off = np.abs(draped.figures.net_deviation)
+        more["net_deviation"] = NetDeviation(max=float(off.max()), median=float(np.median(off)))
+    return Drape(
+        method=draped.method.name,
+        status=draped.report.status.value,
+        dofs=draped.report.dofs,
+        levels=tuple(Solve(**_effort(level)) for level in draped.levels),
+        seconds=sum(level.seconds for level in draped.levels),
+        force_residual=draped.report.force_residual,
+        max_strain=draped.report.max_strain,
+        max_gap=draped.figures.max_gap,
+        negative_modes=draped.report.negative_modes,
+        min_angle_deg=degrees(draped.figures.min_angle),
+        min_angle_at=draped.figures.min_angle_at,
+        contact_pulls=draped.figures.contact_pulls,
+        **more,
+    )
+
+
+def _drape_of_all(parts: list[Drape]) -> Drape:
+    """Figures of the drapes of all patches: sums, and the worst of each kind."""
+    tightest = min(parts, key=lambda part: part.min_angle_deg or 0.0)
+    figures: dict[str, Any] = {
+        "levels": tuple(level for part in parts for level in part.levels),
+        "status": next((part.status for part in parts if part.status != "converged"), "converged"),
+    }
+    totals = ("dofs", "seconds", "negative_modes", "contact_pulls")
+    for name in (*totals, "force_residual", "max_strain", "max_gap"):
+        values = [getattr(part, name) for part in parts]
+        whole = sum if name in totals else max
+        figures[name] = None if None in values else whole(values)
+    if strong := [part.strong_bending for part in parts if part.strong_bending is not None]:
+        figures["strong_bending"] = max(strong, key=lambda found: (found.beyond or 0.0, found.moment or 0.0))
+    off = [part.net_deviation for part in parts if part.net_deviation is not None]
+    figures["net_deviation"] = NetDeviation(
+        max=max(found.max or 0.0 for found in off), median=max(found.median or 0.0 for found in off)
+    )
+    return tightest.changed(**figures)
+
+
+def _mesh_states(footprint: Footprint) -> States:
+    mesh = footprint.mesh
+    return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
+
+
+def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Rods with their joints, and rod ends."""
+    joints: list[list[RodJoint]] = [[] for _ in footprint.rods]
+    crossings = footprint.mesh.grid.crossings
+    for pair, at in zip(crossings.rods.tolist(), crossings.at.tolist(), strict=True):
+        for (k, other), distance in zip((pair, pair[::-1]), at, strict=True):
+            name, start = footprint.rods[other].name, footprint.rods[k].start
+            joints[k].append(RodJoint(other=name, at=distance - start))
+    rods = tuple(
+        Rod(
+            id=rod.name,
+            family=rod.family,
+            offset=rod.offset,
+            start=rod.start,
+            end=rod.end,
+            length=rod.length,
+            joints=tuple(sorted(on_rod, key=lambda joint: joint.at)),
+        )
+        for rod, on_rod in zip(footprint.rods, joints, strict=True)
+    )
+    return {
+        "rods": rods,
+        "dropped": tuple(Dropped(id=name, reason=reason) for name, reason in dropped),
+        "footprint": footprint.points.tolist(),
+        "boundary": boundary.tolist(),
+    }
+
+
+def _effort(report: SolveReport) -> dict[str, Any]:
+    return {
+        "dofs": report.dofs,
+        "status": report.status.value,
+        "iterations": report.iterations,
+        "factorizations": report.factorizations,
+        "seconds": report.seconds,
+    }
+
+
+def _pop_up(report: SolveReport, start: str) -> PopUp:
+    """Figures of a pop-up that began from the shape `start`."""
+    return PopUp(
+        **_effort(report),
+        start=start,
+        force_residual=report.force_residual,
+        max_strain=report.max_strain,
+        negative_modes=report.negative_modes,
+        stable=report.stable,
+    )
+
+
+def _agreement(gap: FoundAgreement) -> Agreement:
+    return Agreement(
+        max=gap.max, rms=gap.rms, max_relative=gap.max_relative, rms_relative=gap.rms_relative, where=gap.where
+    )
+
+
+def _patch(form: PatchedForm, name: str) -> Patch:
+    laid, found = form.laid[name], form.found[name]
+    return Patch(
+        id=name,
+        status=found.status,
+        rods=len(found.footprint.rods),
+        left_out=len(laid.layout.left_out),
+        anchor=laid.anchor,
+        rotate=laid.layout.rotate,
+        spacing=laid.layout.spacing,
+        flat_shift=form.flat.shifts[name].tolist(),
+        ends_moved=form.moved[name],
+        net=_net(laid.net),
+        agreement={ends: _agreement(gap) for ends, gap in found.agreement.items()},
+        drape=_drape(found.draped),
+        pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in found.popped.items()},
+    )
+
+
+def _seam(form: PatchedForm, index: int) -> Seam:
+    meetings = [
+        Meeting(point=plain(meeting.point), ends=(str(meeting.ends[0]), str(meeting.ends[1])))
+        for meeting in form.meetings
+        if meeting.seam == index
+    ]
+    return Seam(points=form.seams[index].points.tolist(), meetings=tuple(meetings))
+
+
+def _seam_forces(forces: Floats) -> SeamForces:
+    """Of the forces (k, 3) [N] at a seam's meetings."""
+    largest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    return SeamForces(each=forces.tolist(), largest=largest, sum=forces.sum(axis=0).tolist())
+
+
+def _end_index(row: Mapping[str, int], end: End) -> int:
+    """Row of a rod end among all, start and end of each rod in turn."""
+    return 2 * row[f"{end.patch}-{end.rod}"] + end.side

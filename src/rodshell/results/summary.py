@@ -1,0 +1,212 @@
+"""One screen of text about a result."""
+
+from collections.abc import Callable, Iterable, Iterator
+from math import degrees
+
+from rodshell.results.checked import Bending
+from rodshell.results.records import Bent, RodType
+from rodshell.results.results import Results
+from rodshell.results.verdict import unknown_below, verdict_of
+from rodshell.results.wording import (
+    NAMES,
+    case_rows,
+    percent,
+    rounded,
+    share_of_weight,
+    shown_length,
+    small,
+    stress,
+    whole_percent,
+)
+
+RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
+
+STAGES = ("pop_up", "deployment")  # of the deployment: with the final shape, and without
+STRAIGHT = 1e-6  # 1/m, rad/m: what is less is round-off
+MOST_DROPPED = 6  # rods that are listed
+
+Length = Callable[[float | None], str]
+
+
+def summary_text(results: Results) -> str:
+    """What was found, how good it is, and what to read first."""
+    length, verdict = shown_length(results), verdict_of(results)
+    joints = sum(len(rod.joints) for rod in results.rods) // 2
+    lines = [f"{results.name or 'rodshell'}: {verdict.headline}"]
+    lines += [f"            {reason}" for reason in verdict.reasons[1:]]
+    lines.append(f"  grid      {len(results.rods)} rods, {joints} joints")
+    if results.rod:
+        lines += _rod(results.rod, results.bending)
+    lines += _patches(results, length)
+    lines += _net_and_drape(results, length)
+    lines += _pop_up(results, length)
+    lines += _bending(results, length)
+    lines += _weight_and_reactions(results, length)
+    lines += _deployment(results)
+    lines += [f"  dropped   {rod.id}: {rod.reason}" for rod in results.dropped[:MOST_DROPPED]]
+    if len(results.dropped) > MOST_DROPPED:
+        lines.append(f"            and {len(results.dropped) - MOST_DROPPED} more, named in result.json")
+    return "\n".join(lines)
+
+
+def chosen(parts: Iterable[str]) -> str:
+    """That the program chose a rod's material, section or both."""
+    parts = list(parts)
+    return f"{' and '.join(parts)} {'were' if len(parts) > 1 else 'was'} not given: chosen to fit"
+
+
+def rod_text(rod: RodType) -> str:
+    """Section and material in a few words, and whether it is the paper's rubber."""
+    line = ", ".join(" ".join(row) for row in case_rows(rod.section)).removeprefix("kind ")
+    material = rod.material
+    if material is None:
+        return line
+    preset = material.preset if material.preset != "rubber" else None
+    line += f"; {preset}, " if preset else "; "
+    if material.youngs_modulus is not None and material.density is not None:
+        line += f"E = {stress(material.youngs_modulus)}, {rounded(material.density, 4)} kg/m3"
+    values = material.plain()
+    if preset:
+        known = rod.preset.plain() if rod.preset else {}
+        changed = [NAMES.get(key, key) for key, value in values.items() if known.get(key, value) != value]
+        return line + (f" ({' and '.join(changed)} not {preset}'s)" if changed else "")
+    rubber = [NAMES.get(key, key) for key, value in RUBBER.items() if values.get(key) == value]
+    if len(rubber) == len(RUBBER):
+        line += " (the paper's rubber; for another: rod.material)"
+    elif rubber:
+        verb = "are" if len(rubber) > 1 else "is"
+        line += f" ({' and '.join(rubber)} {verb} the paper's rubber's; for another: rod.material)"
+    return line
+
+
+def _rod(rod: RodType, bending: Bending | None) -> Iterator[str]:
+    """Section and material in a line; what is known of a preset, and what the program chose, in further lines."""
+    yield f"  rod       {rod_text(rod)}"
+    if rod.chosen:
+        reached = _reached(bending) if "section" in rod.chosen else ""
+        yield f"            {chosen(rod.chosen)}{reached}"
+    if rod.preset:
+        line = f"            {rod.preset.name}: {rod.preset.grade}"
+        if rod.preset.bending_strength is not None:
+            line += f"; bending strength {stress(rod.preset.bending_strength)}, {rod.preset.strength_note}"
+        yield line
+
+
+def _reached(bending: Bending | None) -> str:
+    """How a section was chosen, and the share of the strength that the final shapes use."""
+    if bending is None or bending.strength is None:
+        return ", as slender as the paper's rods, since no strength is known"
+    final = [bent.utilisation for bent in (bending.pinned, bending.clamped) if bent]
+    known = [used for used in final if used is not None]
+    reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
+    return f", aiming at half of the bending strength at most by an estimate of the bends; {reached}"
+
+
+def _patches(results: Results, length: Length) -> Iterator[str]:
+    """Each patch and each seam in a line."""
+    for patch in results.patches:
+        line = f"  patch {patch.id:<4}{patch.rods} rods, heading {degrees(patch.rotate or 0.0):.1f} deg"
+        if patch.net and patch.net.min_angle_deg is not None:
+            line += f"; smallest angle {patch.net.min_angle_deg:.1f} deg"
+        yield line + "".join(f"; {ends} gap rms {percent(gap.rms_relative)}" for ends, gap in patch.agreement.items())
+    moved = max((patch.ends_moved or 0.0 for patch in results.patches), default=0.0)
+    for number, seam in enumerate(results.seams, start=1):
+        line = f"  seam {number:<5}{len(seam.meetings)} rods of each side meet, ends moved by {length(moved)} at most"
+        for ends, force in seam.forces.items():
+            line += f"; {ends} force {rounded(force.largest or 0.0)} N at most"
+        yield line
+
+
+def _net_and_drape(results: Results, length: Length) -> Iterator[str]:
+    """How exact the net and the drape are."""
+    if net := results.net:
+        angle = "not known" if net.min_angle_deg is None else f"{net.min_angle_deg:.1f} deg"
+        yield f"  footprint error {length(net.error_estimate)} before extrapolation; smallest angle {angle}"
+    if drape := results.drape:
+        work = sum(level.factorizations or 0 for level in drape.levels)
+        gap = "gap" if drape.method == "bound" else "deepest node inside by"
+        yield (
+            f"  drape     {drape.method}: {drape.dofs} unknowns, {work} factorisations, {gap} {length(drape.max_gap)}, "
+            f"strain {small(drape.max_strain)}, negative modes {drape.negative_modes}"
+        )
+        if off := drape.net_deviation:
+            yield f"            drape against net, rod ends: max {length(off.max)}, median {length(off.median)}"
+
+
+def _pop_up(results: Results, length: Length) -> Iterator[str]:
+    """Whether each shell is stable, and how near it comes to the target."""
+    for ends, shell in results.pop_up.items():
+        state = "stable, unloaded" if shell.stable else f"{shell.status}, NOT STABLE"
+        line = f"  pop-up    {ends:<8}{state}, {shell.factorizations} factorisations"
+        if gap := results.agreement.get(ends):
+            line += f"; gap max {length(gap.max)} ({percent(gap.max_relative)}), "
+            line += f"rms {length(gap.rms)} ({percent(gap.rms_relative)})"
+        yield line
+
+
+def _bending(results: Results, length: Length) -> Iterator[str]:
+    """Bending, stress and utilisation, a line for each shape."""
+    bending, unknown = results.bending, unknown_below(results)
+    if bending is None or (results.target and results.target.flat):
+        return
+    strength = f"{bending.strength_of}'s bending strength" if bending.strength_of else "the strength"
+    for shape, bent in bending.shapes().items():
+        if (shape == "pop_up" and bending.deployment) or (shape in STAGES and unknown >= 1) or bent.min_radius is None:
+            continue  # the first is the deployment with the final shape
+        name = "stages" if shape in STAGES else shape
+        line = f"  bending   {name:<8}smallest radius {length(bent.min_radius)}{_curved(bent, length)}"
+        if bent.max_stress is not None:
+            line += f", largest stress {stress(bent.max_stress)}"
+        if bent.torsion_stress:
+            line += f" (torsion alone {stress(bent.torsion_stress)})"
+        if bent.utilisation is not None:
+            line += f", {percent(bent.utilisation)} of {strength}"
+        yield line + (f"; unknown below {whole_percent(unknown)} of it" if shape in STAGES and unknown else "")
+
+
+def _curved(bent: Bent, length: Length) -> str:
+    """How the rods are curved out of the shell and within it, by radii, and twisted."""
+    curved = ((bent.normal_curvature, "out of the shell"), (bent.geodesic_curvature, "within it"))
+    words = [f"{where} {length(1 / value)}" for value, where in curved if value is not None and value > STRAIGHT]
+    if bent.twist_rate is not None and bent.twist_rate > STRAIGHT:
+        words.append(f"twist {rounded(degrees(bent.twist_rate))} deg/m")
+    return f" ({', '.join(words)})" if words else ""
+
+
+def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
+    """How much of its own weight the shell bears, and the forces at its supports."""
+    least = " (weakest patch, its seam held)" if results.patches else ""
+    for ends, weighed in results.self_weight.items():
+        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}{least}"
+        if weighed.deflection is not None:
+            line += f"; deflection under it: {length(weighed.deflection)}"
+        yield line
+    for ends, held in results.reactions.items():
+        sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
+        yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N; sums of {sums}"
+
+
+def _deployment(results: Results) -> Iterator[str]:
+    """Whether the shell is reached from flat, and what other shapes it has."""
+    if deployment := results.deployment:
+        snaps = ", ".join(whole_percent(start) for start, _ in deployment.snaps)
+        words = {
+            True: f"reached, snapping at {snaps}" if snaps else "reached",
+            False: "ends in another shape",
+            None: "not known whether it is reached",
+        }
+        yield f"  from flat {deployment.ends or 'pinned':<8}{words[deployment.reached_from_flat]}"
+        if deployment.clamped and deployment.clamped.reached_from_flat:
+            yield "  from flat clamped reached: the ends are turned into their clamps after the deployment"
+    for ends, searched in results.other_shapes.items():
+        others = [shape for shape in searched.found if not shape.mirror]
+        found = ["its mirror image"] if len(others) < len(searched.found) else []
+        if others:
+            near = min(others, key=lambda shape: shape.distance or 0.0)
+            found.append(
+                f"{len(others)} other stable shape{'s' if len(others) > 1 else ''}, the nearest "
+                f"{percent(near.distance)} of half its width away at {rounded(near.energy or 0.0)} times the energy"
+            )
+        elif searched.tried:
+            found.append("no other stable shape found")
+        yield f"  shapes    {ends:<8}{'; '.join([*found, searched.searched])}"

@@ -1,0 +1,346 @@
+"""The verdict on a result, computed once from all that was found: good, check or unbuildable, and the reasons.
+
+Summary, report, JSON and exit code show what stands here and judge nothing themselves. A figure that is missing was
+not checked, and then the result is not good.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from rodshell.results.checked import Clearance, Deployment, Level, Verdict, WorstBent
+from rodshell.results.records import Agreement, Ends, PopUp
+from rodshell.results.results import Results
+from rodshell.results.wording import millimetres, percent, place, rounded, rounding_of, whole_percent
+
+ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
+
+FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
+# leaves a tenth of the second
+THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
+RESERVED = 0.5  # share of a preset's strength, characteristic and short-term, that a shell may use permanently
+FLAT = "the target is flat, nothing pops up"
+NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
+LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
+MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
+NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
+CONVERGED = "converged"
+
+
+def verdict_of(results: Results) -> Verdict:
+    """The verdict that a result holds, or that on its figures (results of versions before verdicts)."""
+    return results.verdict or verdict(results)
+
+
+def verdict(results: Results) -> Verdict:
+    """The verdict on the figures of a result.
+
+    An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
+    enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
+    """
+    shells = results.pop_up
+    faults = {ends: [*_shell_faults(results, ends)] for ends in shells}
+    usable = [ends for ends, found in faults.items() if not found]
+    deployment = [*_fibre_faults(results, "deployment"), *_contact_faults(results, "deployment")]
+    grave = [sentence for found in faults.values() for sentence in found] + deployment
+    if results.target and results.target.flat:
+        warned = [word for word in results.warnings if word.startswith(FLAT)]
+        return _verdict("unbuildable", warned or [FLAT])
+    if not shells:
+        why = "there is no pop-up in this result"
+        return _verdict(
+            "unbuildable", [why if results.status == CONVERGED else f"it did not converge: {results.status}"]
+        )
+    best = _best(results, usable)
+    off = 0.0 if best is None else best[1].max_relative or 0.0
+    far = [_off_words(results, *best)] if best is not None and off > OFF else []
+    open_points = [*_open_points(results, usable), *results.warnings]
+    if not usable or deployment or off > FAR_OFF:
+        gravest = [*far, *grave] if off > FAR_OFF else [*grave, *far]
+        return _verdict("unbuildable", [*gravest, *open_points])
+    if to_check := [*grave, *far, *open_points]:
+        return _verdict("check", to_check)
+    return _verdict("good", _merits(results, usable))
+
+
+def unknown_below(results: Results) -> float:
+    """Share of the deployment below which nothing is known: 0 all was followed, 1 only the final shape is known."""
+    deployment = results.deployment
+    if deployment and deployment.lost_at is None:
+        return 0.0
+    return min((stage.share for stage in (deployment.stages if deployment else ()) if stage.share > 0), default=1.0)
+
+
+def utilisation(results: Results) -> float | None:
+    """The largest of all shapes that are known, those of the deployment among them; None without a strength."""
+    shapes = results.bending.shapes().values() if results.bending else ()
+    return max((bent.utilisation for bent in shapes if bent.utilisation is not None), default=None)
+
+
+def facts(results: Results) -> list[str]:
+    """What was found, in sentences that judge nothing: gaps, supports, strength."""
+    return [*_gaps(results), *_strength(results)]
+
+
+def _verdict(level: Level, reasons: Iterable[str]) -> Verdict:
+    """Each reason once."""
+    return Verdict(level=level, reasons=tuple(dict.fromkeys(reasons)))
+
+
+def _status(shell: PopUp | None) -> str:
+    """Of a shell; those of the first versions that kept none had converged."""
+    return (shell.status if shell else None) or CONVERGED
+
+
+def _bent(results: Results, shape: str) -> WorstBent:
+    """The worst bending of a shape; one without figures where nothing is known."""
+    return (results.bending.shapes() if results.bending else {}).get(shape) or WorstBent()
+
+
+def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
+    """Why the shell with these ends cannot be built."""
+    shell = results.pop_up[ends]
+    if _status(shell) != CONVERGED:
+        yield f"the pop-up with {ends} ends did not converge: {shell.status}"
+        return
+    if shell.stable is False:
+        modes = shell.negative_modes
+        count = f" ({modes} buckling mode{'s' if modes != 1 else ''})" if modes else ""
+        yield f"with {ends} ends the shell is unstable{count} and would snap to another shape"
+    yield from _contact_faults(results, ends)
+    yield from _fibre_faults(results, ends)
+
+
+def _contact_faults(results: Results, shape: str) -> Iterator[str]:
+    touching = results.contact.of(shape) if results.contact else None
+    if not touching or not touching.pairs:
+        return
+    first, second = touching.rods or ("a rod", "another")
+    rods = f"{first} and {second} overlap" if first != second else f"{first} runs into itself"
+    worst = f"{touching.pairs} pairs of rods touch or cross, worst: " if touching.pairs > 1 else "rods touch: "
+    where = f" near ({place(touching.where, rounding_of(results))})" if touching.where else ""
+    yield (
+        f"{_shape(shape, touching)} {worst}{rods} by {_mm(results, -(touching.clearance or 0.0))}{where}: use thinner "
+        "rods (rod.section) or a larger spacing"
+    )
+
+
+def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
+    """Stress above the strength, strain beyond thin rods."""
+    bent = _bent(results, shape)
+    used, strain = bent.utilisation, bent.max_bending_strain
+    where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
+    if used is not None and used > 1:
+        share = f"{max(101, round(100 * used))} % of their strength"  # never 100 % of what breaks
+        yield f"{_shape(shape, bent)} the rods would break: {share}{where}"
+    if strain is not None and strain > THIN:
+        yield (
+            f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for their bends, "
+            f"the theory of thin rods holds up to some {percent(THIN)}; use thinner rods or a larger target"
+        )
+
+
+def _shape(shape: str, found: WorstBent | Clearance) -> str:
+    """The shape that a sentence is about."""
+    if shape in ENDS:
+        return f"with {shape} ends"
+    return (
+        "during deployment"
+        if found.share is None
+        else f"during deployment (at {whole_percent(found.share)} of the way)"
+    )
+
+
+def _best(results: Results, usable: list[Ends]) -> tuple[Ends, Agreement] | None:
+    """Of the shells that can be used the nearest to the target, and its gap; None without a target."""
+    known = {ends: gap for ends, gap in results.agreement.items() if ends in usable and gap.max_relative is not None}
+    return min(known.items(), key=lambda pair: pair[1].max_relative or 0.0, default=None)
+
+
+def _off_words(results: Results, ends: Ends, gap: Agreement) -> str:
+    """How far off the best shell is; with clamped ends a convex shell keeps to the target, and dips are the cause."""
+    where = f", near ({place(gap.where, rounding_of(results))})" if gap.where else ""
+    drape = results.drape
+    strong = drape.strong_bending if drape else None
+    buckles = strong is not None and (strong.beyond or 0.0) > 0
+    kind = (results.joint.kind if results.joint else None) or "ball"
+    against_shear = kind not in ("ball", "pin")
+    bound = drape is not None and drape.method == "bound"
+    dips = ends == "clamped" and bound and not buckles and not against_shear
+    advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
+    return (
+        f"with {ends} ends, the best that can be used, the shell is off the target by {_mm(results, gap.max)} "
+        f"({percent(gap.max_relative)} of its size){where}{advice}"
+    )
+
+
+def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
+    """What has to be looked at although the shell can be built, and what is not known; more is among the warnings."""
+    shells, status = results.pop_up, results.status
+    stopped = any(_status(shell) != CONVERGED for shell in shells.values())
+    if status not in (CONVERGED, "unknown") and not stopped and not any(status in word for word in results.warnings):
+        yield f"the job is not complete: {status}"
+    if any(shells[ends].stable is None for ends in usable):
+        yield "whether the shell is stable was not checked"
+    yield from _weight(results, usable)
+    yield from _from_flat(results, usable, late=status != CONVERGED)
+    yield from _other_shapes(results, usable)
+    yield from _rods(results, usable)
+    if results.target and not set(usable) <= set(results.agreement):
+        yield "how near the shell comes to the target was not checked"
+
+
+def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
+    """Whether rods hold and pass each other."""
+    met = results.contact
+    if any(
+        (met.of(ends) if met else None) is None or _bent(results, ends).max_bending_strain is None for ends in usable
+    ):
+        yield (
+            "whether rods touch and are thin enough for their bends was not checked; a given section needs "
+            "rod.section.fibre_distances for that"
+        )
+    if results.bending is None or results.bending.strength is None:
+        if _width(results) > LARGE:
+            yield "no strength was given, so it is not known whether the rods hold (checks.strength)"
+        return
+    name = results.bending.strength_of
+    used = max((_bent(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
+    if name and used > RESERVED:
+        yield (
+            f"the rods permanently use {percent(used)} of {name}'s strength, which is characteristic and short-term: "
+            "reduce it for duration and moisture and give what is left as checks.strength, or use thinner rods"
+        )
+
+
+def _weight(results: Results, usable: list[Ends]) -> Iterator[str]:
+    """Shells that cannot stand; what is not known of them is among a result's warnings."""
+    borne = {ends: found for ends, found in results.self_weight.items() if ends in usable}
+    if set(borne) != set(usable):
+        yield "whether it bears its own weight was not checked"
+    factors = {ends: found.load_factor for ends, found in borne.items() if found.limit != "not followed"}
+    weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
+    if weak:
+        each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
+        yield f"it bears only {each}: it does not stand unless it is held, braced or made of stiffer rods"
+
+
+def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:
+    """Whether the deployment was checked; what was found there is among a result's warnings."""
+    deployment = results.deployment
+    if not deployment:
+        remedy = "" if late else ": that takes pinned ends (pop_up.ends) and checks.stages above 0"
+        failed = _status(results.pop_up.get("pinned")) != CONVERGED
+        why = ", since the pinned shell was not found" if failed else remedy
+        yield f"whether the shell is reached from flat was not checked{why}"
+    elif (
+        "clamped" in usable
+        and deployment.reached_from_flat
+        and (deployment.clamped is None or deployment.clamped.reached_from_flat is None)
+    ):
+        yield "whether the clamped shape is reached from the pinned one by turning the ends is not known"
+
+
+def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[str]:
+    for ends, searched in results.other_shapes.items():
+        near = [
+            (shape.distance, shape.energy)
+            for shape in searched.found
+            if not shape.mirror and shape.distance is not None and shape.energy is not None
+            if shape.distance < NEAR and shape.energy < AKIN
+        ]
+        if ends in usable and near:
+            distance, energy = min(near, key=lambda pair: pair[0])
+            yield (
+                f"with {ends} ends the shell has another stable shape, {percent(distance)} of its size away "
+                f"at {rounded(energy)} times the energy: make sure on site that it takes the right one"
+            )
+
+
+def _width(results: Results) -> float:
+    """Longest side in plan [m] of what the shell stands on."""
+    columns = [[point[axis] for point in results.boundary] for axis in (0, 1)]
+    known = [[value for value in column if value is not None] for column in columns]
+    return max((max(column) - min(column) for column in known if column), default=0.0)
+
+
+def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
+    """Why a result is good."""
+    borne = [results.self_weight[ends].load_factor for ends in usable]
+    least = min((factor for factor in borne if factor is not None), default=None)
+    weight = "over 100" if least is None else f"{'at least ' if len(usable) > 1 else ''}{rounded(least)}"
+    best = _best(results, usable)
+    near = (
+        f"; with {best[0]} ends it keeps to the target within {percent(best[1].max_relative)} of its size"
+        if best
+        else ""
+    )
+    yield f"with {' and '.join(usable)} ends the shell is stable and bears {weight} times its own weight{near}"
+    yield "no other load than its own weight was checked, neither snow, wind nor people; nor were imperfections"
+
+
+def _mm(results: Results, metres: float | None) -> str:
+    """A length as fine as on the drawings."""
+    return millimetres(metres, rounding=rounding_of(results))
+
+
+def _gaps(results: Results) -> Iterator[str]:
+    """How near the converged shells come to the target, and which support is better."""
+    faults = {ends: [*_shell_faults(results, ends)] for ends in results.pop_up}
+    known = {
+        ends: gap.max
+        for ends in ENDS
+        if (gap := results.agreement.get(ends)) is not None
+        and gap.max is not None
+        and (shell := results.pop_up.get(ends)) is not None
+        and shell.status == CONVERGED
+    }
+    for ends, largest in known.items():
+        size = results.agreement[ends].max_relative
+        share = "" if size is None else f" ({percent(size)} of its size)"
+        yield f"With {ends} ends the largest gap to the target is {_mm(results, largest)}{share}."
+    if len(known) == len(ENDS) and not any(faults.values()):
+        yield from _advice(known, results.agreement["pinned"].max_relative)
+    elif faults and not results.target:
+        yield "This result has no target, so no gap can be stated."
+
+
+def _advice(gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]:
+    """Which of two supports that can both be used is worth its effort.
+
+    relative : the pinned gap over the target's size.
+    """
+    if gaps["clamped"] < MUCH_LESS * gaps["pinned"] and (relative is None or relative > NEGLIGIBLE):
+        share = percent(gaps["clamped"] / gaps["pinned"])
+        yield f"Supports that hold the rods' directions (clamped) leave {share} of the gap that pinned ones leave."
+    elif relative is None or relative <= OFF:
+        yield "Supports that hold the rods' directions (clamped) gain little here: pinned ones will do."
+
+
+def _strength(results: Results) -> Iterator[str]:
+    """How much of the strength is used, and in which shapes that is known."""
+    used = utilisation(results)
+    if used is not None:
+        where = _known(results.deployment, unknown_below(results))
+        yield f"The rods use {percent(used)} of their strength at most, {where}"
+    elif results.bending:
+        yield "No strength was given, so it is not known whether the rods hold (checks.strength)."
+
+
+def _known(deployment: Deployment | None, unknown: float) -> str:
+    """In which shapes the stress is known; no more is said of the deployment than was followed."""
+    if not deployment:
+        return "in the final shape; the deployment from flat was not followed."
+    if unknown >= 1:
+        return "in the final shape; nothing is known of the deployment, which could not be followed."
+    if unknown:
+        return (
+            f"in the final shape and above {whole_percent(unknown)} of the deployment; below, nothing is known of it."
+        )
+    if deployment.guided:
+        low, high = (whole_percent(share) for share in deployment.guided)
+        return (
+            f"in the final shape and the stages of the deployment; the stress while the shell is guided from {low} to "
+            f"{high} is not known."
+        )
+    if deployment.snaps:
+        return "in the final shape and the stages of the deployment; the stress during a snap is not known."
+    return "deployment included."

@@ -1,0 +1,247 @@
+"""Numbers in words, with their units, and how finely lengths are shown: one rule for drawings, tables and texts."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, floor, isfinite, log10, pi
+from typing import Any
+
+from rodshell.results.checked import SelfWeight
+from rodshell.results.records import Record
+from rodshell.results.results import Results
+from rodshell.units import stress_text
+
+FINEST, COARSEST = 1e-3, 1.0  # mm
+OF_ROD = 1e-4  # share of the longest rod to which lengths are shown where no tolerance is given
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """Lengths to the next `step` [mm], a power of ten; each from its exact value, never from rounded ones."""
+
+    step: float
+
+    @property
+    def digits(self) -> int:
+        """Decimals of a length in mm."""
+        return max(round(-log10(self.step)), 0)
+
+    def mm(self, metres: float | None) -> str:
+        """A length [m] in mm, without its unit and without a minus before a zero; "" where it is not known."""
+        if metres is None or not isfinite(metres):
+            return ""
+        return f"{round(1e3 * metres, self.digits) + 0.0:.{self.digits}f}"
+
+    @property
+    def words(self) -> str:
+        return f"{self.step:g} mm"
+
+
+def rounding_of(results: Results) -> Rounding:
+    """The rule for a result: the power of ten not above half of the tolerance, so that rounding takes a quarter of it.
+
+    Where no tolerance is given, the power of ten not above a ten-thousandth of the longest rod.
+    """
+    tolerance = results.drawings.tolerance if results.drawings else None
+    if tolerance is None:
+        asked = 1e3 * OF_ROD * max((rod.length or 0.0 for rod in results.rods), default=0.0)
+    else:
+        asked = 0.5 * 1e3 * tolerance
+    power = 10.0 ** floor(log10(max(asked, FINEST)) + 1e-9)
+    return Rounding(min(max(power, FINEST), COARSEST))
+
+
+EXACT = Rounding(FINEST)
+UNKNOWN = "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+
+CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of the case, by its key
+    **dict.fromkeys(
+        ("radius", "height", "base", "size", "reference_size", "a", "b", "c", "spacing", "length"), (1e3, "mm")
+    ),
+    **dict.fromkeys(("edge", "offset", "move", "thickness", "width"), (1e3, "mm")),
+    **dict.fromkeys(("EI", "EI1", "EI2", "GJ"), (1.0, "N m\N{SUPERSCRIPT TWO}")),
+    **dict.fromkeys(("mass", "mass_per_length"), (1.0, "kg/m")),
+    "EA": (1.0, "N"),
+    **dict.fromkeys(("youngs_modulus", "shear", "fibre_modulus"), (1e-6, "MPa")),
+    "fibre_distances": (1e3, "mm"),
+    "torsion_modulus": (1e6, "cm\N{SUPERSCRIPT THREE}"),
+    "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
+    **dict.fromkeys(("rotate", "turn"), (180 / pi, "\N{DEGREE SIGN}")),
+}
+TURNING = (1.0, "N m/rad")
+JOINT_UNITS = {
+    "eccentricity": (1e3, "mm"),
+    "mass": (1.0, "kg"),
+    **dict.fromkeys(("shear", "out_of_plane", "twist"), TURNING),
+    "rest_angle": (180 / pi, "\N{DEGREE SIGN}"),
+}
+NAMES = {
+    "youngs_modulus": "Young's modulus",
+    "poisson_ratio": "Poisson's ratio",
+    "shear": "shear modulus",
+    "reference_size": "size, for relative gaps",
+}
+
+
+def rounded(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits; a large one in full, never as 1.42e+03."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if abs(float(text)) >= 10**digits else text
+
+
+def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXACT) -> str:
+    """A length [m] in mm with about `digits` significant digits, no finer than its rounding."""
+    if metres is None or not isfinite(metres):
+        return UNKNOWN
+    value = 1e3 * metres
+    if value and abs(value) < rounding.step:
+        return f"under {rounding.words}"
+    whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
+    return f"{value:.{min(max(digits - whole, 0), rounding.digits)}f} mm"
+
+
+def nice_step(span: float, count: int) -> float:
+    """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less."""
+    if span <= 0:
+        return 1.0
+    power = 10.0 ** floor(log10(span / count))
+    return next(k * power for k in (1.0, 2.0, 5.0, 10.0) if k * power >= span / count * (1 - 1e-9))
+
+
+def nice_ticks(low: float, high: float, count: int) -> list[float]:
+    """Round numbers from `low` to `high`, `count` + 1 at most."""
+    step = nice_step(high - low, count)
+    first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
+    return [k * step for k in range(first, last + 1)]
+
+
+def percent(share: float | None) -> str:
+    """A share as a percentage with two significant digits."""
+    if share is None or not isfinite(share):
+        return UNKNOWN
+    if abs(share) < 1e-9:
+        return "0 %"
+    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+def share_of_weight(found: SelfWeight) -> str:
+    """How much of its own weight a shell bears."""
+    factor = found.load_factor
+    if found.limit == "no mass":
+        return "unknown: no mass was given"
+    if factor is None:
+        return "more than 100 times"
+    if found.limit == "unstable unloaded":
+        return "none: unstable unloaded"
+    least = "at least " if found.limit == "not followed" else ""
+    return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
+
+
+def whole_percent(share: float) -> str:
+    """A share of the deployment in whole percents, as warnings and drawings name stages."""
+    return f"{100 * share:.0f} %"
+
+
+def newtons(force: float) -> str:
+    return f"{rounded(force)} N"
+
+
+def newton_metres(moment: float) -> str:
+    return f"{rounded(moment)} N m"
+
+
+def stress(pascals: float) -> str:
+    """A stress [Pa] in a unit of its size."""
+    return stress_text(pascals)
+
+
+def curvature(value: float) -> str:
+    return f"{rounded(value)} 1/m"
+
+
+def twist_rate(value: float) -> str:
+    return f"{rounded(value * 180 / pi)}\N{DEGREE SIGN}/m"
+
+
+def seconds(time: float) -> str:
+    return f"{time:.2f} s"
+
+
+def degrees(angle: float) -> str:
+    return f"{angle:.1f}\N{DEGREE SIGN}"
+
+
+def small(value: float | None) -> str:
+    """A number of which the power of ten matters."""
+    return UNKNOWN if value is None else f"{value:.1e}"
+
+
+def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
+    """A point (3,) [m] in mm."""
+    known = [rounding.mm(x).replace("-", MINUS) for x in point if x is not None]
+    return f"{', '.join(known)} mm" if len(known) == 3 else UNKNOWN
+
+
+def yes_or_no(value: object) -> str:
+    return "yes" if value else "no"
+
+
+def plain(value: object) -> str:
+    """A value of which no more is known than that it was recorded."""
+    return UNKNOWN if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def case_rows(table: Record | None, rounding: Rounding = EXACT) -> list[tuple[str, str]]:
+    """The entries of a table of the case, in the units of a drawing, files by their names.
+
+    rounding : how finely lengths are shown at most.
+    """
+    return [
+        (NAMES.get(key, key.replace("_", " ")), _case_value(key, value, CASE_UNITS, rounding))
+        for key, value in (table.plain() if table else {}).items()
+        if value is not None and key != "unit" and not isinstance(value, dict)  # all is shown in units of its own
+    ]
+
+
+def joint_rows(joint: Record | None) -> list[tuple[str, str]]:
+    """The same of the joints, without what they do not have: "pin", eccentricity, mass, stiffnesses."""
+    return [
+        (key.replace("_", " "), _case_value(key, value, JOINT_UNITS, EXACT))
+        for key, value in (joint.plain() if joint else {}).items()
+        if value and not isinstance(value, dict)
+    ]
+
+
+def shown_length(results: Results) -> Callable[[float | None], str]:
+    """How texts show lengths [m]: to three figures, no finer than on the drawings."""
+    rounding = rounding_of(results)
+
+    def shown(metres: float | None) -> str:
+        if metres is None:
+            return UNKNOWN
+        if abs(metres) >= 1.0:
+            return f"{rounded(metres)} m"
+        return millimetres(metres, rounding=rounding) if abs(metres) >= 1e-9 else "0 mm"
+
+    return shown
+
+
+def _case_value(key: str, value: Any, units: Mapping[str, tuple[float, str]], rounding: Rounding) -> str:
+    if isinstance(value, list | tuple):
+        between = ", " if key in ("offset", "move", "turn") else " \N{MULTIPLICATION SIGN} "
+        return between.join(_case_value(key, item, units, rounding) for item in value)
+    if key in ("file", "boundary"):
+        return re.split(r"[/\\]", str(value))[-1]
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, int | float):
+        return str(value)
+    factor, unit = units.get(key, (1.0, ""))
+    if unit == "MPa" and value >= 1e8:
+        factor, unit = 1e-9, "GPa"
+    number = factor * value
+    if unit == "mm":
+        number = round(number, rounding.digits) or number
+    shown = rounded(number, 5).replace("-", MINUS)
+    return f"{shown}{unit}" if unit == "\N{DEGREE SIGN}" else f"{shown} {unit}".strip()

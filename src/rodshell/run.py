@@ -1,0 +1,226 @@
+"""One run of a case: what is left open is decided, and each stage runs or is taken over from an earlier form."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from rodshell.case import Case
+from rodshell.case.case import Built, built
+from rodshell.case.rod_ends import RodEnds
+from rodshell.checks.sizing import Fit
+from rodshell.form import Form, Stages
+from rodshell.formfinding import Fall, PatchForm, find_stages, pop_up_stages
+from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
+from rodshell.formfinding.progress import Progress
+from rodshell.formfinding.search import Search, search
+from rodshell.results.from_form import rod_type
+from rodshell.results.inputs import read_inputs
+from rodshell.results.summary import chosen, rod_text
+from rodshell.rods.section import GivenSection, Rod
+from rodshell.targets import Target
+from rodshell.targets.patch import Seam
+from rodshell.units import length_text
+
+Announce = Callable[[str], None]
+
+STAGES: dict[str, tuple[str, ...]] = {
+    "target": ("target",),
+    "drape": ("layout", "rod", "joint", "drape", "seams"),
+    "trim": (),
+    "pop-up": ("pop_up",),
+    "checks": ("checks",),
+    "fabrication": ("fabrication",),
+    "files": ("drawings",),
+}
+"""The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
+
+DECIDED_BY = ("target", "layout", "rod", "joint", "drape", "seams", "checks")
+"""Tables that decide what a case leaves open: anchor, heading and rod."""
+
+
+class Run:
+    """One run of a case; parameters as of `Job.run`, with the target where it was built before."""
+
+    def __init__(
+        self,
+        case: Case,
+        target: Target | None,
+        warm_start: Form | None,
+        progress: Progress,
+        announce: Announce | None,
+        frames_in: Path,
+    ) -> None:
+        self.asked, self.target, self.progress = case, target, progress
+        self.announce, self.frames_in = announce, frames_in
+        self.inputs = read_inputs(case.text())
+        self.options = case.output_options()
+        self.earlier = warm_start
+        if warm_start is not None and warm_start.from_table != (case.target.kind == "table"):
+            self.earlier = None
+
+    def form(self) -> Form:
+        """Of a target."""
+        earlier = self.earlier
+        same_target = earlier is not None and self._same(earlier, ("target",))
+        if same_target and earlier is not None:
+            self.target = earlier.target
+        case, found = self.asked, self.asked.build(self.target)
+        self._announce_sizes(found)
+        case, found, searched = self._decided(case, found)
+        self._announce_rod(
+            found.rod,
+            lambda: case.fit_on(found.target, found.layout, anchor=None if case.seams.lines else found.anchor),
+        )
+        case = case.with_rod(found.rod)
+        same = self._unchanged(case)
+        stages = self._patches(case, found, same) if case.seams.lines else self._one_piece(case, found, same)
+        return self._made(case, stages, searched, same)
+
+    def table_form(self) -> Form:
+        """Of a table of rods."""
+        case = self.asked
+        assert case.target.held is not None
+        ends: RodEnds = case.target.held.value
+        fit = partial(Fit.between, ends.lengths, ends.final, ends.grid.joint_counts())
+        rod = case.rod.held.value if case.rod.held else case.rod.build(fit, strength=case.checks.strength)
+        self._announce_rod(rod, fit)
+        case = case.with_rod(rod)
+        same = self._unchanged(case)
+        joint, stages = built(case.joint), self.earlier.stages if self.earlier is not None else None
+        if not (isinstance(stages, PatchForm) and "pop-up" in same and stages.finished_pop_ups(stages.ends)):
+            stages = pop_up_stages(
+            ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress
+        )  # fmt: skip
+        return self._made(case, stages, None, same)
+
+    def _one_piece(self, case: Case, found: Built, same: Sequence[str]) -> PatchForm:
+        method = found.method
+        if isinstance(method, Fall) and case.drape.frames is not None and case.drape.held is None:
+            method = replace(method, stream=self.frames_in / case.drape.frames)
+        earlier = self.earlier.stages if self.earlier is not None else None
+        streams = isinstance(method, Fall) and method.stream is not None
+        return find_stages(
+            found.target, found.layout, found.rod,
+            method=method, anchor=found.anchor, joint=found.joint, ends=found.ends,
+            warm_start=earlier if isinstance(earlier, PatchForm) else None,
+            same_drape="trim" in same and not streams, progress=self.progress,
+        )  # fmt: skip
+
+    def _patches(self, case: Case, found: Built, same: Sequence[str]) -> PatchedForm:
+        earlier = self.earlier.stages if self.earlier is not None else None
+        return find_patched_stages(
+            found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
+            own=case.seams.own(), joint=found.joint, ends=found.ends,
+            warm_start=earlier if isinstance(earlier, PatchedForm) else None,
+            same_drape="trim" in same, progress=self.progress,
+        )  # fmt: skip
+
+    def _decided(self, case: Case, found: Built) -> tuple[Case, Built, Search | None]:
+        """The case with anchor and heading, and the search for them, if they are "auto"."""
+        if not case.undecided:
+            return case, found, None
+        earlier = self.earlier if self.earlier is not None and self._same(self.earlier, DECIDED_BY) else None
+        if case.seams.lines:
+            turn = earlier.layout.rotate if earlier is not None else self._best_heading(case, found)
+            return case.headed(turn), found._replace(layout=replace(found.layout, rotate=turn)), None
+        searched = earlier.search if earlier is not None else None
+        if searched is None:
+            anchor, heading = case.drape.anchor, case.layout.rotate
+            searched = search(
+                found.target, found.layout, found.rod, objective=case.drape.objective, progress=self.progress,
+                anchors="auto" if anchor == "auto" else [anchor or found.target.summit],
+                headings="auto" if heading == "auto" else [heading],
+            )  # fmt: skip
+        best = searched.best
+        layout = replace(found.layout, rotate=best.heading)
+        case = case.decided(best.anchor, best.heading)
+        rod = case.rod_on(found.target, layout, anchor=best.anchor)
+        return case, found._replace(layout=layout, anchor=best.anchor, rod=rod), searched
+
+    def _best_heading(self, case: Case, found: Built) -> float:
+        return best_heading(
+            found.target, [Seam.of(line) for line in case.seams.lines], found.layout, case.seams.own(),
+            eccentricity=found.joint.eccentricity, progress=self.progress,
+        )  # fmt: skip
+
+    def _made(self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str]) -> Form:
+        """The form, with what it takes over from the earlier one."""
+        form = Form(case, self.asked, stages, self.options, self.inputs, searched)
+        earlier = self.earlier
+        if earlier is None:
+            return form
+        reused = ["target"] if "target" in same else []
+        if _same_drapes(stages, earlier.stages):
+            reused += [] if form.from_table else ["drape", "trim"]
+            taken = _same_pop_ups(form, earlier)
+            reused += ["pop-up"] if taken else []
+            checks = earlier.known_checks if taken and "checks" in same else None
+            if checks is not None and not checks.stopped:
+                reused += ["checks"]
+                made = earlier.known_fabrication if "fabrication" in same else None
+                reused += ["fabrication"] if made is not None else []
+                form = replace(form, _known_checks=checks, _known_fabrication=made)
+        return replace(form, reused=tuple(reused))
+
+    def _unchanged(self, case: Case) -> list[str]:
+        """The stages up to the first one whose part of the decided case has changed."""
+        same = list[str]()
+        for stage, tables in STAGES.items():
+            if self.earlier is None or not self._same(self.earlier, tables, case):
+                break
+            same.append(stage)
+        return same
+
+    def _same(self, earlier: Form, tables: Iterable[str], case: Case | None = None) -> bool:
+        """Whether these tables are as they were, and so are their files; without a decided `case`, as asked for."""
+        before, now = (earlier.asked, self.asked) if case is None else (earlier.case, case)
+        before, now = before.absolute(), now.absolute()
+        if "target" in tables and (dict(earlier.inputs) != self.inputs or not now.files <= self.inputs.keys()):
+            return False  # a file too large to be kept may have changed
+        return all(getattr(before, name) == getattr(now, name) for name in tables)
+
+    def _announce_sizes(self, found: Built) -> None:
+        """Which lengths were left to the target's size: a wrong unit shows here."""
+        lengths = {
+            "spacing": min(found.layout.spacing) if self.asked.layout.spacing == "auto" else None,
+            "edge": found.layout.edge if self.asked.layout.edge == "auto" else None,
+        }
+        said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
+        if said and self.announce is not None:
+            name = self.asked.drawings.name or found.target.name
+            self.announce(f"{name}, {length_text(2 * found.target.size)} wide; {said}")
+
+    def _announce_rod(self, rod: Rod, fit: Callable[[], Fit]) -> None:
+        """A rod of which the case left something open, and what decided its size."""
+        left_open, strength = self.asked.rod.left_open, self.asked.checks.strength
+        if not left_open or self.announce is None:
+            return
+        said = f"rod: {rod_text(rod_type(rod))}; {chosen(left_open)}"
+        if "section" in left_open and rod.material and not isinstance(rod.section, GivenSection):
+            why = fit().reason(rod.section, rod.material, strength=strength, shape=self.asked.rod.shape)
+            said += f", {why}"
+        self.announce(said)
+
+
+def _same_drapes(now: Stages, before: Stages) -> bool:
+    """Whether a form's drapes are those of an earlier one; a table of rods has none to run again."""
+    if isinstance(now, PatchForm) and isinstance(before, PatchForm) and not now.from_table:
+        return now.draped is before.draped
+    if isinstance(now, PatchedForm) and isinstance(before, PatchedForm):
+        return list(now.found) == list(before.found) and all(
+            patch.draped is before.found[name].draped for name, patch in now.found.items()
+        )
+    return now is before
+
+
+def _same_pop_ups(now: Form, before: Form) -> bool:
+    """Whether all pop-ups of a form are those of an earlier one, which has no others."""
+    if now.ends != before.ends:
+        return False
+    pairs = zip(now.patches, before.patches, strict=True)
+    return all(
+        list(patch.popped) == list(earlier.popped)
+        and all(shell is earlier.popped[ends] for ends, shell in patch.popped.items())
+        for patch, earlier in pairs
+    )

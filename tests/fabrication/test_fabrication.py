@@ -1,0 +1,220 @@
+"""Layers, stock, splices and bracing, against what they must satisfy and against brute force."""
+
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rodshell as rs
+from rodshell.fabrication import Fabrication, diagonals, fabricate, nest, splices
+from rodshell.layout import FlatGrid, mesh_grid, straight_rods
+from rodshell.layout.flatgrid import layers
+from rodshell.layout.gridlayout import GridLayout
+
+ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+
+
+@given(st.integers(2, 12).flatmap(lambda n: st.tuples(st.just(n), st.sets(st.tuples(*[st.integers(0, n - 1)] * 2)))))
+def test_rods_of_one_layer_never_cross(graph: tuple[int, set[tuple[int, int]]]) -> None:
+    rods, crossings = graph
+    met = [(a, b) for a, b in crossings if a != b]
+    layer = layers(rods, met)
+    assert layer.min() >= 1
+    assert all(layer[a] != layer[b] for a, b in met)
+
+
+def test_two_families_take_two_layers_the_first_below() -> None:
+    met = [(u, 5 + v) for u in range(5) for v in range(4)]
+    assert layers(9, met).tolist() == [1] * 5 + [2] * 4
+    assert layers(3, [(0, 1), (1, 2), (0, 2)]).tolist() == [1, 2, 3]  # a triangle needs three
+
+
+def fewest_bars(lengths: list[float], stock: float) -> int:
+    """The best there is, by trying every place for every piece."""
+    best = len(lengths)
+
+    def place(k: int, left: list[float]) -> None:
+        nonlocal best
+        if len(left) >= best:
+            return
+        if k == len(lengths):
+            best = len(left)
+            return
+        for bar in range(len(left)):
+            if left[bar] >= lengths[k] - 1e-9:
+                place(k + 1, [*left[:bar], left[bar] - lengths[k], *left[bar + 1 :]])
+        place(k + 1, [*left, stock - lengths[k]])
+
+    place(0, [])
+    return best
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(1, 12), min_size=1, max_size=9), st.sampled_from([0.0, 0.25]))
+def test_every_piece_is_cut_once_and_no_bar_is_too_short(pieces: list[int], kerf: float) -> None:
+    lengths, stock = [float(piece) for piece in pieces], 12.0
+    plan = nest(lengths, stock, kerf=kerf)
+    assert sorted(k for bar in plan.bars for k in bar.pieces) == list(range(len(lengths)))
+    for bar in plan.bars:
+        used = sum(lengths[k] for k in bar.pieces) + kerf * (len(bar.pieces) - 1)
+        assert used <= stock + 1e-9
+        assert bar.left == pytest.approx(max(stock - used - kerf, 0.0), abs=1e-9)
+    assert plan.waste == pytest.approx(1 - sum(lengths) / (stock * len(plan.bars)))
+    if kerf == 0:
+        best = fewest_bars(lengths, stock)
+        assert plan.fewest <= best <= len(plan.bars) <= 11 / 9 * best + 2 / 3  # [Dosa 2007]
+
+
+def test_pieces_that_fill_a_bar_to_the_last_leave_nothing() -> None:
+    plan = nest([0.1, 0.2, 0.3, 0.4], 0.5)
+    assert [bar.pieces for bar in plan.bars] == [(3, 0), (2, 1)]
+    assert plan.waste == pytest.approx(0.0, abs=1e-12)
+    assert plan.fewest == 2
+
+
+def choices(length: float, joints: list[float], stock: float) -> list[tuple[float, ...]]:
+    """All ways to splice halfway between joints into pieces that stock can give."""
+    middles = [(a + b) / 2 for a, b in pairwise(joints)]
+    ways = []
+    for count in range(len(middles) + 1):
+        for some in combinations(middles, count):
+            stops = [0.0, *some, length]
+            if all(b - a <= stock for a, b in pairwise(stops)):
+                ways.append(some)
+    return ways
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(1, 30), min_size=2, max_size=7, unique=True), st.integers(8, 40), st.randoms())
+def test_splices_are_the_fewest_and_then_the_least_bent(at: list[int], stock: int, random: object) -> None:
+    joints, length = sorted(float(one) for one in at), 32.0
+    places = np.linspace(0, length, 33)
+    curvature = np.array([random.random() for _ in places])  # type: ignore[attr-defined]
+    made = splices(length, joints, float(stock), stations=places, curvature=curvature)
+    ways = choices(length, joints, float(stock))
+    if not ways:
+        assert made is None
+        return
+    assert made is not None
+    fewest = min(map(len, ways))
+    worst = [max(np.interp(way, places, curvature), default=0.0) for way in ways if len(way) == fewest]
+    assert len(made) == fewest
+    assert tuple(made) in ways
+    assert max(np.interp(made, places, curvature), default=0.0) == pytest.approx(min(worst))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(1, 30), min_size=2, max_size=7, unique=True), st.integers(8, 40), st.randoms())
+def test_of_the_fewest_pieces_the_fewest_are_short_and_then_the_bend_counts(
+    at: list[int], stock: int, random: object
+) -> None:
+    joints, length, short = sorted(float(one) for one in at), 32.0, 6.0
+    places = np.linspace(0, length, 33)
+    curvature = np.array([random.random() for _ in places])  # type: ignore[attr-defined]
+
+    def cost(way: tuple[float, ...]) -> tuple[int, int, float]:
+        pieces = np.diff([0.0, *way, length])
+        return len(way), int((pieces < short).sum()), max(np.interp(way, places, curvature), default=0.0)
+
+    made = splices(length, joints, float(stock), stations=places, curvature=curvature, short=short)
+    ways = choices(length, joints, float(stock))
+    assert (made is None) == (not ways)
+    if made is not None:
+        assert cost(tuple(made)) == pytest.approx(min(map(cost, ways)))
+
+
+@pytest.mark.parametrize(("rods", "pieces"), [(1, [2.0, 4.0, 5.0]), (3, [1.0, 5.0, 5.0])])
+def test_short_pieces_are_avoided_where_that_takes_no_more_bars(rods: int, pieces: list[float]) -> None:
+    """Rods of 11 m from bars of 5 m: the least bend splices at 5 and 6 m, the next at 4 and 6 m.
+
+    Of one rod both ways take three bars. Of three the pieces of 1 m share a bar, and those of 2 m do not: 7 and not 8.
+    """
+    long = [[[0.0, 0.02 * k], [11.0, 0.02 * k]] for k in range(rods)]
+    mesh = mesh_grid(straight_rods([*long, *([[x + 0.5, -0.01], [x + 0.5, 0.05]] for x in range(11))]), 0.5)
+    bend = np.ones(len(mesh.rod_nodes))
+    for k, rod in enumerate(mesh.grid.rods[:rods]):
+        at = mesh.stations[mesh.rod_slice(k)] - rod.start
+        bend[mesh.rod_slice(k)] = [
+            next((b for b, s in ((0, (5, 6)), (0.5, (4,))) if np.isclose(x, s).any()), 1) for x in at
+        ]
+    made = fabricate(mesh, ROD, Fabrication(stock_length=5.0), curvature=bend)
+    for k in range(rods):
+        assert sorted(length for rod, _, length in made.pieces if rod == k) == pytest.approx(pieces)
+    assert made.nesting is not None
+    assert len(made.nesting.bars) == (3 if rods == 1 else 7)
+
+
+def test_a_rod_within_its_stock_is_not_spliced() -> None:
+    assert splices(1.0, [0.2, 0.4], 1.0, stations=[0.0, 1.0], curvature=[0.0, 0.0]) == []
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_every_cell_has_two_diagonals(turned: bool) -> None:
+    """A 3 x 4 lattice of 2 by 1 m cells; also where every second rod runs the other way."""
+    ends = [[[0, y], [8, y]] for y in (1.0, 2.0, 3.0)] + [[[x, 0], [x, 4]] for x in (1.0, 3.0, 5.0, 7.0)]
+    if turned:
+        ends = [pair[::-1] if k % 2 else pair for k, pair in enumerate(ends)]
+    grid = straight_rods(ends)
+    places = np.array(
+        [grid.rods[a].point(s) for (a, _), (s, _) in zip(grid.crossings.rods, grid.crossings.at, strict=True)]
+    )
+    sheared = np.column_stack([places @ np.array([[1, 0.5], [0, 1]]).T, 0 * places[:, 0]])
+    found = diagonals(grid.crossings.rods, grid.crossings.at, places, sheared)
+    assert len(found) == 2 * 2 * 3
+    assert len({frozenset(one.joints) for one in found}) == len(found)
+    np.testing.assert_allclose([one.flat for one in found], np.hypot(2, 1))
+    expected = {round(float(np.hypot(2 + 0.5 * side, 1)), 9) for side in (1, -1)}
+    assert {round(one.final, 9) for one in found} == expected
+
+
+def test_a_cell_with_a_missing_joint_has_none() -> None:
+    ends = [[[0, y], [8, y]] for y in (1.0, 2.0)] + [[[1.0, 0], [1.0, 4]], [[3.0, 0], [3.0, 1.5]], [[5.0, 0], [5.0, 4]]]
+    grid = straight_rods(ends)
+    places = np.zeros((len(grid.crossings), 3))
+    assert diagonals(grid.crossings.rods, grid.crossings.at, places, places) == []
+
+
+def lattice() -> FlatGrid:
+    return GridLayout.orthogonal(rods=(4, 5), spacing=0.1, length=0.6, edge=0.05).flat_grid((4, 5), 0.6)
+
+
+def test_lengths_of_the_workshop_add_up() -> None:
+    mesh = mesh_grid(lattice(), 0.05)
+    made = fabricate(mesh, ROD, Fabrication(end_allowance=0.02, stock_length=0.4, kerf=0.003))
+    np.testing.assert_allclose(made.cut_length, 0.64)
+    np.testing.assert_allclose(made.mass, 0.64 * ROD.mass_per_length)
+    for k, at in enumerate(made.splices):
+        pieces = [length for rod, _, length in made.pieces if rod == k]
+        assert len(pieces) == len(at) + 1 == 2
+        assert sum(pieces) == pytest.approx(0.64)
+        assert pieces[0] == pytest.approx(0.02 + at[0])  # splices are measured from the rod's start, not its cut end
+        mine = mesh.grid.crossings.at[mesh.grid.crossings.rods == k] - mesh.grid.rods[k].start
+        assert np.abs(mine - at[0]).min() == pytest.approx(0.05)
+    assert made.nesting is not None
+    assert made.warnings == ()
+
+
+def test_stock_that_is_too_short_is_said() -> None:
+    made = fabricate(mesh_grid(lattice(), 0.05), ROD, Fabrication(stock_length=0.08))
+    assert made.nesting is None
+    assert made.warnings[0].startswith("9 rods (the first: U01) cannot be spliced between joints from stock of 80 mm")
+
+
+def test_one_rod_that_cannot_be_spliced_is_named_alone() -> None:
+    long = [[-0.3, 0.0], [0.3, 0.0]]
+    grid = rs.straight_rods([long, *([[x, -0.03], [x, 0.03]] for x in np.linspace(-0.3, 0.3, 5))])
+    made = fabricate(mesh_grid(grid, 0.02), ROD, Fabrication(stock_length=0.08))
+    assert made.warnings == ("rod R01 cannot be spliced between joints from stock of 80 mm: give longer stock",)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [({"end_allowance": -0.01}, "end allowance"), ({"kerf": float("nan")}, "kerf"),
+     ({"kerf": 0.003}, "kerf of 0.003 m is lost where stock is cut: give its stock_length"),
+     ({"stock_length": 0.0}, "stock of 0.0 m"), ({"stock_length": 0.002, "kerf": 0.003}, "longer bars")],
+)  # fmt: skip
+def test_lengths_that_cannot_be_are_refused(options: dict[str, float], reason: str) -> None:
+    with pytest.raises(rs.InputError, match=reason):
+        Fabrication(**options)

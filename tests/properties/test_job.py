@@ -1,0 +1,379 @@
+"""A job is a value: the same however it is written; run again from an earlier form, only what changed is run."""
+
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.case import BUILT_IN
+from rodshell.cli import main
+from rodshell.errors import InputError, OutOfTimeError
+from rodshell.run import STAGES
+
+SIZE = 0.2
+ROD = rs.Rod(rs.Circle(1e-3), rs.Material(1e6, 1e3))
+COARSE = {"layout.rods": "auto", "layout.length": "auto", "layout.spacing": "60 mm", "layout.edge": "20 mm"}
+COARSE |= {"checks.stages": 2}
+ALL = tuple(STAGES)[:-1]  # files are written when they are asked for
+SAME = 1e-9 * SIZE  # Newton's last step is shorter than 1e-6 of the size, the error left its square
+
+
+def dome(**changes: object) -> rs.Job:
+    return rs.Job.load("hemisphere", COARSE, **changes)
+
+
+@pytest.fixture(scope="module")
+def earlier() -> rs.Form:
+    return dome().run()
+
+
+# A value
+
+
+@pytest.mark.parametrize("name", [name for name in BUILT_IN if name != "heightfield"])
+def test_a_job_its_text_its_pickle_and_its_copy_are_equal(name: str) -> None:
+    job = rs.Job.load(name)
+    for same in (rs.Job.load(name), rs.Job.load(job.to_toml()), pickle.loads(pickle.dumps(job)), job.changed()):
+        assert same == job
+        assert hash(same) == hash(job)
+        assert same.to_toml() == job.to_toml()
+    assert job.changed(drawings__author="Ada") != job
+    assert job != name
+
+
+def test_options_a_file_and_python_make_the_same_job(tmp_path: Path) -> None:
+    (tmp_path / "roof.toml").write_text(
+        '[layout]\nspacing = "50 mm"\nrotate = "10 deg"\n[rod.material]\npreset = "gfrp"'
+    )
+    loaded = rs.Job.load(tmp_path / "roof.toml", pop_up__ends="pinned")
+    tables = {"layout": {"spacing": 0.05, "rotate": "10 deg"}, "rod.material.preset": "gfrp", "pop_up.ends": "pinned"}
+    assert loaded == rs.Job.load(tables)
+    assert loaded == rs.Job.load("layout = {spacing = 0.05}\nrod.material.preset = 'gfrp'", {"layout.rotate": "10 deg"},
+                                 pop_up__ends="pinned")  # fmt: skip
+    changes = {"layout": {"rotate": "10 deg"}, "pop_up.ends": "pinned"}
+    assert rs.Job.load("layout.spacing = 0.05\nrod.material.preset = 'gfrp'").changed(changes) == loaded
+
+
+def test_a_job_of_objects_is_the_job_of_their_case() -> None:
+    layout = rs.GridLayout.orthogonal(rods=(17, 17), spacing=0.03, length=1.2, edge=0.005)
+    job = rs.Job(rs.Hemisphere(SIZE), layout, ROD)
+    assert job == rs.Job.load("hemisphere")
+    other = rs.Job(
+        rs.Hemisphere(SIZE), layout, ROD,
+        method=rs.Gravity(acceleration=1.6), anchor=(0.1, 0.0), ends="pinned", joint=rs.Pin(mass=0.1),
+        options=rs.OutputOptions(strength=3e7, stages=2),
+    )  # fmt: skip
+    asked = {"drape.method": "gravity", "drape.gravity": 1.6, "drape.anchor": "0.1, 0", "pop_up.ends": "pinned"}
+    asked |= {"joint.kind": "pin", "joint.mass": "100 g", "checks.strength": "30 MPa", "checks.stages": 2}
+    assert other == job.changed(asked)
+    assert other.case.build().method == rs.Gravity(acceleration=1.6)
+    seams = rs.Job(rs.Hemisphere(SIZE), rs.GridLayout.orthogonal(spacing=0.03, edge=0.005), ROD, rotate="auto",
+                   seams=[[(-1, 0), (1, 0)]], patches={"B": rs.PatchLayout(spacing=(0.02, 0.02))})  # fmt: skip
+    again = rs.Job.load(seams.to_toml())
+    assert again == seams
+    assert again.case.layout.rotate == "auto"
+    assert again.case.seams.own() == {"B": rs.PatchLayout(spacing=(0.02, 0.02))}
+
+
+def bowl(x, y):
+    return 0.1 - x * x - y * y
+
+
+def mesh() -> rs.Target:
+    x = np.linspace(-1, 1, 9)
+    points = np.array([(a, b, 0.5 * np.cos(a) * np.cos(b)) for a in x for b in x])
+    corner = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    faces = np.column_stack([corner, corner + 9, corner + 10, corner, corner + 10, corner + 1])
+    return rs.Freeform.of(points, faces.reshape(-1, 3))
+
+
+LAYOUT = rs.GridLayout.orthogonal(spacing=0.06, edge=0.02)
+FUNCTION = rs.HeightField(function=bowl, domain=rs.Disc(SIZE))
+HELD = {
+    "a Python function": (lambda: rs.Job(FUNCTION, LAYOUT, ROD), "the Python function .*bowl"),
+    "a mesh made in Python": (lambda: rs.Job(mesh(), LAYOUT, ROD), "a mesh of 81 vertices made in Python"),
+    "linkers of their own rod": (
+        lambda: rs.Job(rs.Hemisphere(SIZE), LAYOUT, ROD, joint=rs.Linker(rod=ROD)),
+        "joints with linkers of another rod",
+    ),
+    "rods left out": (
+        lambda: rs.Job(rs.Hemisphere(SIZE), replace(LAYOUT, left_out=("U01",)), ROD),
+        "a layout with lines at unequal spacing or rods left out",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_what_no_case_can_describe_is_kept_as_it_is(name: str) -> None:
+    make, words = HELD[name]
+    job = make()
+    assert job == pickle.loads(pickle.dumps(job)) or name.startswith("a ")  # another object is another target
+    assert job.changed(pop_up__ends="pinned").changed(pop_up__ends="both") == job
+    with pytest.raises(InputError, match=f"no case file can describe {words}"):
+        job.to_toml()
+    assert "\n" not in repr(job)
+
+
+def test_equality_of_targets_from_python_is_by_the_object() -> None:
+    target = mesh()
+    assert rs.Job(target, LAYOUT, ROD) == rs.Job(target, LAYOUT, ROD)
+    assert rs.Job(target, LAYOUT, ROD) != rs.Job(mesh(), LAYOUT, ROD)
+    assert len({rs.Job(target, LAYOUT, ROD), rs.Job(target, LAYOUT, ROD)}) == 1
+    with pytest.raises(InputError, match=r"target.radius cannot be changed: it is a mesh .*: make a new job"):
+        rs.Job(target, LAYOUT, ROD).changed(target__radius=1)
+
+
+def test_a_job_of_python_objects_runs_with_them(tmp_path: Path) -> None:
+    form = rs.Job(FUNCTION, LAYOUT, ROD, ends="clamped", options=rs.OutputOptions(stages=0)).run()
+    assert form.target is FUNCTION
+    assert form.status == "converged"
+    assert "no case file can give the Python function" in form.archive().case_toml
+    frames = rs.Fall(stream=tmp_path / "frames", duration=0.01, every=2, time_step=0.005)
+    job = rs.Job(rs.Hemisphere(SIZE), LAYOUT, ROD, method=frames)
+    assert rs.Job.load(job.to_toml()).case.build().method == replace(frames, stream=None, every=1)
+    assert job.case.build().method == frames
+
+
+def test_a_job_is_read_only_and_says_what_it_is_in_one_line() -> None:
+    job = dome(seams__lines="-1,0; 1,0")
+    with pytest.raises(AttributeError, match=r"use job.changed\(...\)"):
+        job.case = None  # type: ignore[misc]
+    assert repr(job) == (
+        "<rodshell.Job: hemisphere, spacing 60 mm x 60 mm, 1 seams, bound drape, ball joints, ends pinned and clamped>"
+    )
+
+
+def test_bad_changes_are_one_sentence() -> None:
+    with pytest.raises(InputError, match=r"unknown key layout.spaceing: did you mean layout.spacing\?"):
+        dome(layout__spaceing=1)
+    with pytest.raises(InputError, match=r"unknown key layout.rotatee: did you mean layout.rotate\?"):
+        dome().changed(layout__rotatee="10 deg")
+    with pytest.raises(InputError, match="until must be"):
+        dome().run(until="checks")
+
+
+def test_a_file_of_a_target_may_be_named_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "roof.obj").write_text("")
+    monkeypatch.chdir(tmp_path)
+    assert (
+        rs.Job.load("roof.obj") == rs.Job.load(tmp_path / "roof.obj") == rs.Job.load(rs.Job.load("roof.obj").to_toml())
+    )
+
+
+# Run again: only what changed
+
+CHANGES = {
+    "drawings": ({"drawings.author": "Ada", "drawings.paper": "A1"}, ALL),
+    "fabrication": ({"fabrication.end_allowance": "10 mm"}, ALL[:5]),
+    "a strength": ({"checks.strength": "30 MPa"}, ALL[:4]),
+    "stages of the checks": ({"checks.stages": 1}, ALL[:4]),
+    "ends": ({"pop_up.ends": "clamped"}, ALL[:3]),
+    "heading": ({"layout.rotate": "10 deg"}, ALL[:1]),
+    "rod": ({"rod.section.radius": "1.2 mm"}, ALL[:1]),
+    "joint": ({"joint.kind": "pin"}, ALL[:1]),
+    "anchor": ({"drape.anchor": "20 mm, 0"}, ALL[:1]),
+    "target": ({"target.radius": "210 mm"}, ()),
+    "drawings and ends": ({"drawings.author": "Ada", "pop_up.ends": "pinned"}, ALL[:3]),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_only_stages_from_the_first_changed_one_run_again_and_give_the_cold_result(
+    change: str, earlier: rs.Form
+) -> None:
+    changes, reused = CHANGES[change]
+    told = set[str]()
+    job = earlier_job().changed(changes)
+    warm = job.run(warm_start=earlier, progress=lambda stage, *_: told.add(stage))
+    cold = job.run()
+    assert warm.reused == reused
+    assert cold.reused == ()
+    runs = {"net": "drape", "drape": "drape", "pop-up": "pop-up", "self-weight": "checks", "deployment": "checks"}
+    assert not {stage for stage in told if runs.get(stage, "checks") in reused}
+    ours, theirs = warm.archive(), cold.archive()
+    assert list(ours.states) == list(theirs.states)
+    for name in ("flat", "draped", "popped_pinned", "popped_clamped"):
+        if name in theirs.states:
+            np.testing.assert_allclose(ours.states[name], theirs.states[name], rtol=0, atol=SAME)
+    assert ours.case_toml == theirs.case_toml == job.to_toml()
+    for key in ("verdict", "drawings", "warnings", "status", "dropped"):
+        assert getattr(ours.results, key) == getattr(theirs.results, key)
+    made, wanted = warm.fabrication, cold.fabrication
+    assert made.options == wanted.options
+    np.testing.assert_allclose(made.cut_length, wanted.cut_length, rtol=0, atol=SAME)
+
+
+def earlier_job() -> rs.Job:
+    return dome()
+
+
+def test_ends_that_were_popped_up_before_are_taken_over(earlier: rs.Form) -> None:
+    both, one = dome(), dome(pop_up__ends="clamped")
+    first = one.run(until="pop-up")
+    assert first.ends == ("clamped",)
+    second = both.run(warm_start=first, until="pop-up")
+    assert second.popped["clamped"] is first.popped["clamped"]
+    assert list(second.popped) == ["pinned", "clamped"]
+    assert second.reused == ALL[:3]
+    assert one.run(warm_start=second).popped["clamped"] is first.popped["clamped"]
+
+
+def test_an_unchanged_job_gives_an_equal_form_at_once(earlier: rs.Form) -> None:
+    def none(stage: str, detail: str, residual: float) -> None:
+        raise AssertionError(stage)
+
+    again = dome().run(warm_start=earlier, progress=none)
+    assert again == earlier
+    assert hash(again) == hash(earlier)
+    assert again.reused == ALL
+    assert again.checks is earlier.checks
+    assert earlier != dome(layout__rotate="1 deg").run(until="pop-up")
+    assert earlier != "a form"
+
+
+def test_checks_that_were_not_made_are_not_reused() -> None:
+    first = dome().run(until="pop-up")
+    assert first.known_checks is None
+    again = dome().run(warm_start=first)
+    assert again.reused == ALL[:4]
+    assert again.known_checks is not None
+    assert first.checks.bending.keys() == again.checks.bending.keys()
+
+
+def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
+    def write(height: float) -> None:
+        x = np.linspace(-SIZE, SIZE, 21)
+        rows = [",".join(f"{height * (1 - a * a / SIZE**2) * (1 - b * b / SIZE**2):.6f}" for a in x) for b in x]
+        (tmp_path / "roof.csv").write_text("\n".join(rows))
+
+    write(0.1)
+    tables = {"target": {"kind": "heights", "file": str(tmp_path / "roof.csv"), "size": "0.4, 0.4", "height": "1 m"}}
+    job = rs.Job.load({**tables, "layout": {"spacing": 0.06}, "rod.section.radius": "1 mm", "pop_up.ends": "pinned"},
+                      {"rod.material.youngs_modulus": 1e6, "checks.stages": 0})  # fmt: skip
+    first = job.run(until="pop-up")
+    same = job.run(warm_start=first, until="pop-up")
+    assert same.reused == ALL[:4]
+    assert same.target is first.target
+    write(0.08)
+    other = job.run(warm_start=first, until="pop-up")
+    assert other.reused == ()
+    assert np.ptp(other.popped["pinned"].positions[:, 2]) < np.ptp(first.popped["pinned"].positions[:, 2]) - 0.01
+
+
+def test_what_the_time_limit_cut_short_is_run_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter(np.arange(0.0, 1e6))
+    monkeypatch.setattr("rodshell.formfinding.progress.monotonic", lambda: next(clock))
+    job, whole = dome(), dome().run()
+    limit, seen = 0.5, set[tuple[str, ...]]()
+    while True:
+        limit += 1 if limit < 30 else 9
+        try:
+            part = job.run(time_limit=limit)
+        except OutOfTimeError:
+            continue
+        if part.archive().results.plain()["status"] == "converged":
+            break
+        again = job.run(warm_start=part)
+        seen.add(again.reused)
+        for ends, shell in whole.popped.items():
+            np.testing.assert_allclose(again.popped[ends].positions, shell.positions, rtol=0, atol=SAME)
+        assert again.archive().results.plain()["status"] == "converged"
+    assert {ALL[:1], ALL[:3], ALL[:4]} <= seen
+
+
+def test_a_search_is_not_repeated_and_decides_the_same() -> None:
+    job = rs.Job.load("ellipsoid", COARSE, layout__rotate="auto", pop_up__ends="clamped")
+    first = job.run(until="pop-up")
+    assert first.search is not None
+    assert first.case.layout.rotate == first.search.best.heading
+    told = set[str]()
+    again = job.changed(drawings__author="Ada").run(warm_start=first, progress=lambda stage, *_: told.add(stage))
+    assert "search" not in told
+    assert again.search is first.search
+    assert again.reused == ALL[:4]
+
+
+def test_patches_are_taken_over_too() -> None:
+    job = dome(seams__lines="-1,-1; 1,1", checks__stages=0)
+    first = job.run()
+    assert [patch.name for patch in first.patches] == ["A", "B"]
+    assert job.run(warm_start=first).reused == ALL
+    pinned = job.changed(pop_up__ends="pinned").run(warm_start=first)
+    assert pinned.reused == ALL[:3]
+    assert pinned.patches[1].popped["pinned"] is first.patches[1].popped["pinned"]
+    turned = job.changed(layout__rotate="5 deg")
+    warm, cold = turned.run(warm_start=first, until="pop-up"), turned.run(until="pop-up")
+    assert warm.reused == ALL[:1]
+    np.testing.assert_allclose(warm.popped["clamped"].positions, cold.popped["clamped"].positions, rtol=0, atol=SAME)
+
+
+def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
+    folder = earlier.save(tmp_path / "dome", kinds=["csv"])
+    job = rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
+    assert job == rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
+    assert job != rs.Job.of_table(folder, rod__section__radius="1 mm", checks__stages=1)
+    form = job.run()
+    assert form.from_table
+    assert form.agreement == {}
+    assert form.archive().case_toml == ""
+    assert job.run(warm_start=form).reused == ("target", "pop-up", "checks", "fabrication")
+    thicker = job.changed(rod__section__radius="1.1 mm").run(warm_start=form)
+    assert thicker.reused == ("target",)
+    assert thicker.rod.section.radius == 1.1e-3
+    assert dome().run(warm_start=form, until="pop-up").reused == ()
+    for read in (lambda: form.target, lambda: form.layout, lambda: form.draped):
+        with pytest.raises(InputError, match="a table of rods has no target"):
+            read()
+    with pytest.raises(InputError, match="no case file can describe a table of"):
+        job.to_toml()
+
+
+def test_the_command_line_runs_the_job(tmp_path: Path) -> None:
+    options = [word for key, value in COARSE.items() for word in (f"--{key}", str(value))]
+    assert main(["form", "hemisphere", *options, "--only", "csv", "--out", str(tmp_path / "out"), "-q"]) == 0
+    saved, made = rs.read(tmp_path / "out"), dome().run().archive()
+    assert saved.case_toml == made.case_toml
+    for name, state in made.states.items():
+        np.testing.assert_array_equal(saved.states[name], state)
+    ours, theirs = made.results.plain(), saved.results.plain()
+    assert {key for key in ours if ours[key] != theirs[key]} <= {"drape", "pop_up"}  # seconds
+
+
+# The form
+
+
+def test_a_form_of_patches_means_the_same_by_the_same_names() -> None:
+    one, two = dome(pop_up__ends="pinned").run(), dome(pop_up__ends="pinned", seams__lines="-1,-1; 1,1").run()
+    for form, count in ((one, 1), (two, 2)):
+        assert len(form.patches) == count
+        nodes = form.footprint.mesh.node_count
+        assert form.popped["pinned"].positions.shape == (nodes, 3)
+        assert len(form.agreement["pinned"].gaps) == nodes
+        assert len(form.checks["pinned"].bending.curvature) == len(form.footprint.mesh.rod_nodes)
+        assert len(form.boundary.points) == 2 * len(form.footprint.rods)
+        assert form.checks["pinned"].reactions.forces.shape == (2 * len(form.footprint.rods), 3)
+        assert len(form.fabrication.cut_length) == len(form.footprint.rods)
+        assert form.verdict.level in ("good", "check", "unbuildable")
+        assert "\n" not in repr(form)
+        assert len(repr(form)) < 200
+    assert one.draped is one.patches[0].draped
+    assert two.meetings
+    with pytest.raises(InputError, match=r"this form has 2 patches: take patches\[k\].draped"):
+        two.draped  # noqa: B018
+    with pytest.raises(KeyError):
+        one.checks["clamped"]
+
+
+def test_a_notebook_shows_the_shell_and_its_verdict(earlier: rs.Form) -> None:
+    shown = earlier._repr_html_()
+    assert "<svg" in shown
+    assert f"<b>{earlier.verdict.level}</b>" in shown
+    assert "&lt;rodshell.Form of hemisphere" in shown
+
+
+def test_the_ready_progress_says_the_stages(capsys: pytest.CaptureFixture[str]) -> None:
+    dome(pop_up__ends="pinned").run(progress=rs.bar, until="pop-up")
+    assert capsys.readouterr().err.splitlines() == [f"rodshell: {stage}" for stage in ("net", "drape", "pop-up")]
