@@ -253,7 +253,7 @@ class _Stages:
         """Pinned, from the flat grid: the ends go straight to the boundary while the grid rises."""
         mesh, boundary = self.footprint.mesh, self.boundary
         shell = self.shell("pinned")
-        flat = laid_below(mesh, boundary.points, float(boundary.points[:, 2].mean()))
+        flat = laid_below(mesh, boundary.points, float(boundary.points.mean(axis=0)[2]))
         first = flat[mesh.ends.ravel()]
         found = follow(
             lambda t: self.problem(shell, (1 - t) * first + t * boundary.points),
