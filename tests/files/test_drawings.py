@@ -129,8 +129,8 @@ def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
     }
     assert list(sheets) == [row + column for row in "ABCD" for column in "12"]
     rods = {part: {path.name for path in sheet.content.paths if path.name} for part, sheet in sheets.items()}
-    top = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "u" else -1.0).id
-    right = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "v" else -1.0).id
+    top = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "u" else -1.0).id
+    right = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "v" else -1.0).id
     assert {part for part, drawn in rods.items() if top in drawn} == {"A1", "A2"}
     assert {part[1] for part, drawn in rods.items() if right in drawn} == {"2"}
     middle = 0.5 * np.sum(room(PAPER), axis=0)

@@ -154,7 +154,7 @@ ELSEWHERE = {
                                     'method "bound" has no gravity: leave it out, or set drape.method to'),
     "a radius in words": ("target.radius", "two", lambda: rs.Hemisphere(radius="two"), 'in m, not "two"',
                           'target.radius = "two": '),
-    "a joint's kind": ("joint.kind", "pinn", lambda: job(joint="pinn"), r"such as rodshell.Pin\(\), not 'pinn'",
+    "a joint's kind": ("joint.kind", "pinn", lambda: job(joint="pinn"), r'such as rodshell.Pin\(\), not "pinn"',
                        '"pin", "spring", "linker" or "rigid", not "pinn": did you mean "pin"?'),
     "an anchor of one number": ("drape.anchor", "0.1", lambda: job(anchor=0.1), "must be two finite numbers",
                                 'drape.anchor = "0.1": needs two values'),

@@ -229,7 +229,7 @@ def _points(rest: ArrayLike) -> int:
     if len(shape) != 2 or shape[0] < 3:
         what = f"an array {shape}" if shape else described(rest)
         raise InputError(f"a rod needs 3 nodes or more, (n, 3) in m, not {what}")
-    return shape[0]
+    return int(shape[0])
 
 
 def _clamps(clamped: Clamps, tangents: Floats, lengths: Floats, closed: bool) -> dict[End, Floats]:

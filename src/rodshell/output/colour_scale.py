@@ -77,7 +77,7 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
-    """The largest gap [mm], signed, and its place (3,) [m], as the agreement has them: it looks between nodes too.
+    """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too.
 
     shape : one whose gaps are known.
     """

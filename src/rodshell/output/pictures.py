@@ -218,7 +218,7 @@ def _dot(pencil: Pencil, at: Floats, radius: float, pen: Pen) -> None:
 
 
 def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None:
-    """A ring around the largest gap, and its size, both as the agreement has them."""
+    """A ring around the largest gap, and its size, both from the agreement."""
     assert shape.gap is not None
     gap, at = largest_gap(archive, shape)
     if abs(gap) <= FINEST:
