@@ -9,7 +9,7 @@ from rodshell.arrays import Bools, Floats
 from rodshell.formfinding.layers import joint_tangents
 from rodshell.formfinding.methods import Method
 from rodshell.formfinding.section_limits import StrongBending
-from rodshell.geometry.vectors import cross, dot
+from rodshell.geometry.frames import cross, dot
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.nets import ChebyshevNet
 from rodshell.rods.section import Rod

@@ -7,7 +7,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.vectors import cross
+from rodshell.geometry.frames import cross
 from rodshell.nets import geodesics
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
