@@ -15,7 +15,7 @@ from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.end_matching import LEAVE_OUT, choose_families
 from rodshell.formfinding.seams import End, carried_heading, in_a_row, patches_of
 from rodshell.geometry.curves import closed_loops, join_end_to_end
-from rodshell.layout.side_by_side import side_by_side
+from rodshell.layout.mesh import side_by_side
 from rodshell.results import read
 from rodshell.targets.patch import Seam
 

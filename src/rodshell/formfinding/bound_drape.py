@@ -19,14 +19,14 @@ from rodshell.formfinding.layers import thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.section_limits import strong_bending
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import whole_rods
 from rodshell.layout.mesh import nodes_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.nets.apron import with_apron
+from rodshell.nets.net_ends import with_apron
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.rods.stretch import Stretch
 from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
@@ -68,7 +68,7 @@ def bound_drape(
     eccentricity = joint.eccentricity if joint else 0.0
     near = warm_start.net if warm_start else None
     net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity)
-    grid = with_apron(net, CLEARANCE * layout.edge)
+    grid = with_apron(net.rods, net.net, net.lines, CLEARANCE * layout.edge)
     cuts = [list[FlatRod]() for _ in grid.rods]
     for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
         cuts[whole].append(piece)

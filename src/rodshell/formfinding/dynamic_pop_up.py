@@ -15,7 +15,7 @@ from rodshell.formfinding.popup import FIRST_RISE, arched, laid_below
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
 from rodshell.rods.section import Rod

@@ -18,7 +18,7 @@ from rodshell.formfinding.layers import middle_surface
 from rodshell.formfinding.methods import Draped, DrapeFigures, Fall, smallest_joint_angle
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell

@@ -17,7 +17,7 @@ from rodshell.contact.modified_mass import Stopped
 from rodshell.errors import InputError
 from rodshell.formfinding.layers import joint_tangents
 from rodshell.formfinding.section_limits import StrongBending
-from rodshell.geometry.vectors import cross, dot
+from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.nets import ChebyshevNet

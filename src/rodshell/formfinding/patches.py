@@ -21,7 +21,7 @@ from rodshell.formfinding.section_limits import flat_warnings
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout
-from rodshell.layout.side_by_side import SideBySide, side_by_side
+from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.rods.section import Rod
 from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target

@@ -19,7 +19,7 @@ from rodshell.formfinding.layers import node_normals
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.curves import on_curve
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.model import Shell

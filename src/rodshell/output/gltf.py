@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
-from rodshell.geometry.frames import directors_along
-from rodshell.geometry.vectors import cross, unit
+from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.grid import rods_of, shape_of
 from rodshell.results import Archive

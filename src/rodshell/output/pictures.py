@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.layout.outline import opens
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, length_unit, mixed, scale_of
 from rodshell.output.drawing import Drawing, Path, Pen, Pencil
-from rodshell.output.grid import GridRod, Shape, outlines_of, rods_of, shape_of
+from rodshell.output.grid import GridRod, Shape, opens, outlines_of, rods_of, shape_of
 from rodshell.output.svg import picture_document
 from rodshell.output.view import View, ground_axes
 from rodshell.results.archive import SHELLS, Archive, made_once

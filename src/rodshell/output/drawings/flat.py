@@ -14,9 +14,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats
-from rodshell.layout.outline import opens
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
-from rodshell.output.grid import GridJoint, GridRod, joints_of, outlines_of, rods_of
+from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, lines_meet, outward, place, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
