@@ -56,7 +56,7 @@ def sphere() -> rs.Form:
     except rs.NetLimitError as reason:
         print(reason)
     form = rs.find_form(ball(), LAYOUT, LATH, seams=[[(-6.0, 0.0), (6.0, 0.0)]])
-    assert min(degrees(laid.net.min_angle) for laid in form.laid.values()) > 30.0
+    assert min(degrees(patch.draped.net.min_angle) for patch in form.patches) > 30.0
     assert form.agreement["clamped"].rms_relative < 5e-4
     return form
 

@@ -103,7 +103,7 @@ class Form:
     @property
     def patches(self) -> tuple[PatchForm, ...]:
         """The stages of each patch; a form in one piece has one."""
-        return tuple(self.stages.found.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
+        return tuple(self.stages.patches.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
 
     @property
     def seams(self) -> tuple[Seam, ...]:
@@ -295,7 +295,7 @@ class Form:
         settings: dict[str, Any] = {"stages": self.options.stages, "shear_weight": self._weight(self.options)}
         if not isinstance(self.stages, PatchedForm):
             return check(self.stages.popped, self.rod, **settings, progress=progress)
-        found = self.stages.found
+        found = self.stages.patches
         each = {name: check(patch.popped, self.rod, **settings, progress=progress) for name, patch in found.items()}
         met = {}
         for ends in self.stages.popped:

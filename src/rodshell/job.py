@@ -242,14 +242,15 @@ class Job:
         run = Run(self._case, self._target, warm_start, limited(progress, time_limit), announce, Path(frames_in))
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
         with entered:
-            form = run.table_form() if self._case.target.kind == "table" else run.form()
+            form = run.table_form() if self._case.of_table else run.form()
             return form if until == "pop-up" else form.finished(run.progress)
 
     def __repr__(self) -> str:
         case = self._case
-        if case.target.kind == "table":
-            return f"<rodshell.Job: pop up {case.target.held.what}>"
-        what = case.drawings.name or (case.target.held.what if case.target.held else case.target.kind)
+        target = case.target.held.what if case.target.held else case.target.kind
+        if case.of_table:
+            return f"<rodshell.Job: pop up {target}>"
+        what = case.drawings.name or target
         source = getattr(case.target, "file", None)
         spacing = "auto" if case.layout.spacing == "auto" else " x ".join(map(length_text, case.layout.spacing))
         seams = f", {len(case.seams.lines)} seams" if case.seams.lines else ""

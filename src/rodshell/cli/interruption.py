@@ -45,8 +45,8 @@ class Interruption:
     def __enter__(self) -> Self:
         Interruption.current = self
         if threading.current_thread() is threading.main_thread():
-            wanted = [one for one in SIGNALS if signal.getsignal(one) not in (signal.SIG_IGN, None)]
-            self._before = {one: signal.signal(one, self._handle) for one in wanted}
+            wanted = [number for number in SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
+            self._before = {number: signal.signal(number, self._handle) for number in wanted}
         sys.unraisablehook = self._unraisable
         return self
 

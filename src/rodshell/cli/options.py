@@ -107,7 +107,7 @@ def overrides_of(values: Mapping[str, str | None]) -> dict[str, object]:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What commands that run a job are told of their output.
+    """Options of the commands that run a job, of their output.
 
     Parameters
     ----------

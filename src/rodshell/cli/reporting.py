@@ -121,8 +121,8 @@ def compiled_before() -> bool:
     if numba.config.DISABLE_JIT:
         return True
     index = f"*.py{sys.version_info.major}{sys.version_info.minor}.nbi"
-    own = os.environ.get("NUMBA_CACHE_DIR")
-    places = [own] if own else [Path(rodshell.__file__).parent, user_cache_dir("numba", appauthor=False)]
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    places = [given] if given else [Path(rodshell.__file__).parent, user_cache_dir("numba", appauthor=False)]
     return any(next(Path(place).rglob(index), None) for place in places)
 
 
@@ -252,7 +252,7 @@ def deliver(
 
 
 def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:
-    """Where a result was saved: beside its place, if somebody put files there while the job ran."""
+    """Where a result was saved: next to its place, if somebody put files there while the job ran."""
     from rodshell.results.folder import ForeignFileError, open_folder
 
     try:

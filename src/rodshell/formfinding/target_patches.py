@@ -44,7 +44,7 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
     return dict(zip(ascii_uppercase, found, strict=False))
 
 
-def carried_heading(target: Target, anchor: tuple[float, float], rotate: float) -> float:
+def transported_heading(target: Target, anchor: tuple[float, float], rotate: float) -> float:
     """Angle against x, seen from above [rad], of the summit's heading `rotate` where it is carried to an anchor.
 
     By the turn that takes one normal into the other: of patches that mirror each other, so do the headings.
