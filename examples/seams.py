@@ -1,4 +1,4 @@
-"""Several simple gridshells sewn together: a roof of two bumps cut in its valley, and a ball that no one net covers.
+"""Several simple gridshells joined at seams: a roof of two bumps cut in its valley, and a ball that no one net covers.
 
 `python examples/seams.py NAME ...` keeps the results in out/NAME; without names nothing is kept.
 """
