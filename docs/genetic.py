@@ -1,6 +1,6 @@
 """The genetic algorithm's searches that come with the package, made again: `python docs/genetic.py [TARGET ...]`.
 
-All values are kept in out/genetic-searches, so that a run that was stopped goes on; without them it takes about an hour
+All values are kept in out/genetic-searches, so that an interrupted run continues; without them it takes about an hour
 of one processor. `make paper` then writes the table and the pictures.
 """
 
@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 from rodshell.cli.reporting import Progress
-from rodshell.paper.fig6 import CASES
-from rodshell.paper.genetic import KEPT, SEED, find
+from rodshell.paper.cases import CASES
+from rodshell.paper.genetic import SEARCHES, SEED, find
 
 DATA = Path(__file__).parents[1] / "src" / "rodshell" / "paper" / "data"
 
@@ -20,7 +20,7 @@ def main() -> None:
         name = case.target.name
         if name in (sys.argv[1:] or name):
             with Progress(quiet=False) as progress:
-                text = find(case, KEPT, seed=SEED, progress=progress).text()
+                text = find(case, SEARCHES, seed=SEED, progress=progress).json()
             (DATA / f"genetic-{name}.json").write_text(text, encoding="utf-8")
 
 

@@ -4,11 +4,10 @@ Without names all figures are made; the page shows all that there are, so that o
 """
 
 import sys
-from importlib import import_module
 from pathlib import Path
 
 from rodshell.cli.reporting import Progress
-from rodshell.paper import FIGURES
+from rodshell.paper import FIGURES, figure_maker
 from rodshell.results.folder import open_folder
 
 HERE = Path(__file__).parent
@@ -51,7 +50,7 @@ def section(name: str, folder: Path) -> str:
 def main() -> None:
     with Progress(quiet=False) as progress:
         for name in sys.argv[1:] or FIGURES:
-            figure = import_module(f"rodshell.paper.{name}").make(progress)
+            figure = figure_maker(name)(progress)
             with open_folder(HERE / "paper" / name, force=True) as place:  # git keeps what was there
                 figure.save(place)
     made = [name for name in FIGURES if (HERE / "paper" / name / "table.txt").exists()]

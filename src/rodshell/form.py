@@ -32,8 +32,7 @@ from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_seam_forces
 from rodshell.rods.section import Rod
-from rodshell.targets import Target
-from rodshell.targets.patch import Seam
+from rodshell.targets import Seam, Target
 
 Stages = PatchForm | PatchedForm
 

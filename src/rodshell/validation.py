@@ -38,7 +38,7 @@ def instance(name: str, value: object, kind: type | UnionType, wanted: str = "")
     """
     if not isinstance(value, kind):
         what = wanted or f"a rodshell {getattr(kind, '__name__', kind)}"
-        raise InputError(f"{name} must be {what}, not {_described(value)}")
+        raise InputError(f"{name} must be {what}, not {described(value)}")
 
 
 def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
@@ -50,10 +50,10 @@ def choice(name: str, value: object, choices: Sequence[Choice]) -> Choice:
 
 
 def not_a_choice(name: str, value: object, choices: Sequence[str]) -> str:
-    """The sentence on a `value` that is none of the words in `choices`; the same for arguments, keys and options."""
+    """The sentence on a `value` that is not one of the words in `choices`; the same for arguments, keys and options."""
     near = get_close_matches(value, choices, n=1) if isinstance(value, str) else []
     hint = f": did you mean {shown(near[0])}?" if near else ""
-    return f"{name} must be {either(choices)}, not {_described(value)}{hint}"
+    return f"{name} must be {either(choices)}, not {described(value)}{hint}"
 
 
 def either(words: Sequence[str]) -> str:
@@ -73,7 +73,7 @@ def choices_of(name: str, value: Any, choices: Sequence[Choice]) -> tuple[Choice
     """
     words = [value] if isinstance(value, str) else list(value) if isinstance(value, Sequence) else None
     if words is None:
-        raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {_described(value)}")
+        raise InputError(f"{name} must be one or several of {', '.join(map(shown, choices))}, not {described(value)}")
     return tuple(dict.fromkeys(choice(name, word, choices) for word in words))
 
 
@@ -81,7 +81,7 @@ def number(name: str, value: object, unit: str = "") -> float:
     """Return `value`, a finite number, as a float; `unit` is named in the message ("" for a plain number)."""
     real = _real(name, value, unit)
     if not isfinite(real):
-        raise InputError(f"{name} must be finite, not {_described(value)}{unit and ' ' + unit}")
+        raise InputError(f"{name} must be finite, not {described(value)}{unit and ' ' + unit}")
     return real
 
 
@@ -89,7 +89,7 @@ def positive(name: str, value: object, unit: str = "") -> float:
     """Return `value`, a finite number above 0, as a float; see `number`."""
     real = _real(name, value, unit)
     if not 0 < real < inf:
-        raise InputError(f"{name} must be positive, not {_described(value)}{unit and ' ' + unit}")
+        raise InputError(f"{name} must be positive, not {described(value)}{unit and ' ' + unit}")
     return real
 
 
@@ -97,7 +97,7 @@ def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = F
     """Return `value`, a number of 0 or more, as a float; infinity only where it is allowed; see `number`."""
     real = _real(name, value, unit)
     if not 0 <= real <= inf or (real == inf and not infinite):
-        raise InputError(f"{name} must be 0 or more, not {_described(value)}{unit and ' ' + unit}")
+        raise InputError(f"{name} must be 0 or more, not {described(value)}{unit and ' ' + unit}")
     return real
 
 
@@ -119,7 +119,7 @@ def numbers(name: str, value: object, wanted: str, count: int) -> tuple[float, .
 
 def _real(name: str, value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{name} must be a number{unit and ' in ' + unit}, not {_described(value)}")
+        raise InputError(f"{name} must be a number{unit and ' in ' + unit}, not {described(value)}")
     return as_float(value)
 
 
@@ -131,7 +131,7 @@ def point(name: str, value: object) -> None:
 def file_path(name: str, value: object) -> Path:
     """Return `value` as a path; refuse what is neither text nor a path."""
     if not isinstance(value, str | PathLike):
-        raise InputError(f"{name} must be the path of a file, not {_described(value)}")
+        raise InputError(f"{name} must be the path of a file, not {described(value)}")
     return Path(value)
 
 
@@ -205,8 +205,10 @@ def _is_finite(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool) and isfinite(as_float(value))
 
 
-def _described(value: object) -> str:
-    """A number or text as it is, anything else by its class."""
+def described(value: object) -> str:
+    """A number or text as it is, a class as such, anything else by its class."""
+    if isinstance(value, type):
+        return f"the class {value.__name__} itself"
     if isinstance(value, str | Real):
         return shown(value)
     name = type(value).__name__

@@ -49,6 +49,8 @@ class Figures:
     documented: int
     taking_parameters: int
     parameter_sections: int
+    classes_with_fields: int
+    class_sections: int
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,20 @@ def arguments(function: Function) -> int:
     return sum(name not in ("self", "cls") for name in names) + (spec.vararg is not None) + (spec.kwarg is not None)
 
 
+def described(node: ast.AST) -> bool:
+    """Whether a docstring has a section that says what the parameters or fields are."""
+    text = ast.get_docstring(node) or ""  # type: ignore[arg-type]
+    return "Parameters\n---" in text or "Attributes\n---" in text
+
+
+def public_records(file: SourceFile) -> Iterator[ast.ClassDef]:
+    """Public classes of a module with annotated fields: records and settings."""
+    for node in file.tree.body:
+        public = isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+        if public and any(isinstance(child, ast.AnnAssign) for child in node.body):
+            yield node
+
+
 def is_any_dict(node: ast.AST) -> bool:
     """`dict[str, Any]` as an annotation or an alias."""
     return isinstance(node, ast.Subscript) and ast.unparse(node).replace(" ", "") == "dict[str,Any]"
@@ -195,7 +211,7 @@ def figures(root: Path) -> Figures:
     nodes = [node for file in files.values() for node in ast.walk(file.tree)]
     every = [(f"{file.path}:{name}", node, public) for file in files.values() for name, node, public in functions(file)]
     public = [node for _, node, seen in every if seen]
-    documented = [text for text in map(ast.get_docstring, public) if text]
+    records = [node for file in files.values() for node in public_records(file)]
     lengths = [(length(node), name) for name, node, _ in every]
     return Figures(
         files=len(files),
@@ -214,9 +230,11 @@ def figures(root: Path) -> Figures:
         longest=worst(lengths, 10),
         most_arguments=worst([(arguments(node), name) for name, node, _ in every], 5),
         public_functions=len(public),
-        documented=len(documented),
+        documented=sum(ast.get_docstring(node) is not None for node in public),
         taking_parameters=sum(arguments(node) > 0 for node in public),
-        parameter_sections=sum("Parameters\n---" in text for text in documented),
+        parameter_sections=sum(map(described, public)),
+        classes_with_fields=len(records),
+        class_sections=sum(map(described, records)),
     )
 
 
@@ -254,6 +272,7 @@ COLUMNS: tuple[tuple[str, Callable[[Figures], object]], ...] = (
     ("public functions with a docstring", lambda f: share(f.documented, f.public_functions)),
     ("with a Parameters section, of all public", lambda f: share(f.parameter_sections, f.public_functions)),
     ("with a Parameters section, of those that take any", lambda f: share(f.parameter_sections, f.taking_parameters)),
+    ("records whose fields are described", lambda f: share(f.class_sections, f.classes_with_fields)),
 )
 DETAILS: tuple[tuple[str, Callable[[Figures], tuple[str, ...]]], ...] = (
     ("file names that occur twice", lambda f: f.repeated_names),

@@ -7,7 +7,7 @@ from math import radians
 import numpy as np
 
 import rodshell as rs
-from rodshell.paper.two_rods import Demonstration, run, run_statics
+from rodshell.paper.two_rods import Demonstration, run_in_time, run_statics
 from rodshell.solve.linear_stability import step_limit
 from tests.acceptance.rows import Row, print_table
 from tests.analytic import coupling_problems as couplings
@@ -104,7 +104,7 @@ def demonstration_rows() -> Iterator[Row]:
     cases: list[tuple[Demonstration, rs.Linker | rs.Pin]] = [("twisting", rs.Linker()), ("bending", rs.Linker())]
     for demonstration, joint in (*cases, ("twisting", rs.Pin())):
         for coupling in (rs.SharedDofs(), rs.ImplicitPenalty(), rs.ExplicitPenalty()):
-            one = run(demonstration, joint, coupling, until=3.0)
+            one = run_in_time(demonstration, joint, coupling, until=3.0)
             case = f"Fig 4 {demonstration}, {joint.name}, {coupling.name}"
             lag = float(np.degrees(one.start_up_lag))
             assert one.step is not None
@@ -117,7 +117,7 @@ def demonstration_rows() -> Iterator[Row]:
             still = run_statics(demonstration, joint, coupling)
             case = f"Fig 4 {demonstration}, {joint.name}, {coupling.name}, statics"
             yield Row(case, "lag", float(np.degrees(still.start_up_lag)), 1e-4, "deg")
-    behind = run("bending", rs.Pin(), rs.SharedDofs(), until=3.0)
+    behind = run_in_time("bending", rs.Pin(), rs.SharedDofs(), until=3.0)
     note = f"rod 2 turned by {np.degrees(np.ptp(behind.angles)):.1g} of 180 degrees"
     yield Row("Fig 4 bending, pin, shared", "passes, though it must not", float(behind.follows), 0, "", note)
 

@@ -32,7 +32,7 @@ MISUSES = (
         '[pop_up]\nends = "clampd"\n', ("--pop_up.ends", "clampd"),
     ),
     Misuse(
-        "ends misspelled in a form", "clampd",
+        "ends misspelled in a form", "ends",
         'rs.find_form(target, layout, rod, ends="clampd")',
         '[pop_up]\nends = ["clampd"]\n', ("--pop_up.ends", "clampd,pinned"),
     ),

@@ -84,7 +84,7 @@ def contact_rows() -> Iterator[Row]:
         yield Row(case, "bending strain off r over radius", off, 2, "%", note)
         yield Row(case, "strain beyond thin rods said wrongly", float(said != (expected > THIN)), 0)
     checks, form = checked(0.001)
-    wrong = sum(found.pairs for found in (*checks.contact.values(), *checks.contact_on_the_way))
+    wrong = sum(found.pairs for found in (*checks.contact.values(), *checks.deployment_contact))
     yield Row("2 mm rods on the hemisphere", "contacts in all shapes and stages", float(wrong), 0)
 
 

@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipeinc, ellipkinc
 
 import rodshell as rs
-from rodshell.geometry import directors_along
-from rodshell.geometry.frames import parallel_transport, signed_angle
+from rodshell.geometry.frames import directors_along, parallel_transport, signed_angle
 from rodshell.geometry.vectors import unit
 from rodshell.solve.sparse_ldl import Qdldl
 

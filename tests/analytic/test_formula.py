@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rodshell.errors import InputError
-from rodshell.targets import Cap, Disc, EllipseDomain, HeightField, Jet, Paraboloid, Rectangle, parse_formula
+from rodshell.targets import Cap, Disc, HeightField, Paraboloid, Rectangle
+from rodshell.targets.domain import EllipseDomain
+from rodshell.targets.formula import parse_formula
 from rodshell.targets.height_function import Heights
-from rodshell.targets.jet import differences
+from rodshell.targets.jet import Jet, differences
 
 Floats = NDArray[np.float64]
 DISC = Disc(0.2)
@@ -358,7 +360,7 @@ REFUSED = {
     "(-8)^(1/3)": "is not a finite number",
     "exp(1000)": "is not a finite number",
     "x*" * 3000 + "x": "6001 characters",
-    "(" * 150 + "x" + ")" * 150: "100 parentheses",
+    "(" * 150 + "x" + ")" * 150: "100 nested parentheses",
     "-" * 3900 + "x": "nested too deeply",
 }
 
@@ -401,7 +403,7 @@ def test_reading_neither_runs_code_nor_warns():
     """In a process of its own: the parser must survive whatever it is fed."""
     script = (
         "import builtins, warnings; warnings.simplefilter('error')\n"
-        "from rodshell.targets import parse_formula\n"
+        "from rodshell.targets.formula import parse_formula\n"
         "from rodshell.errors import InputError\n"
         "def forbidden(*_): raise SystemExit('code was run')\n"
         "builtins.eval = builtins.exec = forbidden\n"

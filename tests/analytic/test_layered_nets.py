@@ -77,6 +77,6 @@ def test_eccentricities_beyond_the_spacing_or_the_radius_are_refused():
 def test_a_layered_net_is_found_alike_near_another_and_from_nothing():
     target = SURFACES["height field"]
     first = rs.chebyshev_net(target, TURNED)
-    near, afresh = (rs.chebyshev_net(target, TURNED, near=one, eccentricity=4e-3) for one in (first, None))
+    near, afresh = (rs.chebyshev_net(target, TURNED, warm_start=one, eccentricity=4e-3) for one in (first, None))
     ends = [[(rod.start, rod.end) for rod in net.rods] for net in (near, afresh)]
     assert np.abs(np.subtract(*ends)).max() < 1e-10

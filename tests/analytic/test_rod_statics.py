@@ -459,7 +459,7 @@ FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (0, 0, 0)}), "tangent .* must not be zero"),
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"start": (1, 0)}), "three numbers"),
         (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped={"end": (-1, 0, 0)}), "points against the rod"),
-        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped="start"), "in a row"),
+        (lambda: rs.ElasticRod.of(straight(4), ROUND, clamped="start"), "must be a sequence of ends"),
         (lambda: CLAMPED.state(np.zeros((3, 3))), r"shape \(5, 3\)"),
         (lambda: CLAMPED.state(angles=np.zeros(3)), r"shape \(4,\)"),
         (
@@ -476,7 +476,7 @@ FLAT = rs.Rod(rs.Ellipse(1e-3, 2e-3), rs.Material(1e9, 1e3))
         (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(along={0: [(2, 0, 0)]})), "unit vectors"),
         (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(along={0: [X, X]})), "right angles"),
         (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(tangents={"end": (0, 0, 0)})), "must not be zero"),
-        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(directors={"end": X})), "the director lies along"),
+        (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(directors={"end": X})), "the director is along its edge"),
         (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(turns={"end": np.nan})), "turn of the .end. must be finite"),
         (lambda: rs.solve_rod(CLAMPED, rs.RodSupports(angles={0: np.nan})), "angle of edge 0 must be finite"),
         (lambda: rs.solve_rod(CLAMPED, loads=rs.RodLoads(moments={0: np.nan})), "moment at 0 must be finite"),

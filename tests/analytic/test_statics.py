@@ -352,7 +352,7 @@ def test_near_a_saddle_newton_finds_it_unless_told_to_descend(descend):
     ([0.1 * 0.99**k for k in range(20)], False),
 ])  # fmt: skip
 def test_steps_that_repeat_themselves_are_told_from_slow_ones(steps, circles):
-    assert equilibrium._in_circles(steps) == circles
+    assert equilibrium._repeats(steps) == circles
 
 
 def test_a_solve_that_goes_in_circles_is_given_up(monkeypatch):
@@ -367,7 +367,7 @@ def test_a_solve_that_goes_in_circles_is_given_up(monkeypatch):
     monkeypatch.setattr(NewtonStep, "take", take)
     _, found = squeezed_column(8, 0.5)
     assert found.report.status is Status.STALLED
-    assert len(taken) == equilibrium.CIRCLES + 2
+    assert len(taken) == equilibrium.REPEATED + 2
 
 
 @pytest.mark.parametrize("push", [20, 20.5, 23])

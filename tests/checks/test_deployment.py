@@ -200,13 +200,13 @@ def test_the_worst_bend_may_be_on_the_way() -> None:
     form = wave()
     checks = check(form.popped, ROD, stages=8)
     final = checks.bending["pinned"].curvature.max()
-    assert max(bent.curvature.max() for bent in checks.on_the_way) > 1.5 * final
+    assert max(bent.curvature.max() for bent in checks.deployment_bending) > 1.5 * final
 
 
 def test_the_bending_of_a_stage_is_that_of_its_shape() -> None:
     checks, mesh = check(dome().popped, ROD, stages=4), dome().footprint.mesh
     assert checks.deployment is not None
-    for bent, shape in zip(checks.on_the_way, checks.deployment.positions, strict=True):
+    for bent, shape in zip(checks.deployment_bending, checks.deployment.positions, strict=True):
         np.testing.assert_allclose(bent.curvature, curvatures(mesh, shape), atol=1e-9)
 
 

@@ -153,6 +153,7 @@ def test_laths_popped_through_are_not_twisted_in_their_clamps() -> None:
     np.testing.assert_allclose(mirrored[rods], -own[rods], atol=0.02 * np.abs(own[rods]).max())
 
 
+@pytest.mark.slow
 def test_a_cap_in_two_layers_is_found_popped_through() -> None:
     """Its joints are nearly where the reflection has them: the layers are 1 % of half the width apart."""
     popped = steel_cap(rs.Pin(eccentricity=2e-3)).popped["pinned"]

@@ -242,16 +242,16 @@ def test_every_shape_is_checked_and_the_nearest_rods_are_named() -> None:
     """44 mm rods touch at the rim of the popped dome; 70 mm ones at 60 mm in the flat grid, too."""
     checks = check(dome().popped, round_rod(0.022), stages=2)
     assert set(checks.contact) == {"pinned", "clamped"}
-    assert len(checks.contact_on_the_way) == 3
-    assert checks.contact_on_the_way[0].pairs == 0
-    assert checks.contact_on_the_way[0].clearance == pytest.approx(0.06 - 0.044)
-    last, popped = checks.contact_on_the_way[-1], checks.contact["pinned"]
+    assert len(checks.deployment_contact) == 3
+    assert checks.deployment_contact[0].pairs == 0
+    assert checks.deployment_contact[0].clearance == pytest.approx(0.06 - 0.044)
+    last, popped = checks.deployment_contact[-1], checks.contact["pinned"]
     assert (last.pairs, last.rods) == (popped.pairs, popped.rods)
     assert last.clearance == pytest.approx(popped.clearance, abs=1e-12)  # the deployment begins with a solve
     assert last.where == pytest.approx(popped.where, abs=1e-12)
     wider = check(dome().popped, round_rod(0.035), stages=2)
-    assert wider.contact_on_the_way[0].pairs == 12
-    assert wider.contact_on_the_way[0].clearance == pytest.approx(0.06 - 0.07)
+    assert wider.deployment_contact[0].pairs == 12
+    assert wider.deployment_contact[0].clearance == pytest.approx(0.06 - 0.07)
 
 
 def test_rods_that_leave_no_room_for_joints_are_warned_of() -> None:

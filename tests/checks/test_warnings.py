@@ -68,11 +68,11 @@ def test_the_shape_that_breaks_is_named(final: dict[str, float], way: list[float
 @pytest.mark.parametrize("at", [0, 40, -1])
 def test_the_place_that_breaks_is_named(at: int) -> None:
     held = checks({"pinned": 0.2}, [1.0, 0.2, 0.2])
-    assert held.on_the_way[1].stress is not None
-    stress = held.on_the_way[1].stress.copy()
+    assert held.deployment_bending[1].stress is not None
+    stress = held.deployment_bending[1].stress.copy()
     stress[at] = 2 * STRENGTH
-    way = (held.on_the_way[0], replace(held.on_the_way[1], stress=stress), held.on_the_way[2])
-    (words,) = reasons(replace(held, on_the_way=way))
+    way = (held.deployment_bending[0], replace(held.deployment_bending[1], stress=stress), held.deployment_bending[2])
+    (words,) = reasons(replace(held, deployment_bending=way))
     entry = range(len(stress))[at]
     rod = next(k for k in range(len(MESH.grid.rods)) if entry < MESH.rod_stop[k])
     along = 1e3 * (MESH.stations[entry] - MESH.grid.rods[rod].start)
@@ -86,10 +86,14 @@ def test_rods_that_hold_are_not_warned_of() -> None:
 
 
 @pytest.mark.parametrize(("radius", "percent"), [(1.01 * THICKNESS / 0.05, None), (THICKNESS / 0.08, 8)])
-@pytest.mark.parametrize("on_the_way", [False, True])
-def test_rods_too_thick_for_their_bends_are_warned_of(radius: float, percent: int | None, on_the_way: bool) -> None:
-    found = checks({"pinned": 10.0 if on_the_way else radius}, [10.0, radius, 10.0] if on_the_way else [])
-    shape = "during deployment (at 50 % of the way)" if on_the_way else "with pinned ends"
+@pytest.mark.parametrize("deployment_bending", [False, True])
+def test_rods_too_thick_for_their_bends_are_warned_of(
+    radius: float, percent: int | None, deployment_bending: bool
+) -> None:
+    found = checks(
+        {"pinned": 10.0 if deployment_bending else radius}, [10.0, radius, 10.0] if deployment_bending else []
+    )
+    shape = "during deployment (at 50 % of the way)" if deployment_bending else "with pinned ends"
     assert [words.split(":")[0] for words in reasons(found, None)] == (
         [] if percent is None else [f"{shape} bending strains the rods by {percent} %"]
     )

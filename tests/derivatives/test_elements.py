@@ -16,7 +16,7 @@ import pytest
 from numpy.linalg import norm
 
 from rodshell.errors import InputError
-from rodshell.geometry import directors_along, parallel_transport
+from rodshell.geometry.frames import directors_along, parallel_transport
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.rods.stretch import Stretch

@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 from rodshell.targets import (
     Cap,
     Disc,
-    EllipseDomain,
     Ellipsoid,
     HeightField,
     Hemisphere,
@@ -16,6 +15,7 @@ from rodshell.targets import (
     Rectangle,
     Target,
 )
+from rodshell.targets.domain import EllipseDomain
 
 Floats = NDArray[np.float64]
 

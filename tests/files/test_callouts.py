@@ -13,6 +13,8 @@ from rodshell.output.drawings.shell import supports_drawing
 from rodshell.output.labels import Room, boxes_meet, callouts, lines_meet, outward
 from rodshell.results import Archive
 
+pytestmark = pytest.mark.slow
+
 Floats = NDArray[np.float64]
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])

@@ -55,6 +55,7 @@ def covered(drawing: Drawing) -> list[tuple[str, str]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
     plan = flat_plan(named(name))
@@ -62,6 +63,7 @@ def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
         assert covered(drawing) == [], drawing.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_sheet_cover_each_other(name: str) -> None:
     sheets, paper = sheet_set(named(name), flat_plan(named(name)))
@@ -127,8 +129,8 @@ def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
     }
     assert list(sheets) == [row + column for row in "ABCD" for column in "12"]
     rods = {part: {path.name for path in sheet.content.paths if path.name} for part, sheet in sheets.items()}
-    top = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "u" else -1.0).id
-    right = max(plan.rods, key=lambda rod: rod.offset or 0.0 if rod.family == "v" else -1.0).id
+    top = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "u" else -1.0).id
+    right = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "v" else -1.0).id
     assert {part for part, drawn in rods.items() if top in drawn} == {"A1", "A2"}
     assert {part[1] for part, drawn in rods.items() if right in drawn} == {"2"}
     middle = 0.5 * np.sum(room(PAPER), axis=0)
@@ -182,6 +184,7 @@ def test_diagonals_are_those_of_the_largest_rectangle() -> None:
     assert area == pytest.approx(best)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMED)
 def test_each_grid_is_set_out_by_two_diagonals_with_their_lengths(name: str) -> None:
     """Each patch of a sewn shell has its own; along them every cell is there, so that none runs over an opening."""
@@ -208,6 +211,7 @@ def apart(point: np.ndarray, lines: np.ndarray) -> np.ndarray:
     return np.linalg.norm(start + share[:, None] * along - point, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "share"), [("dome", 0.7), ("roof", 1.0), ("opening", 1.0), ("sewn", 0.45)])
 def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -> None:
     """Nearly all of them find room, where cells are not too thin; between joints, rods are taken to be straight."""
@@ -231,6 +235,7 @@ def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -
         assert lengths[int(np.argmin(off))] == number.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "spans"), [("roof", ("12000", "8000")), ("dome", ("400.00", "400.00"))])
 def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[str, str]) -> None:
     """Rod ends are some hundredths of a millimetre off the edge: to a ten-thousandth a roof of 12 by 8 m is that."""
@@ -243,6 +248,7 @@ def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[st
     assert elevations_drawing(replace(made, states=longer), plan.text).texts[0].text != spans[0]
 
 
+@pytest.mark.slow
 def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:
     """Strips, both schedules, the PDF's tables and the pieces of stock: 12 mm of allowance before the rod's start."""
     made = wished()

@@ -101,6 +101,7 @@ def test_the_same_drawing_gives_the_same_bytes_and_leaves_ezdxf_as_it_was() -> N
     assert not ezdxf.options.write_fixed_meta_data_for_testing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*TARGETS, "wished"])
 def test_every_drawing_passes_the_audit(name: str, tmp_path: Path) -> None:
     names = export(wished() if name == "wished" else archive(name), tmp_path, ["dxf"])

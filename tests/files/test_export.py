@@ -172,7 +172,7 @@ def test_drawings_are_the_same_whatever_the_hash_seed(tmp_path: Path) -> None:
         str(tmp_path / "again"),
         "-q",
         "--only",
-        "dxf,csv",
+        "dxf,pdf,png,csv",
     ]
     subprocess.run(command, check=True, env={**os.environ, "PYTHONHASHSEED": "7"})
     again = contents(tmp_path / "again")

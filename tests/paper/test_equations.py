@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.paper.two_rods import LENGTH, RATE, run
+from rodshell.paper.two_rods import LENGTH, RATE, run_in_time
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
@@ -64,11 +64,11 @@ def test_targets_are_those_of_equation_13() -> None:
 
 def test_rod_1_is_led_as_equation_7_says() -> None:
     """x_11 = L/2 (cos wt, sin wt, 0) at 10 rpm, and the joint stays; twisted, the first angle is w t."""
-    turned = run("bending", rs.Linker(), rs.SharedDofs(), until=0.5)
+    turned = run_in_time("bending", rs.Linker(), rs.SharedDofs(), until=0.5)
     rate = 10 * 2 * np.pi / 60
     way = 0.5 * LENGTH * np.column_stack([np.cos(rate * turned.times), np.sin(rate * turned.times), 0 * turned.times])
     np.testing.assert_allclose(turned.nodes[:, 0, 0], way, atol=1e-12)
     np.testing.assert_allclose(turned.nodes[:, 0, 2], 0.0, atol=1e-12)
     assert pytest.approx(rate) == RATE
-    twisted = run("twisting", rs.Linker(), rs.SharedDofs(), until=0.5)
+    twisted = run_in_time("twisting", rs.Linker(), rs.SharedDofs(), until=0.5)
     np.testing.assert_allclose(twisted.twists[:, 0], rate * twisted.times, atol=1e-12)

@@ -79,6 +79,7 @@ def test_explicit_springs_part_by_the_force_over_their_stiffness() -> None:
     assert abs(gaps[0] / gaps[1] - 2.0) < 0.05
 
 
+@pytest.mark.slow
 def test_the_rest_without_friction_is_unstable_sideways_and_says_so() -> None:
     draped = fallen("shared")
     assert draped.rest is not None

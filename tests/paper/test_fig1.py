@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rodshell.paper import fig1
-from rodshell.paper.drapes import Case
+from rodshell.paper.cases import Case
 from rodshell.targets import Hemisphere
 from tests.paper.falls import RADIUS
 
@@ -64,6 +64,6 @@ def test_the_picture_has_both_rows_with_all_rods(tmp_path: Path) -> None:
 
 
 def test_what_lies_behind_is_pale() -> None:
-    picture = figure().picture()
+    picture = figure().pictures()["fig1"]
     pale = picture.count('stroke-opacity="0.22"')
     assert 0 < pale < picture.count("<polyline")

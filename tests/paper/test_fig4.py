@@ -11,8 +11,9 @@ import pytest
 
 import rodshell as rs
 from rodshell.paper import reserved
+from rodshell.paper.cases import ROD
 from rodshell.paper.fig4 import make
-from rodshell.paper.two_rods import LENGTH, RATE, ROD, STEP, run, run_statics
+from rodshell.paper.two_rods import LENGTH, RATE, STEP, run_in_time, run_statics
 
 JOINTS = {"linker": rs.Linker(), "pin": rs.Pin(), "ball": rs.Ball(), "shear spring": rs.Spring(1e-3)}
 COUPLINGS = {"shared": rs.SharedDofs(), "implicit": rs.ImplicitPenalty(), "explicit": rs.ExplicitPenalty()}
@@ -21,7 +22,7 @@ UNTIL = 1.5  # a quarter of a revolution
 
 @cache
 def demonstrated(demonstration, joint, coupling):
-    return run(demonstration, JOINTS[joint], COUPLINGS[coupling], until=UNTIL)
+    return run_in_time(demonstration, JOINTS[joint], COUPLINGS[coupling], until=UNTIL)
 
 
 @pytest.mark.slow
@@ -43,7 +44,7 @@ def test_explicit_ties_start_up_as_implicit_ones_do_with_the_same_step(demonstra
     explicit = demonstrated(demonstration, "linker", "explicit")
     same = rs.ExplicitPenalty().with_defaults(ROD, LENGTH / 4)
     ties = rs.ImplicitPenalty(C1=same.C1, C2=same.C2)
-    implicit = run(demonstration, rs.Linker(), ties, until=0.1, step=explicit.step)
+    implicit = run_in_time(demonstration, rs.Linker(), ties, until=0.1, step=explicit.step)
     every = round(STEP / explicit.step)
     at_its_times = implicit.lag[::every]
     early = explicit.lag[: len(at_its_times)]

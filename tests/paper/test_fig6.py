@@ -14,11 +14,13 @@ from scipy.interpolate import CubicSpline
 from rodshell.formfinding.methods import Fall
 from rodshell.nets import sphere_net_end
 from rodshell.output.view import TOWARDS
-from rodshell.paper import drape_pictures
-from rodshell.paper.drapefigure import DrapeFigure
-from rodshell.paper.drapes import METHODS, Case, Drape, drape_all
-from rodshell.paper.panels import standing
+from rodshell.paper import drapes
+from rodshell.paper.cases import Case
+from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
+from rodshell.paper.plotting import standing
 from tests.paper.falls import HEMISPHERE
+
+pytestmark = pytest.mark.slow
 
 CASE = Case("a", HEMISPHERE, (7, 7), spacing=0.06, edge=0.03)
 
@@ -28,7 +30,7 @@ def figure() -> DrapeFigure:
     return DrapeFigure("fig6", "a title", drape_all([CASE], lambda *told: None, fall=Fall(drag=5.0)))
 
 
-def by(method: str) -> Drape:
+def by(method: str) -> DrapeRun:
     return next(one for one in figure().drapes if one.method == method)
 
 
@@ -91,8 +93,8 @@ def test_a_footprint_that_was_sought_is_drawn_where_its_rods_are_those_of_the_ca
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def curves(found: np.ndarray | None) -> int:
-        monkeypatch.setattr(drape_pictures, "stored_footprint", lambda name: found)
-        return drape_pictures.rows_svg([by("bound")]).count("<polygon")
+        monkeypatch.setattr(drapes, "stored_footprint", lambda name: found)
+        return drapes.rows_svg([by("bound")]).count("<polygon")
 
     around = np.column_stack([np.cos(np.arange(28)), np.sin(np.arange(28))])
     assert curves(around) == curves(None) + 1

@@ -1,13 +1,13 @@
 """The command that makes figures: one, or all of them, each written as soon as it is made."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from rodshell.cli import main, paper
-from rodshell.paper import FIGURES
+from rodshell.paper import FIGURES, figure_maker
 from rodshell.results.folder import ResultFolder
 
 
@@ -30,11 +30,10 @@ class Made:
 def stand_in(monkeypatch: pytest.MonkeyPatch, status: dict[str, str]) -> None:
     """Figures that cost nothing; `status` of those that do not converge."""
 
-    def module(name: str) -> SimpleNamespace:
-        figure = name.rsplit(".", 1)[1]
-        return SimpleNamespace(make=lambda progress: Made(figure, status.get(figure, "converged")))
+    def maker(figure: str) -> Callable[[object], Made]:
+        return lambda progress: Made(figure, status.get(figure, "converged"))
 
-    monkeypatch.setattr(paper, "import_module", module)
+    monkeypatch.setattr(paper, "figure_maker", maker)
 
 
 def test_a_figure_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
@@ -63,6 +62,6 @@ def test_a_figure_that_does_not_converge_does_not_stop_the_others(
     assert "NOT CONVERGED: (a) was not at rest" in capsys.readouterr().err
 
 
-def test_every_figure_is_a_module_that_makes_it() -> None:
+def test_every_figure_has_a_function_that_makes_it() -> None:
     for name in FIGURES:
-        assert callable(__import__(f"rodshell.paper.{name}", fromlist=["make"]).make)
+        assert callable(figure_maker(name))

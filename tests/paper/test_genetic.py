@@ -17,11 +17,10 @@ from rodshell.cli import main
 from rodshell.errors import InputError
 from rodshell.formfinding import Footprint, PatchForm, find_stages
 from rodshell.formfinding.progress import silent
-from rodshell.paper import genetic, genetic_design, genetic_search
-from rodshell.paper.drapes import Case
-from rodshell.paper.fig6 import CASES
-from rodshell.paper.genetic_design import Design
-from rodshell.paper.genetic_history import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
+from rodshell.paper import genetic, genetic_search
+from rodshell.paper.cases import CASES, Case
+from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
+from rodshell.paper.genetic_search import Design
 from tests.paper.falls import HEMISPHERE, PAPER_ROD
 
 SMALL = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)
@@ -145,11 +144,12 @@ def test_what_does_not_stand_counts_as_off_by_the_targets_size(monkeypatch: pyte
     assert one.error(short) == 0.2
     stands = one.pop_up(good)
     assert stands is not None
-    shaky = replace(stands, report=replace(stands.report, negative_modes=1))
+    found = stands.equilibrium
+    shaky = replace(stands, equilibrium=replace(found, report=replace(found.report, negative_modes=1)))
     with monkeypatch.context() as patched:
-        patched.setattr(genetic_design, "pop_up", lambda *_, **__: shaky)
+        patched.setattr(genetic_search, "pop_up", lambda *_, **__: shaky)
         assert one.error(good) == 0.2
-    monkeypatch.setattr(genetic_design, "PATIENCE", 5)
+    monkeypatch.setattr(genetic_search, "PATIENCE", 5)
     assert one.error(good) == 0.2
 
 
@@ -214,7 +214,7 @@ def test_an_interrupted_search_goes_on_bit_for_bit_and_makes_no_run_twice(
 
     monkeypatch.setattr(genetic_search, "_judge", counted)
     for after in (3, POPULATION, POPULATION + 2):  # in the first generation, at an end, in a later one
-        with pytest.raises(KeyboardInterrupt, match=r"hemisphere-seed3.json keeps what was found"):
+        with pytest.raises(KeyboardInterrupt, match=r"hemisphere-seed3.json has the values found so far"):
             find(tmp_path, progress=stopping(after))
     found = find(tmp_path)
     assert course(found) == course(whole)
@@ -251,7 +251,7 @@ def test_a_search_says_where_it_is_in_every_generation(tmp_path: Path) -> None:
 def test_a_broken_file_is_refused_in_one_sentence(text: str, tmp_path: Path) -> None:
     file = tmp_path / f"hemisphere-seed{SEED}.json"
     file.write_text(text)
-    with pytest.raises(InputError, match=r"cannot go on with the search in .*hemisphere-seed3.*remove it"):
+    with pytest.raises(InputError, match=r"cannot continue the search in .*hemisphere-seed3.*remove it"):
         find(tmp_path)
     assert file.read_text() == text
 
@@ -276,7 +276,7 @@ def test_values_that_cannot_be_are_refused(harm: str, tmp_path: Path) -> None:
 def test_values_of_another_search_are_refused(tmp_path: Path) -> None:
     find(tmp_path, most=1)
     (tmp_path / f"hemisphere-seed{SEED}.json").rename(tmp_path / "hemisphere-seed9.json")
-    with pytest.raises(InputError, match=r"hemisphere-seed9.json is another one"):
+    with pytest.raises(InputError, match=r"hemisphere-seed9.json is a different one"):
         find(tmp_path, seed=9, most=1)
 
 
@@ -295,7 +295,7 @@ def test_a_search_has_converged_when_twenty_generations_gained_less_than_a_hundr
 
 @pytest.mark.slow
 def test_the_table_the_picture_and_the_files_tell_the_search(tmp_path: Path) -> None:
-    made = genetic.make(silent, seed=SEED, generations=1, cases=[SMALL], kept=tmp_path / "kept")
+    made = genetic.make(silent, seed=SEED, generations=1, cases=[SMALL], folder=tmp_path / "kept")
     assert made.status == "the search on the hemisphere has not converged: 1 of at least 21 generations"
     made.save(tmp_path / "genetic")
     found, by_direct = made.comparisons[0], made.rows()[0]
@@ -320,7 +320,7 @@ def test_the_table_the_picture_and_the_files_tell_the_search(tmp_path: Path) -> 
     ("words", "said"),
     [
         (["fig4", "--seed", "2"], "--seed is for the figure genetic, not for fig4"),
-        (["genetic", "--jobs", "2"], "jobs and generations are those of a new search: give its seed, too"),
+        (["genetic", "--jobs", "2"], "jobs and generations belong to a new search: give its seed, too"),
         (["genetic", "--seed", "2", "--target", "cap"], "use one of hemisphere, paraboloid, ellipsoid"),
         (["genetic", "--seed", "-1"], "--seed"),
     ],
@@ -341,7 +341,9 @@ def test_the_command_says_what_an_interrupted_search_keeps(
     monkeypatch.setattr(genetic_search, "_judge", stopped)
     monkeypatch.chdir(tmp_path)
     assert main(["paper", "genetic", "--seed", "2", "--target", "ellipsoid", "--quiet", "--out", "here"]) == 130
-    assert "interrupted: out/genetic-searches/ellipsoid-seed2.json keeps what was found" in capsys.readouterr().err
+    assert (
+        "interrupted: out/genetic-searches/ellipsoid-seed2.json has the values found so far" in capsys.readouterr().err
+    )
 
 
 def test_a_best_footprint_that_pops_up_otherwise_is_said(whole: History) -> None:
@@ -375,7 +377,7 @@ def test_a_target_without_a_kept_search_has_none() -> None:
 
 
 def test_a_history_is_read_as_it_was_written(whole: History) -> None:
-    again = History.of(whole.text())
+    again = History.of(whole.json())
     assert again.generations == whole.generations
     assert isinstance(again.generations[0], Generation)
     assert again.last_gain == whole.last_gain == 1.0

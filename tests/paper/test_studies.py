@@ -12,6 +12,8 @@ from rodshell.paper import studies
 from rodshell.paper.studies import Line, Studies
 from tests.paper.falls import coarse_layout
 
+pytestmark = pytest.mark.slow
+
 
 def silent(*told: object) -> None:
     pass

@@ -447,14 +447,14 @@ LAYOUT = {"rods": (3, 4), "spacing": 0.03, "length": 1.2, "edge": 0.005}
     ({"edge": 0.031}, "layout edge 0.031 m is longer than the spacing 0.03 m: use a shorter edge"),
     ({"length": 0}, "layout length must be positive, not 0 m"),
     ({"edge": "5 mm"}, "layout edge must be a number in m, not .5 mm"),
-    ({"length": None}, "layout length must be a number in m, not a NoneType"),
-    ({"spacing": "auto"}, "layout spacing must be two lengths in m"),
-    ({"rods": (1, 4)}, 'layout rods must be "auto" or two counts of at least 2'),
+    ({"length": None}, "layout length must be a number in m, not None"),
+    ({"spacing": "auto"}, "two lengths in m, not .auto"),
+    ({"rods": (1, 4)}, 'layout rods must be two counts of at least 2, or "auto"'),
     ({"rods": (3, 4.5)}, "two counts"),
     ({"rods": 5}, "two counts"),
     ({"rods": (3, 4, 5)}, "two counts"),
-    ({"rotate": nan}, "rotate and offset must be finite"),
-    ({"offset": (0.0, np.inf)}, "rotate and offset must be finite"),
+    ({"rotate": nan}, "layout rotate must be finite, not nan rad"),
+    ({"offset": (0.0, np.inf)}, "layout offset must be finite, not inf m"),
 ])  # fmt: skip
 def test_a_layout_that_cannot_be_is_refused(changed, sentence):
     with pytest.raises(InputError, match=sentence):

@@ -178,7 +178,7 @@ def test_a_rod_that_runs_far_past_its_last_joint_is_warned_of(ending, tail, left
 
 
 def test_a_layout_beside_the_target_is_refused():
-    with pytest.raises(InputError, match="none of the layout's rods touches the target"):
+    with pytest.raises(InputError, match="no rod of the layout touches the target"):
         rs.find_form(
             HEMISPHERE, rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.03, length=1.2, offset=(1.0, 1.0)), ROD
         )

@@ -8,9 +8,9 @@ from scipy.ndimage import label
 
 import rodshell as rs
 from rodshell.geometry.curves import resampled
-from rodshell.nets import march, net_extent
+from rodshell.nets import net_extent
 from rodshell.nets.apron import RINGS
-from rodshell.nets.compass import fill_quadrants
+from rodshell.nets.compass import Net, fill_quadrants, march
 from rodshell.nets.cuts import inside_nodes
 from rodshell.nets.net_extent import Covering, march_covering, wanted_nodes
 from tests.targets.test_nets_on_files import TARGETS as FILES
@@ -172,7 +172,7 @@ def test_inside_nodes_are_those_that_hang_together_with_the_anchor():
     s = np.linspace(-1.0, 1.0, 81)
     height = 0.03 * (np.cos(9 * s)[:, None] * np.cos(7 * s) + 0.3 * np.sin(11 * s[:, None] * s) - 0.1)
     points = np.stack([*np.meshgrid(s, s, indexing="ij"), height], axis=-1)
-    net = rs.nets.Net(s, s, points)
+    net = Net(s, s, points)
     islands, count = label(height > 0)
     assert count > 4
     np.testing.assert_array_equal(inside_nodes(target, net), islands == islands[net.origin])

@@ -96,6 +96,7 @@ def test_these_points_lie_on_target_and_seam(name: str) -> None:
     assert off_seams(form, points).max() < 3e-5  # the dense points lie 5e-5 apart
 
 
+@pytest.mark.slow
 @every_case
 def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
     """Each end off the target's own edge belongs to exactly one meeting."""
@@ -111,6 +112,7 @@ def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
     assert inside >= 0.8 * len(met)
 
 
+@pytest.mark.slow
 @every_case
 def test_every_patch_lies_on_the_target_on_its_own_side(name: str) -> None:
     form = sewn(name)
@@ -121,6 +123,7 @@ def test_every_patch_lies_on_the_target_on_its_own_side(name: str) -> None:
     assert sum(len(found.footprint.rods) for found in form.stages.patches.values()) == len(form.footprint.rods)
 
 
+@pytest.mark.slow
 @every_case
 def test_shells_are_stable_and_stay_near(name: str) -> None:
     form = sewn(name)
@@ -130,12 +133,14 @@ def test_shells_are_stable_and_stay_near(name: str) -> None:
         assert form.agreement[ends].rms_relative < allowed
 
 
+@pytest.mark.slow
 @every_case
 def test_ends_hardly_move_to_their_points(name: str) -> None:
     """What the mesh of a patch alone misses them by; second order in its edges."""
     assert max(sewn(name).stages.moved.values()) < 3e-3 * CASES[name][0].size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dome, aside", "two bumps, in the valley", "vault in three"])
 def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
     """Across the rod; along it the net itself is known to 1e-4 only. Without a correction 4e-6 to 7e-5 are left."""
@@ -167,6 +172,7 @@ def test_a_patch_alone_is_the_same_form() -> None:
         assert apart.max() < 2 * form.stages.moved[name] < 4e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dome, across", "dome, diagonal", "ball"])
 def test_patches_of_a_mirrored_target_mirror_each_other(name: str) -> None:
     form = sewn(name)
@@ -208,6 +214,7 @@ def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> 
     assert archive.summary().count("(weakest patch, its seam held)") == 2
 
 
+@pytest.mark.slow
 def test_a_sphere_beyond_the_nets_limit_is_formed_in_two() -> None:
     with pytest.raises(NetLimitError):
         rs.find_form(BALL, layout_of(0.035), ROD)
@@ -216,6 +223,7 @@ def test_a_sphere_beyond_the_nets_limit_is_formed_in_two() -> None:
     assert all("would swing" in why for _, why in form.dropped)
 
 
+@pytest.mark.slow
 def test_a_valley_with_a_seam_holds_the_grid_down() -> None:
     whole = rs.find_form(BUMPS, layout_of(0.032), ROD, ends=("clamped",))
     assert sewn("two bumps, in the valley").agreement["clamped"].rms < 0.3 * whole.agreement["clamped"].rms
@@ -239,6 +247,7 @@ def test_a_patch_may_have_its_own_spacing_and_anchor() -> None:
     assert len(form.meetings) > 10
 
 
+@pytest.mark.slow
 def test_the_strong_bending_of_patches_is_that_of_the_worst() -> None:
     """Here not of the patch whose rods meet at the smallest angle."""
     lath = rs.Rod(rs.RectangularSection(width=1e-3, height=8e-3), rs.Material(youngs_modulus=1e9, density=1e3))
@@ -395,6 +404,7 @@ def test_points_are_put_in_a_row_along_an_overhanging_curve() -> None:
     assert order.tolist() in (list(range(60)), list(range(59, -1, -1)))
 
 
+@pytest.mark.slow
 def test_grids_side_by_side_are_the_same_grids() -> None:
     form = sewn("vault in three")
     meshes = {name: found.footprint.mesh for name, found in form.stages.patches.items()}
@@ -435,12 +445,14 @@ LEFT_OUT = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEFT_OUT)
 def test_hardly_a_rod_is_left_out_where_rods_can_meet(name: str) -> None:
     """Of 40 to 70: those in corners, which have too few joints."""
     assert len(sewn(name).dropped) <= LEFT_OUT[name]
 
 
+@pytest.mark.slow
 def test_figures_of_all_patches_are_joined() -> None:
     form = sewn("two bumps, in the valley")
     for ends, gap in form.agreement.items():

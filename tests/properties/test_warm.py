@@ -94,7 +94,7 @@ def test_a_net_found_near_another_asks_the_target_less_often(monkeypatch):
         monkeypatch.setattr(rs.HeightField, name, lambda self, x, say=answer: asked.append(len(x)) or say(self, x))
     chebyshev_net(BUMPS, layout)
     cold, asked[:] = len(asked), []
-    chebyshev_net(BUMPS, layout, near=last)
+    chebyshev_net(BUMPS, layout, warm_start=last)
     assert len(asked) < 0.1 * cold  # 16 against 467
 
 
@@ -157,9 +157,18 @@ def test_a_pop_up_that_was_somewhere_else_is_started_from_the_draped_state(last)
     for form in (last, rs.find_form(HEMISPHERE, layout_of(), ROD, ends=("pinned",))):
         popped, trimmed = form.popped["pinned"], form.trimmed
         down = at_positions(popped, popped.positions * [1.0, 1.0, -0.85])
-        again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", start=down)
+        again = rs.pop_up(form.footprint, trimmed.boundary, ROD, ends="pinned", warm_start=down)
         assert again.report.stable
         assert largest(again.positions - popped.positions) < SETTLED
+
+
+def test_a_warm_start_that_would_be_ignored_is_refused(last):
+    """An earlier pop-up serves the same ends, and no start from flat."""
+    popped, boundary = last.popped["pinned"], last.trimmed.boundary
+    with pytest.raises(rs.InputError, match="has pinned ends, not clamped"):
+        rs.pop_up(last.footprint, boundary, ROD, ends="clamped", warm_start=popped)
+    with pytest.raises(rs.InputError, match='first guess for start="draped" alone'):
+        rs.pop_up(last.footprint, boundary, ROD, ends="pinned", start="flat", warm_start=popped)
 
 
 # What is carried

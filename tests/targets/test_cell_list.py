@@ -71,6 +71,6 @@ def test_spread_points_are_apart_and_every_other_is_near_one():
 
 def test_points_along_a_line_get_wider_cells_and_no_more_of_them():
     points = np.column_stack([np.linspace(0, 1, 50), np.linspace(0, 1, 50), np.linspace(0, 1, 50)])
-    buckets = CellList.of(points, 1e-3)
-    assert np.prod(buckets.shape) <= 64 * 50
-    assert np.array_equal(buckets.nearest(points)[1][:, 0], np.arange(50))
+    cells = CellList.of(points, 1e-3)
+    assert np.prod(cells.shape) <= 64 * 50
+    assert np.array_equal(cells.nearest(points)[1][:, 0], np.arange(50))

@@ -57,13 +57,13 @@ def test_rod_ends_that_two_marches_place_differently_are_warned_of():
     """A peak much sharper than the spacing; the sentence names the place and what helps, and comes true."""
     sharp = Freeform.of(*sheet(lambda x, y: 5 * np.exp(-(x**2 + y**2) / 1.62), 6.0, 121))
     net = rs.chebyshev_net(sharp, rs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 6))
-    said = [sentence for sentence in net.warnings if "are known within" in sentence]
+    said = [sentence for sentence in net.warnings if "have an error of up to" in sentence]
     assert len(said) == 1
     assert "use a smaller spacing or shorter edges" in said[0]
     assert f"{net.error_estimate:.3g} m" in said[0]
     finer = rs.chebyshev_net(sharp, rs.GridLayout.orthogonal(spacing=0.7, edge=0.7 / 12))
     assert finer.error_estimate < 0.1 * net.error_estimate
-    assert not any("are known within" in sentence for sentence in finer.warnings)
+    assert not any("have an error of up to" in sentence for sentence in finer.warnings)
 
 
 def test_lines_that_a_rough_march_misses_are_found_by_a_finer_one():

@@ -10,7 +10,6 @@ import pytest
 import rodshell as rs
 from tests.types.greenhouse import study
 
-pytestmark = pytest.mark.skipif("Job" not in rs.__all__, reason="rodshell.Job is still to come")
 PACKAGE = Path(rs.__file__).parent
 PROJECT = Path(study.__file__).parent
 
@@ -31,7 +30,7 @@ def test_a_downstream_project_passes_mypy_strict(tmp_path: Path) -> None:
 
 def test_stages_calls_and_jobs_agree_in_a_downstream_project(tmp_path: Path) -> None:
     layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.02)
-    assert all(study.by_stages(target, layout, study.laths()) < 0.05 for target in study.targets()[:2])
+    assert all(study.by_stages(target, layout, study.wires()) < 0.05 for target in study.targets()[:2])
     form = study.by_call(tmp_path / "called")
     gaps = study.by_job(tmp_path / "called" / "case.toml")
     assert gaps["as it is"] == pytest.approx(form.agreement["pinned"].rms_relative, rel=1e-9)

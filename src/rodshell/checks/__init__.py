@@ -1,4 +1,4 @@
-"""Is it safe to build: bending and stress, reactions and their balance, the way up from flat, its own weight."""
+"""Is it safe to build: bending and stress, contact, reactions, deployment, own weight, other shapes."""
 
 from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check

@@ -122,7 +122,7 @@ def bending(
 
 def rod_frames(shell: Shell) -> BendTwist | None:
     """The elements that carry the rods' material frames; None where no twist angles are carried."""
-    return next((one for one in shell.within if isinstance(one, BendTwist)), None)
+    return next((element for element in shell.within if isinstance(element, BendTwist)), None)
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
@@ -143,7 +143,7 @@ def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
 
 def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
     """(k,) curvature [1/m] at each entry of `rod_nodes`."""
-    return np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1)
+    return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
 
 
 def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:

@@ -1,9 +1,10 @@
 """All checks of a popped-up shell in one call."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
 from rodshell.rods.section_stress import VON_MISES
 from rodshell.solve.critical import MOST_FACTORIZATIONS
+from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.units import length_text, stress_text
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
@@ -50,9 +52,10 @@ class Checks:
     Parameters
     ----------
     bending, reactions, joints : by end condition.
-    deployment : the way up from flat with pinned ends, or None; `on_the_way` the bending of its stages.
-    self_weight : by end condition, what share of its own weight the shell bears.
-    contact : by end condition; `contact_on_the_way` of the deployment's stages.
+    deployment : from flat, with pinned ends, or None; `deployment_bending` the bending of its stages, the flat grid
+        first.
+    self_weight : by end condition, what share of its own weight the shell carries.
+    contact : by end condition; `deployment_contact` of the deployment's stages.
     other_shapes : by end condition, of shells that are stable; empty where they were not looked for.
     clamped_from_flat : whether the pinned shell, reached from flat, comes to the clamped shape when its ends are
         turned into their clamps; None where that is not known.
@@ -62,11 +65,11 @@ class Checks:
     bending: dict[Ends, Bending]
     reactions: dict[Ends, Reactions]
     joints: dict[Ends, JointLoads]
-    deployment: Deployment | None
-    on_the_way: tuple[Bending, ...]
+    deployment: Deployment | None = None
+    deployment_bending: tuple[Bending, ...] = ()
     self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
-    contact_on_the_way: tuple[Contact, ...] = ()
+    deployment_contact: tuple[Contact, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
     clamped_from_flat: bool | None = None
     stopped: str = ""
@@ -104,24 +107,24 @@ class Checks:
         return (*late, *way, *turned, *unknown_weights(self.self_weight), *self.tight)
 
     @property
-    def before_the_end(self) -> tuple[tuple[float, Bending], ...]:
+    def stages_below_final(self) -> tuple[tuple[float, Bending], ...]:
         """Stages of the deployment below the final shape, with their shares."""
         shares = () if self.deployment is None else self.deployment.share.tolist()
-        return tuple((share, bent) for share, bent in zip(shares, self.on_the_way, strict=True) if share < 1)
+        return tuple((share, bent) for share, bent in zip(shares, self.deployment_bending, strict=True) if share < 1)
 
     @property
-    def nearest_on_the_way(self) -> tuple[float, Contact] | None:
+    def closest_stage(self) -> tuple[float, Contact] | None:
         """The stage below the final shape in which rods are nearest, by its share; None where nothing was checked."""
-        if self.deployment is None or not self.contact_on_the_way:
+        if self.deployment is None or not self.deployment_contact:
             return None
-        pairs = zip(self.deployment.share.tolist()[:-1], self.contact_on_the_way[:-1], strict=True)
+        pairs = zip(self.deployment.share.tolist()[:-1], self.deployment_contact[:-1], strict=True)
         return min(pairs, key=lambda pair: inf if pair[1].clearance is None else pair[1].clearance)
 
     @property
     def tight(self) -> tuple[str, ...]:
         """A sentence where rods that do not touch come so near to each other that there is no room for joints."""
         shapes = [(found, f"with {ends} ends") for ends, found in self.contact.items()]
-        if (nearest := self.nearest_on_the_way) is not None:
+        if (nearest := self.closest_stage) is not None:
             share, found = nearest
             shapes.append((found, f"during deployment (stage at {100 * share:.0f} %)" if share else "in the flat grid"))
         near = [(found, where) for found, where in shapes if found.clearance is not None]
@@ -140,7 +143,7 @@ class Checks:
 
     def shear_unknown(self, strength: float | None) -> tuple[str, ...]:
         """A sentence where torsion counts and the shear strength of a material that is not isotropic is not known."""
-        parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.on_the_way)]
+        parts = [bent.torsion_stress for bent in (*self.bending.values(), *self.deployment_bending)]
         sheared = max((float(part.max()) for part in parts if part is not None), default=0.0)
         if strength is None or sheared <= WORTH * strength:
             return ()
@@ -158,17 +161,54 @@ def check(
 
     Parameters
     ----------
+    popped : the shells of one footprint by their end condition.
+    rod : of which they are made.
     stages : of the deployment from flat of the pinned shell; 0: none.
     shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.section_stress`.
+    progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
+        was found until then is returned.
     """
-    done = {ends: shape for ends, shape in popped.items() if shape.report.converged}
-    bent = {ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()}
-    met = {ends: contact_of(shape.shell, shape.state, rod) for ends, shape in done.items()}
-    held = {ends: reactions(shape.shell, shape.equilibrium) for ends, shape in done.items()}
-    joints = {ends: joint_loads(shape.shell, shape.state) for ends, shape in done.items()}
-    weighed = dict[Ends, SelfWeight]()
+    done = {ends: _settled(shape) for ends, shape in popped.items() if shape.report.converged}
+    checks = Checks(
+        bending={
+            ends: bending_of(shape.shell, shape.state, rod, shear_weight=shear_weight) for ends, shape in done.items()
+        },
+        reactions={ends: reactions(shape.shell, shape.equilibrium) for ends, shape in done.items()},
+        joints={ends: joint_loads(shape.shell, shape.state) for ends, shape in done.items()},
+        contact={ends: contact_of(shape.shell, shape.state, rod) for ends, shape in done.items()},
+        **_long_checks(popped, done, stages, progress),
+    )
+    if checks.deployment is None:
+        return checks
+    mesh, flat, shells = done["pinned"].footprint.mesh, checks.deployment.positions[0], checks.deployment.shells
+    directors = np.tile(UP, (len(mesh.edges), 1))
+    return replace(
+        checks,
+        deployment_bending=(
+            bending(mesh, flat, rod, normals=shell_normals(mesh, flat)),
+            *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in shells),
+        ),
+        deployment_contact=(
+            contact(mesh, flat[mesh.rod_nodes], rod, directors=directors),
+            *(contact_of(*stage, rod) for stage in shells),
+        ),
+    )
+
+
+def _settled(shape: PopUp) -> PopUp:
+    """Settled once more from where the pop-up has ended: the order of equal figures depends on the last bits."""
+    last = shape.equilibrium
+    found = find_equilibrium(last.problem, last.state, last.forces)
+    return replace(shape, shell=shape.shell.with_elements(found.elements), equilibrium=found)
+
+
+def _long_checks(
+    popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, progress: Progress
+) -> dict[str, Any]:
+    """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     follow = "pinned" in done and stages > 0
-    deployment, turned, others, stopped = None, None, dict[Ends, OtherShapes](), ""
+    deployment, turned, stopped = None, None, ""
+    weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
     missing = [f"self-weight with {ends} ends" for ends in done]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:
@@ -176,39 +216,39 @@ def check(
             weighed[ends] = self_weight(shape.shell, shape.equilibrium, progress=_weighing(ends, progress))
             missing.pop(0)
         if follow:
-            deployment = _deployed(done["pinned"], stages, progress)
+            deployment = _deployed(popped["pinned"], stages, progress)
             missing[0] = "whether the clamped shell is reached from flat"
             if deployment.reached_from_flat and "clamped" in done and done["clamped"].report.stable:
                 progress("deployment", "turning the ends into their clamps", 0.0)
-                turned = reached_by_turning(done["pinned"], done["clamped"])
+                turned = reached_by_turning(popped["pinned"], popped["clamped"])
             missing.pop(0)
-        done_before = sum(weight.factorizations for weight in weighed.values())
-        for ends, search in _other_shapes(popped, deployment, done_before, progress):
+        weighing = sum(weight.factorizations for weight in weighed.values())
+        for ends, search in _other_shapes(popped, done, deployment, weighing, progress):
             others[ends] = search
         missing.pop(0)
     except OutOfTimeError as error:
         stopped = str(error)
-    late = stopped, tuple(missing)
-    if deployment is None:
-        return Checks(bent, held, joints, None, (), weighed, met, (), others, None, *late)
-    mesh, laid = done["pinned"].footprint.mesh, deployment.positions[0]
-    flat = bending(mesh, laid, rod, normals=shell_normals(mesh, laid))
-    on_the_way = (flat, *(bending_of(*stage, rod, shear_weight=shear_weight) for stage in deployment.shells))
-    met_flat = contact(mesh, laid[mesh.rod_nodes], rod, directors=np.tile(UP, (len(mesh.edges), 1)))
-    met_on_the_way = (met_flat, *(contact_of(*stage, rod) for stage in deployment.shells))
-    return Checks(bent, held, joints, deployment, on_the_way, weighed, met, met_on_the_way, others, turned, *late)
+    return {
+        "self_weight": weighed,
+        "deployment": deployment,
+        "clamped_from_flat": turned,
+        "other_shapes": others,
+        "stopped": stopped,
+        "missing": tuple(missing),
+    }
 
 
 def _other_shapes(
-    popped: Mapping[Ends, PopUp], deployment: Deployment | None, weighing: int, progress: Progress
-) -> Iterator[tuple[Ends, OtherShapes]]:
+    popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], deployment: Deployment | None, weighing: int,
+    progress: Progress,
+) -> Iterator[tuple[Ends, OtherShapes]]:  # fmt: skip
     """Other stable shapes, with half of the factorisations that the shells, their deployment and their `weighing` took.
 
     Two thirds of them are for the first end condition; clamped shells seldom have other shapes.
     """
-    done = weighing + sum(shape.report.factorizations for shape in popped.values())
-    left = (done + (0 if deployment is None else deployment.factorizations)) // 2
-    stable = {ends: shape for ends, shape in popped.items() if shape.report.stable}
+    work = weighing + sum(shape.report.factorizations for shape in popped.values())
+    left = (work + (0 if deployment is None else deployment.factorizations)) // 2
+    stable = {ends: shape for ends, shape in done.items() if shape.report.stable}
     for number, (ends, shape) in enumerate(stable.items()):
         most = 2 * left // 3 if number == 0 else left
         left -= most

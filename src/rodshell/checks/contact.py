@@ -81,13 +81,13 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
     together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
     patch = np.repeat(np.arange(len(patches)), 2 * np.diff(sizes))
     together = together[patch[together[:, 0]] != patch[together[:, 1]]]
-    stations = np.array([(one.start, one.end) for one in mesh.grid.rods]).ravel()
+    stations = np.array([(rod.start, rod.end) for rod in mesh.grid.rods]).ravel()
     crossings = Crossings(
-        np.concatenate([*(one.rods + by for one, by in zip(parts, sizes, strict=False)), together // 2]),
-        np.concatenate([*(one.at for one in parts), stations[together]]),
+        np.concatenate([*(crossings.rods + by for crossings, by in zip(parts, sizes, strict=False)), together // 2]),
+        np.concatenate([*(crossings.at for crossings in parts), stations[together]]),
     )
     frames = [(shell, rod_frames(shell), state) for shell, state in patches]
-    turned = [edge_directors(shell, one, state) for shell, one, state in frames if one is not None]
+    turned = [edge_directors(shell, frame, state) for shell, frame, state in frames if frame is not None]
     directors = np.concatenate(turned) if len(turned) == len(patches) else None
     return contact(mesh, places, rod, directors=directors, crossings=crossings)
 
@@ -122,13 +122,13 @@ def contact(
 
 def worst_contact(parts: Mapping[str, Contact]) -> Contact:
     """Of several shells, by their names, each checked by itself: the worst, with the names of rods among all."""
-    known = [(name, one) for name, one in parts.items() if one.clearance is not None]
+    known = [(name, shape) for name, shape in parts.items() if shape.clearance is not None]
     if not known:
         return Contact()
     name, worst = min(known, key=lambda pair: pair[1].clearance or 0.0)
     assert worst.rods is not None
     rods = (f"{name}-{worst.rods[0]}", f"{name}-{worst.rods[1]}")
-    return replace(worst, rods=rods, pairs=sum(one.pairs for one in parts.values()))
+    return replace(worst, rods=rods, pairs=sum(shape.pairs for shape in parts.values()))
 
 
 @dataclass(frozen=True)
@@ -295,7 +295,7 @@ class _Edges:
     def _sines(self) -> Floats:
         """(c,) sine of the angle between the rods at each crossing."""
         tangents = [self.tangent[self._edge_at(self.crossings.rods[:, k], self.crossings.at[:, k])] for k in (0, 1)]
-        return np.linalg.norm(cross(*tangents), axis=1)
+        return np.asarray(np.linalg.norm(cross(*tangents), axis=1))
 
     def _edge_at(self, rods: Ints, at: Floats) -> Ints:
         """Edge of each rod at a material coordinate."""
@@ -303,7 +303,7 @@ class _Edges:
         keys = self.rods * span + (self.station + 0.5 * self.lengths - low)
         after = np.searchsorted(keys, rods * span + (at - low))
         first, stop = (np.searchsorted(self.rods, rods, side=side) for side in ("left", "right"))
-        return np.clip(after, first, stop - 1)
+        return np.asarray(np.clip(after, first, stop - 1))
 
 
 def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[Floats, Floats]:

@@ -234,9 +234,9 @@ class _Path:
         self._counted(found)
         return found if found.report.stable else None
 
-    def apart(self, one: Equilibrium, two: Equilibrium) -> float:
+    def apart(self, here: Equilibrium, there: Equilibrium) -> float:
         """Distance of two shapes over half the shell's width."""
-        return float(np.linalg.norm(self.shell.positions(one.state - two.state), axis=1).max()) / self._length
+        return float(np.linalg.norm(self.shell.positions(here.state - there.state), axis=1).max()) / self._length
 
     def lifted(self, like: Stage, share: float) -> Equilibrium:
         """The equilibrium at a small share that is next to the flat grid lifted towards the shape of a stage, whose
@@ -289,10 +289,10 @@ class _Path:
         last = list(takewhile(lambda one: one[1].report.iterations <= EASY, reversed(found[-DEGREE - 1 :])))
         if len(last) < 2 or not self._smooth:
             return None
-        roots, root = [np.sqrt(one[0]) for one in last], np.sqrt(share)
+        roots, root = [np.sqrt(stage[0]) for stage in last], np.sqrt(share)
         weights = [prod((root - b) / (a - b) for b in roots if b != a) for a in roots]  # Lagrange's
-        state = np.sum([weight * one.state for weight, (_, one) in zip(weights, last, strict=True)], axis=0)
-        forces = np.sum([weight * one.forces for weight, (_, one) in zip(weights, last, strict=True)], axis=0)
+        state = np.sum([weight * there.state for weight, (_, there) in zip(weights, last, strict=True)], axis=0)
+        forces = np.sum([weight * there.forces for weight, (_, there) in zip(weights, last, strict=True)], axis=0)
         before, problem = last[0][1], self._problem(share, last[0][1].elements)
         there = self._counted(find_equilibrium(problem, state, forces, most_iterations=EASY))
         self._smooth = there.report.stable  # where one guess leads astray, the next ones do, too
@@ -312,7 +312,7 @@ def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
 
     Returns
     -------
-    None where that could not be followed. Snaps on the way are gone through.
+    None where that could not be followed. The path goes on after a snap.
     """
     shell, mesh = clamped.shell, clamped.footprint.mesh
     now, outward = end_directions(mesh, pinned.positions), clamped.boundary.tangents

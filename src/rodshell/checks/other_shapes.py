@@ -2,7 +2,7 @@
 
 A shell that was bent into its shape may have several. They are looked for from starts at some distance: popped
 through, each node mirrored in the surface that the supports span, and kicked along the softest modes of the tangent
-stiffness, one by one and mixed. From each start the energy is gone down to the next stable equilibrium. What is found
+stiffness, one by one and mixed. From each start the energy is lowered to the next stable equilibrium. What is found
 is a shape of the shell; that nothing is found proves nothing, so the search says how far it looked.
 """
 
@@ -100,7 +100,7 @@ def other_shapes(
     ----------
     found : its stable equilibrium without loads, the shell's source frames being there.
     most_factorizations : the search ends before they are used up; kicks that are small come first.
-    deployment : of this shell; the shape that it ended in, if that was another one, is among those found.
+    deployment : of this shell; the shape that it ended in, where that is not the final one, is among those found.
     progress : called with the number of each start before it.
     """
     search = _Search(shell, found, deployment)
@@ -118,7 +118,7 @@ def other_shapes(
 
 class _Search:
     def __init__(self, shell: Shell, found: Equilibrium, deployment: Deployment | None) -> None:
-        self.shell, self.own, self.factorizations = shell, found, 0
+        self.shell, self.found, self.factorizations = shell, found, 0
         self.positions = shell.positions(found.state)
         self.length = half_width(self.positions)
         crossed = (shell.mesh.grid.joint_counts() > 0).all()  # else no normals are known
@@ -143,32 +143,34 @@ class _Search:
         for size in KICKS:
             for mode in modes:
                 for side in (1.0, -1.0):
-                    yield size, self.own.state + side * size * self.length * mode
+                    yield size, self.found.state + side * size * self.length * mode
             if self.image is None and size == KICKS[0]:
                 yield 0.0, self._through()
         for _ in range(MIXTURES):
             mixture = np.tensordot(random.standard_normal(len(modes)), modes, 1)
             mixture /= np.linalg.norm(mixture[nodes], axis=2).max()
-            yield KICKS[-1], self.own.state + KICKS[-1] * self.length * mixture
+            yield KICKS[-1], self.found.state + KICKS[-1] * self.length * mixture
 
     def go(self, start: Floats, kick: float, most: int) -> None:
         """Down from a start; keeps a shape that is new. The mirror image has the same axial forces."""
-        forces = self.own.forces if kick == 0 else np.zeros_like(self.own.forces)
-        there = find_equilibrium(self.own.problem, start, forces, descend=True, limit_steps=True, most_iterations=most)
+        forces = self.found.forces if kick == 0 else np.zeros_like(self.found.forces)
+        there = find_equilibrium(
+            self.found.problem, start, forces, descend=True, limit_steps=True, most_iterations=most
+        )
         self.factorizations += there.report.factorizations
         positions = self.shell.positions(there.state)
-        known = (self.positions, *(one.positions for one in self.shapes))
-        if there.report.stable and all(self._apart(positions, one) > SAME for one in known):
+        known = (self.positions, *(shape.positions for shape in self.shapes))
+        if there.report.stable and all(self._apart(positions, other) > SAME for other in known):
             mirror = self.image is not None and self._apart(positions, self.image) < MIRRORED
             same = mirror and not self.shell.mesh.layered  # lifted to the other side it goes to its image
             from_flat = True if same and self.reached else None
-            energy = there.energy / self.own.energy
+            energy = there.energy / self.found.energy
             self.shapes.append(OtherShape(self._apart(positions, self.positions), energy, from_flat, mirror, positions))
 
     def _modes(self) -> list[Floats]:
         """The softest modes, the farthest node going by 1."""
         mass = self.shell.mass if self.shell.mass.any() else None
-        modes = self.own.tangent.lowest_modes(MODES, mass=mass, tolerance=0.0, most_sweeps=MODE_SWEEPS, guards=2)
+        modes = self.found.tangent.lowest_modes(MODES, mass=mass, tolerance=0.0, most_sweeps=MODE_SWEEPS, guards=2)
         self.factorizations += MODES_COST
         return [mode / np.linalg.norm(mode[self.shell.stretch.blocks], axis=2).max() for mode in modes.shapes]
 
@@ -177,19 +179,19 @@ class _Search:
         sections, whose first directors are kept on the side of the shell where they were."""
         nodes = np.flatnonzero(self.shell.like < self.shell.mesh.node_count)
         above = (self.middle - spanned(self.shell.mesh, self.middle)) @ self.normal
-        state = self.own.state.copy()
+        state = self.found.state.copy()
         state[nodes] += (self._mirrored(above) - self.positions)[self.shell.like[nodes]]
         held = np.append(self.shell.ends, self.shell.ghosts)
-        state[held] = self.own.state[held]
+        state[held] = self.found.state[held]
         if frames := rod_frames(self.shell):
             self._turn_sections(frames, state)
         return state
 
     def _turn_sections(self, frames: BendTwist, state: Floats) -> None:
         """Set the twist angles of a state whose nodes are mirrored to those of mirrored sections."""
-        shell, own = self.shell, self.own.state
-        before, now = (unit(np.diff(at[shell.stretch.blocks], axis=1)[:, 0]) for at in (own, state))
-        directors = edge_directors(shell, frames, own)
+        shell, here = self.shell, self.found.state
+        before, now = (unit(np.diff(at[shell.stretch.blocks], axis=1)[:, 0]) for at in (here, state))
+        directors = edge_directors(shell, frames, here)
         wanted = parallel_transport(-self._reflected(directors), self._reflected(before), now)
         with np.errstate(divide="ignore", invalid="ignore"):  # turned right round an edge has no frame, nor energy
             turns = signed_angle(parallel_transport(directors, before, now), wanted, now)
@@ -208,14 +210,23 @@ class _Search:
         """(n, 3) vectors as the plane of the supports reflects them."""
         return np.asarray(vectors - 2 * (vectors @ self.normal)[:, None] * self.normal)
 
-    def _apart(self, one: Floats, two: Floats) -> float:
-        return float(np.linalg.norm(one - two, axis=1).max()) / self.length
+    def _apart(self, here: Floats, there: Floats) -> float:
+        return float(np.linalg.norm(here - there, axis=1).max()) / self.length
 
 
 def spanned(mesh: GridMesh, positions: Floats) -> Floats:
-    """(n, 3) nodes on the surface that the rod ends span like a net of soft springs along the edges.
+    """The surface that the rod ends span like a net of soft springs along the edges.
 
-    Rods in two layers, whose nodes lie at `positions` of the surface between them, are joined at their crossings.
+    Rods in two layers are joined at their crossings.
+
+    Parameters
+    ----------
+    mesh : the grid.
+    positions : (n, 3) of its nodes [m]; of rods in two layers on the surface between them.
+
+    Returns
+    -------
+    (n, 3) the nodes on that surface [m].
     """
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]

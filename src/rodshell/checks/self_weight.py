@@ -1,8 +1,8 @@
-"""How much of its own weight a popped-up shell bears, and how far it sinks under it.
+"""How much of its own weight a popped-up shell carries, and how far it sinks under it.
 
-The weight is that of the rods and joints, lumped at the nodes as in the motions, acting along -z. "Bears" means: the
-path of equilibria that begins at the unloaded shell is stable up to there. A linear buckling factor would not do: the
-unloaded shell is bent, and sinks before it buckles.
+The weight is that of the rods and joints, lumped at the nodes as in the motions, acting along -z. A shell carries a
+load where the path of equilibria that begins at the unloaded shell is stable up to there. A linear buckling factor
+would not do: the unloaded shell is bent, and sinks before it buckles.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,13 +24,13 @@ Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "not 
 
 @dataclass(frozen=True)
 class SelfWeight:
-    """What share of its own weight a shell bears.
+    """How much of its own weight a shell carries.
 
     Parameters
     ----------
     load_factor : on the weight, up to which the shell is stable; 0 if it is unstable unloaded; None where it is above
         `MOST`, or where no mass is known. At most 0.2 % below where stability is lost.
-    deflection : largest displacement of a node under the whole weight [m]; None where the shell does not bear it.
+    deflection : largest displacement of a node under the whole weight [m]; None where the shell does not carry it.
     limit : why the factor is what it is. "limit point": the load cannot grow, the shell snaps through; "bifurcation":
         it gives way sideways; "none": it is stable up to `MOST`; "not followed": it is stable up to the factor, and
         nothing is known above; "no mass": the rods have none, so that nothing is known.
@@ -44,7 +44,7 @@ class SelfWeight:
 
     @property
     def at_least(self) -> float:
-        """The factor as a number: infinite above `MOST`, nought where nothing is known."""
+        """The factor as a number: infinite above `MOST`, 0 where nothing is known."""
         if self.load_factor is not None:
             return self.load_factor
         return np.inf if self.limit == "none" else 0.0
@@ -64,7 +64,7 @@ def self_weight(
     ----------
     found : the equilibrium of the shell without loads, its ends held.
     gravity : [m/s2].
-    most : the largest factor that is of interest.
+    most : largest factor that is looked for.
     progress : as of `first_critical`.
     """
     if not shell.mass[np.unique(shell.stretch.blocks), 2].all():  # joints may have some even then
@@ -83,26 +83,36 @@ def self_weight(
 
 
 def unknown_weights(found: Mapping[Ends, SelfWeight]) -> tuple[str, ...]:
-    """Sentences for what is not known of shells by their end condition."""
-    if any(one.limit == "no mass" for one in found.values()):
+    """Sentences on what is not known.
+
+    Parameters
+    ----------
+    found : by end condition.
+    """
+    if any(weight.limit == "no mass" for weight in found.values()):
         return (
             "no mass was given, so that it is not known what share of its own weight the shell bears: "
             "give rod.section.mass",
         )
     return tuple(
-        f"with {ends} ends the shell bears at least {_share(one.load_factor or 0.0)} its own weight; above, its path "
-        "could not be followed, and nothing is known"
-        for ends, one in found.items()
-        if one.limit == "not followed"
+        f"with {ends} ends the shell bears at least {_share(weight.load_factor or 0.0)} its own weight; above, its "
+        "path could not be followed, and nothing is known"
+        for ends, weight in found.items()
+        if weight.limit == "not followed"
     )
 
 
 def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
-    """Of shells that stand by themselves: the smallest factor, and the largest deflection if all bear their weight."""
-    least = min(parts, key=lambda one: one.at_least)
-    sunk = [one.deflection for one in parts]
-    deflection = None if None in sunk else max(one for one in sunk if one is not None)
-    return SelfWeight(least.load_factor, deflection, least.limit, sum(one.factorizations for one in parts))
+    """Of patches that stand by themselves: the smallest factor, and the largest deflection if all carry their weight.
+
+    Parameters
+    ----------
+    parts : of each patch.
+    """
+    least = min(parts, key=lambda part: part.at_least)
+    sunk = [part.deflection for part in parts]
+    deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
+    return SelfWeight(least.load_factor, deflection, least.limit, sum(part.factorizations for part in parts))
 
 
 def _share(factor: float) -> str:

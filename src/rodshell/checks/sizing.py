@@ -21,7 +21,7 @@ from rodshell.units import length_text, rounded_down
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
 SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
 # Of the strength, by the bends of the net: an estimate, since the free shell bends up to 1.2 times as sharply (measured
-# on the gallery). On the way up from flat roofs bend 3 times as sharply, those with several waves more.
+# on the gallery). During deployment flat roofs bend 3 times as sharply, those with several waves more.
 AIM = 1 / 2
 # Rods of a table bend the more sharply the more others they are joined to, which lie low near their own ends: 1.3 to
 # 1.4 times the root of the joints along one, measured on square tables of 4, 8 and 12 rods each way.

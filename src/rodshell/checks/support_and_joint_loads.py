@@ -124,7 +124,7 @@ class JointLoads:
     @property
     def out_of_plane_moments(self) -> Floats:
         """(c,) size of the moment about the axes in the joint's plane [N m]."""
-        return np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1)
+        return np.asarray(np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1))
 
 
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:
@@ -184,7 +184,7 @@ def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:
     pair = np.sort(mesh.grid.crossings.rods, axis=1) @ [count, 1]
     order = np.argsort(pair)
     forces, moments = np.zeros((len(pair), 2, 3)), np.zeros((len(pair), 3))
-    elements = [one for one in shell.elements if isinstance(one, LinkerBend) or one in shell.between]
+    elements = [element for element in shell.elements if isinstance(element, LinkerBend) or element in shell.between]
     for element in elements:
         angles = [c for c in range(element.blocks.shape[1]) if (element.blocks[:, c] >= first).all()]
         if not angles or len(element.blocks) == 0:

@@ -1,5 +1,6 @@
-"""`rodshell export`: files of an earlier result, made again from its archive."""
+"""`rodshell export`: files of an earlier result, made again from its archive; and the JSON Schema of result.json."""
 
+import json
 from pathlib import Path
 
 import click
@@ -8,10 +9,23 @@ from rodshell.cli.options import FORCE, QUIET, wanted_kinds
 from rodshell.cli.reporting import Progress
 
 
+def print_schema(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+    """--schema: print the JSON Schema and exit, as --help does."""
+    if wanted:
+        from rodshell.results.results import json_schema
+
+        click.echo(json.dumps(json_schema(), indent=1, ensure_ascii=False))
+        context.exit()
+
+
+SCHEMA = "Print the JSON Schema of result.json and exit."
+
+
 @click.command()
 @click.argument("folder", metavar="DIR")
 @click.option("--only", metavar="KINDS", help="Such as dxf,csv; default: all but 3dm.")
 @click.option("--out", "-o", metavar="DIR", help="Where to write; default: into the result itself.")
+@click.option("--schema", is_flag=True, is_eager=True, expose_value=False, callback=print_schema, help=SCHEMA)
 @FORCE
 @QUIET
 def command(folder: str, only: str | None, out: str | None, force: bool, quiet: bool) -> int:

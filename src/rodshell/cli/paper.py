@@ -2,7 +2,6 @@
 
 from contextlib import ExitStack
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ import click
 from rodshell.cli.options import FORCE, QUIET
 from rodshell.cli.reporting import Progress, announce_compilation, deliver, output_folder
 from rodshell.errors import InputError
-from rodshell.paper import FIGURES, reserved
+from rodshell.paper import FIGURES, figure_maker, reserved
 
 if TYPE_CHECKING:
     from rodshell.results.folder import ResultFolder
@@ -45,7 +44,7 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
         codes = []
         for name, place in zip(names, places, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:
-                made = import_module(f"rodshell.paper.{name}").make(progress, **given)
+                made = figure_maker(name)(progress, **given)
             saved = partial(_save, made)
             codes.append(deliver(made, saved, place, progress=progress, as_json=as_json, quiet=quiet))
     return max(codes)

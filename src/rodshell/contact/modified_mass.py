@@ -60,7 +60,13 @@ class Touching:
 
     @staticmethod
     def none(supports: Any, state: Floats) -> "Touching":
-        """Nothing touches."""
+        """Nothing touches.
+
+        Parameters
+        ----------
+        supports : the shell's supports, a constraint.
+        state : (N, 3) [m].
+        """
         nowhere, no_nodes = np.empty((0, 3)), np.empty(0, dtype=np.intp)
         return Touching(supports, supports.freedom(state), no_nodes, nowhere, nowhere, np.empty(0, dtype=bool))
 
@@ -98,7 +104,13 @@ class Touching:
         return Freedom(directions, self.free.count), along, cosine
 
     def free_share(self, nodes: Ints, normals: Floats) -> Floats:
-        """(k,) cosines between the normals (k, 3) of `nodes` (k,) and the directions that their supports leave free."""
+        """(k,) cosines between the normals (k, 3) of `nodes` (k,) and the directions that their supports leave free.
+
+        Parameters
+        ----------
+        nodes : (k,) blocks.
+        normals : (k, 3) unit vectors.
+        """
         along = np.einsum("kcx,kx->kc", self.free.directions[nodes], normals)
         along[np.arange(3) >= self.free.count[nodes][:, None]] = 0.0
         return np.asarray(np.sqrt(dot(along, along)))
@@ -140,7 +152,13 @@ class ModifiedMass:
         return self.stopped == "all" and not self.friction
 
     def touching(self, supports: Any, state: Floats) -> Touching:
-        """The constraint to start a step with: nothing touches, whatever touched in the step before."""
+        """The constraint to start a step with: nothing touches, whatever touched in the step before.
+
+        Parameters
+        ----------
+        supports : the shell's supports, a constraint.
+        state : (N, 3) [m].
+        """
         return Touching.none(supports, state)
 
     def below(self, state: Floats, touching: Touching) -> Touching | None:
@@ -148,6 +166,11 @@ class ModifiedMass:
 
         Nodes that touch already are not tested again: above a concave surface a node on its plane is below it by the
         square of its slide, and elsewhere by round-off (ERRATA to Algorithm 1, which could loop on them).
+
+        Parameters
+        ----------
+        state : (N, 3) at the end of the step [m].
+        touching : the constraint of the step so far.
         """
         outside = np.ones(len(state), dtype=bool)
         outside[self.nodes] = self.target.outside(state[self.nodes])
@@ -195,7 +218,13 @@ class ModifiedMass:
         return replace(touching, stuck=touching.stuck & ~slips), rubbing
 
     def landed(self, velocity: Floats, touching: Touching) -> Floats:
-        """(N, 3) the velocity after the inelastic impact."""
+        """(N, 3) the velocity after the inelastic impact.
+
+        Parameters
+        ----------
+        velocity : (N, 3) before the impact [m/s].
+        touching : the nodes that touch, with their normals.
+        """
         result, nodes = velocity.copy(), touching.nodes
         if self.stops_all:
             result[nodes] = 0.0

@@ -41,7 +41,13 @@ class BoundToTarget:
         return Freedom(_tangents(self._surface.at(state).normal, self.guides), self.count)
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N]."""
+        """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N].
+
+        Parameters
+        ----------
+        state : (n, 3) nodes [m].
+        gradient : (n, 3) of the energy there [N].
+        """
         surface = self._surface.at(state)
         return -dot(surface.normal, gradient)[:, None, None] * surface.hessian
 
@@ -100,7 +106,12 @@ class UnilateralContact:
     __repr__ = brief
 
     def forces(self, state: Floats) -> Floats:
-        """(m,) contact forces [N] at `state` (N, 3)."""
+        """(m,) contact forces [N] at `state` (N, 3).
+
+        Parameters
+        ----------
+        state : (N, 3) [m].
+        """
         gap = self.target.contact(state[self.blocks[:, 0]]).distance
         return np.maximum(0.0, self.multipliers - self.stiffness * gap)
 

@@ -1,10 +1,8 @@
-"""What a workshop needs beyond the form: layers, cut lengths, splices, stock, bracing."""
+"""How a form is made: layers, cut lengths, splices, stock, bracing."""
 
 from rodshell.fabrication.bracing import Diagonal, diagonals
-from rodshell.fabrication.fabricate import Fabricated, fabricate
-from rodshell.fabrication.nesting import Bar, Nesting, nest
-from rodshell.fabrication.options import Fabrication
-from rodshell.fabrication.splices import splices
+from rodshell.fabrication.cutting import Bar, Nesting, nest, splices
+from rodshell.fabrication.fabricate import Fabricated, Fabrication, fabricate
 
 __all__ = [
     "Bar",

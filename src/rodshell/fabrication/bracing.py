@@ -38,31 +38,31 @@ def diagonals(rods: ArrayLike, at: ArrayLike, flat: Floats, final: Floats) -> li
 
 
 def _cells(rods: Sequence[Sequence[int]], at: Floats) -> list[tuple[int, int, int, int]]:
-    """Joints around each cell, in a row: on along one rod, over, back along another, home."""
+    """The four joints of each cell, in their order around it."""
     along: dict[int, list[tuple[float, int]]] = {}
     for joint, (pair, places) in enumerate(zip(rods, at.tolist(), strict=True)):
         for rod, place in zip(pair, places, strict=True):
             along.setdefault(rod, []).append((place, joint))
-    beside: dict[tuple[int, int], list[int]] = {}  # the joints next to a joint on a rod
+    next_to: dict[tuple[int, int], list[int]] = {}  # the joints next to a joint on a rod
     for rod, on_rod in along.items():
         row = [joint for _, joint in sorted(on_rod)]
         for k, joint in enumerate(row):
-            beside[joint, rod] = row[max(k - 1, 0) : k] + row[k + 1 : k + 2]
+            next_to[joint, rod] = row[max(k - 1, 0) : k] + row[k + 1 : k + 2]
     found: dict[frozenset[int], tuple[int, int, int, int]] = {}
     for joint, (p, q) in enumerate(rods):
-        for on in beside[joint, p]:
-            for over in beside[joint, q]:
-                corner = _meeting(beside, rods, on, over, p, q)
+        for on in next_to[joint, p]:
+            for over in next_to[joint, q]:
+                corner = _meeting(next_to, rods, on, over, p, q)
                 if corner is not None:
                     found.setdefault(frozenset((joint, on, corner, over)), (joint, on, corner, over))
     return list(found.values())
 
 
 def _meeting(
-    beside: dict[tuple[int, int], list[int]], rods: Sequence[Sequence[int]], on: int, over: int, p: int, q: int
+    next_to: dict[tuple[int, int], list[int]], rods: Sequence[Sequence[int]], on: int, over: int, p: int, q: int
 ) -> int | None:
     """The joint next to `on` on its other rod and next to `over` on its own, or None."""
     other_of_on = rods[on][1] if rods[on][0] == p else rods[on][0]
     other_of_over = rods[over][1] if rods[over][0] == q else rods[over][0]
-    both = set(beside[on, other_of_on]) & set(beside[over, other_of_over])
+    both = set(next_to[on, other_of_on]) & set(next_to[over, other_of_over])
     return min(both) if both else None

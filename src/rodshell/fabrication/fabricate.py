@@ -1,21 +1,50 @@
-"""All that the workshop needs of a grid, in one call."""
+"""Cut list, layers, splices, stock and bracing of a grid, in one call, and the lengths that decide the cutting."""
 
 from dataclasses import dataclass
 from functools import partial
+from math import isfinite
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
 from rodshell.fabrication.bracing import Diagonal, diagonals
-from rodshell.fabrication.nesting import Nesting, nest
-from rodshell.fabrication.options import Fabrication
-from rodshell.fabrication.splices import splices
+from rodshell.fabrication.cutting import Nesting, nest, splices
 from rodshell.layout import GridMesh
 from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
 from rodshell.units import length_text
 
 SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
+
+
+@dataclass(frozen=True)
+class Fabrication:
+    """Lengths that decide the cutting.
+
+    Parameters
+    ----------
+    end_allowance : added to a rod at each end [m], to be held by the support.
+    stock_length : of the bars that rods are cut from [m]; None if every rod comes in one piece.
+    kerf : lost at each saw cut of that stock [m].
+    """
+
+    end_allowance: float = 0.0
+    stock_length: float | None = None
+    kerf: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("end allowance", self.end_allowance), ("kerf", self.kerf)):
+            if not (isfinite(value) and value >= 0):
+                raise InputError(f"the {name} must not be negative, but is {value} m")
+        if self.stock_length is None and self.kerf > 0:
+            raise InputError(
+                f"the kerf of {self.kerf} m is lost where stock is cut: give its stock_length, or leave the kerf out"
+            )
+        if self.stock_length is not None and not self.stock_length > self.kerf:
+            raise InputError(
+                f"stock of {self.stock_length} m cannot be cut with a kerf of {self.kerf} m: give longer bars"
+            )
 
 
 @dataclass(frozen=True)
@@ -95,16 +124,16 @@ def _splices(
         cut = rod.length + 2 * options.end_allowance
         apart = float(np.median(np.diff(np.sort(joints)))) if len(joints) > 1 else 0.0
         found = splices(
-            cut, joints, stock, places=mesh.stations[here] + shift, curvature=bend[here], short=short * apart
+            cut, joints, stock, stations=mesh.stations[here] + shift, curvature=bend[here], short=short * apart
         )
         if found is None:
             hopeless.append(rod.name)
         made.append(tuple(at - options.end_allowance for at in found or ()))
     if not hopeless:
         return tuple(made), ()
-    who = f"rod {hopeless[0]}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {hopeless[0]})"
+    named = f"rod {hopeless[0]}" if len(hopeless) == 1 else f"{len(hopeless)} rods (the first: {hopeless[0]})"
     return tuple(made), (
-        f"{who} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock",
+        f"{named} cannot be spliced between joints from stock of {length_text(stock)}: give longer stock",
     )
 
 

@@ -66,7 +66,7 @@ def bound_drape(
     progress("net", "marching", 0.0)
     eccentricity = joint.eccentricity if joint else 0.0
     near = warm_start.net if warm_start else None
-    net = chebyshev_net(target, layout, anchor=anchor, near=near, eccentricity=eccentricity)
+    net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity)
     grid = with_apron(net, CLEARANCE * layout.edge)
     cuts = [list[FlatRod]() for _ in grid.rods]
     for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):

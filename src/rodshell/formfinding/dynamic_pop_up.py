@@ -20,7 +20,7 @@ from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
 from rodshell.solve.forces import Damping
-from rodshell.solve.implicit_euler import Motion
+from rodshell.solve.implicit_euler import ImplicitEuler, Motion
 from rodshell.solve.linear_stability import step_limit
 from rodshell.solve.newton_matrix import narrow_or_dissected
 from rodshell.solve.problem import Supports
@@ -131,7 +131,8 @@ def dynamic_pop_up(
             break
         series = simulate(
             replace(last.motion, forces=(Damping(rate=rate),)), last.state, last.velocity,
-            start=last.time, until=until, step=step, every=int(until / step) + 2, stop=stop, matrix=matrix,
+            start=last.time, until=until, step=step, every=int(until / step) + 2, stop=stop,
+            stepper=ImplicitEuler(matrix),
         )  # fmt: skip
         assert series.last is not None
         assert series.report is not None

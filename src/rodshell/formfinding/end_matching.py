@@ -126,7 +126,7 @@ def match_net(
             x, y, _ = interpolated(net.net, shift[:1], shift[1:])[0, 0].tolist()
             anchor = (x, y)
         laid = replace(layout, lines=(_filled(lines, 0, layout.spacing), _filled(lines, 1, layout.spacing)))
-        net = chebyshev_net(target, laid, anchor=anchor, near=net, eccentricity=eccentricity)
+        net = chebyshev_net(target, laid, anchor=anchor, warm_start=net, eccentricity=eccentricity)
         matched, moved = _corrected(net, lines, goals.points)
         if moved < SETTLED * target.size:
             break

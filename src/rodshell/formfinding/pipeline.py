@@ -177,7 +177,7 @@ def find_stages(
             continue
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
-            ends=end, start=earlier.get(end, "draped"), joint=joint, progress=progress,
+            ends=end, warm_start=earlier.get(end), joint=joint, progress=progress,
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break

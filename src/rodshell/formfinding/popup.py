@@ -17,7 +17,7 @@ from rodshell.formfinding.layers import node_normals
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.formfinding.warm_start import transferred_edges, transferred_nodes
-from rodshell.geometry.vectors import dot, unit
+from rodshell.geometry.vectors import cross, dot, unit
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
@@ -28,7 +28,7 @@ from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem, half_width
 from rodshell.solve.report import SolveReport, Status
 from rodshell.units import length_text
-from rodshell.validation import choice
+from rodshell.validation import choice, instance
 
 Ends = Literal["pinned", "clamped"]
 Start = Literal["draped", "flat"]
@@ -39,7 +39,7 @@ FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves t
 CLAMP_STEP = 0.25
 MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
 MOST_AGAIN = 8  # iterations from the last form before starting afresh
-HOPELESS = 0.5  # negative modes a joint: laths end 2 to 17 % off the target from there, other shells have less than 0.2
+MODES_PER_JOINT = 0.5  # negative modes: laths end 2 to 17 % off the target from more, other shells have less than 0.2
 NEARBY = 0.1  # of the length: a state further from the guess may be another one
 
 
@@ -89,7 +89,8 @@ def pop_up(
     rod: Rod,
     *,
     ends: Ends = "clamped",
-    start: "Start | PopUp" = "draped",
+    start: Start = "draped",
+    warm_start: PopUp | None = None,
     joint: Joint | Sequence[Joint] | None = None,
     progress: Progress = silent,
 ) -> PopUp:
@@ -100,24 +101,31 @@ def pop_up(
     ends : "pinned" holds the ends' positions, "clamped" their directions too (a rod may spin in its clamp).
     start : "draped" releases the boundary's draped state; "flat" follows the ends on straight paths from the
         flat grid, which leaves its plane to the side that the boundary's directions point away from (without
-        directions to that of +z), then turns the clamps. A shell popped up before, with the same ends: as "draped",
-        but the displacements and axial forces that it had on the same rods are the first guess. Where that does
-        not lead to a stable state nearby, the draped state does.
+        directions to that of +z), then turns the clamps.
+    warm_start : a shell popped up before with the same ends, for start="draped": the displacements and axial forces
+        that it had on the same rods are the first guess. Where that does not lead to a stable state nearby, the
+        draped state does.
     joint : what the rods do to each other where they cross: one for all, or one for each crossing; ball joints
         without. Eccentric ones lay the rods in two layers: each rod begins on its own line, half of their distance
         above or below the draped surface, and the boundary's ends lie there.
 
     Raises
     ------
-    InputError : `start` is "draped" and the boundary has no draped state; the joints do not fit the grid.
+    InputError : `start` is "draped" and the boundary has no draped state; `warm_start` has other ends, or comes with
+        start="flat"; the joints do not fit the grid.
     """
     choice("ends", ends, ENDS)
-    if not isinstance(start, PopUp):
-        choice("start", start, STARTS)
+    choice("start", start, STARTS)
+    if warm_start is not None:
+        instance("warm_start", warm_start, PopUp, "what an earlier rodshell.pop_up returned")
+    if warm_start is not None and start != "draped":
+        raise InputError('an earlier pop-up is a first guess for start="draped" alone: leave out warm_start, or start')
+    if warm_start is not None and warm_start.ends != ends:
+        raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {ends}: give one with the same ends")
     require_joint(joint)
     joint = joint or Ball()
     joints = joint if isinstance(joint, Sequence) else (joint,)
-    apart = max((one.eccentricity for one in joints), default=0.0)
+    apart = max((joint.eccentricity for joint in joints), default=0.0)
     if apart and not footprint.mesh.layered:
         footprint, boundary = in_layers(footprint, boundary, apart)
     elif footprint.mesh.layered and apart != (lie := 2 * float(np.abs(footprint.mesh.heights).max(initial=0.0))):
@@ -126,9 +134,8 @@ def pop_up(
             f"{length_text(apart)} apart: drape it with the same joint"
         )
     stages = _Stages(footprint, boundary, rod, joint, progress)
-    if start == "draped" or isinstance(start, PopUp):
-        shell, found = (stages.again(start) if isinstance(start, PopUp) else None) or stages.release(ends)
-        start = "draped"
+    if start == "draped":
+        shell, found = (stages.again(warm_start) if warm_start else None) or stages.release(ends)
     else:
         shell, found = stages.rise()
         if ends == "clamped" and found.report.converged:
@@ -160,14 +167,17 @@ class _Stages:
         return half_width(self.boundary.points)
 
     @property
-    def hopeless(self) -> int | None:
-        """Negative modes of the draped state from which no good shape is reached: rods buckle between their joints
-        nearly everywhere, and hundreds of factorisations lead to crumpled states far from the target. None where
-        rods can roll at their joints: laths on edge have as many modes, and lie down."""
+    def most_modes(self) -> int | None:
+        """Most negative modes of a draped state from which a good shape is reached.
+
+        With more, rods buckle between their joints nearly everywhere, and hundreds of factorisations lead to crumpled
+        states far from the target. None where rods can roll at their joints: laths on edge have as many modes, and
+        lie down.
+        """
         joints = self.joint if isinstance(self.joint, Sequence) else (self.joint,)
         if not all(joint.holds_normals for joint in joints):
             return None
-        return int(HOPELESS * len(self.footprint.mesh.grid.crossings))
+        return int(MODES_PER_JOINT * len(self.footprint.mesh.grid.crossings))
 
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
         """Ends (and ghosts) held, or on their way to `goals`."""
@@ -185,7 +195,7 @@ class _Stages:
     def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
         """Let go of the draped state: the ends stay, the target's forces vanish. At once, or down the energy.
 
-        Given up where it has more negative modes than is `hopeless`.
+        Given up where it has more negative modes than `most_modes`.
         """
         if self.boundary.draped is None:
             raise InputError('this boundary has no draped state to start from: use start="flat"')
@@ -197,7 +207,7 @@ class _Stages:
             state,
             forces,
             limit_steps=True,
-            most_modes=self.hopeless,
+            most_modes=self.most_modes,
             most_iterations=MOST_AT_ONCE,
             progress=self._counting(f"{ends}, iteration", MOST_AT_ONCE),
         )
@@ -214,26 +224,26 @@ class _Stages:
         )
         return shell, replace(slid, report=slid.report.after(at_once.report))
 
-    def again(self, last: PopUp) -> tuple[Shell, Equilibrium] | None:
-        """From where a shell popped up before went from its draped state; None where that leads nowhere near.
+    def again(self, warm_start: PopUp) -> tuple[Shell, Equilibrium] | None:
+        """From the displacements that an earlier pop-up has; None where that does not lead to a stable state nearby.
 
-        Not for rods with twist angles: these are not carried, and without them the draped state is a better guess.
+        Not for rods with twist angles: these are not carried over, and without them the draped state is a better guess.
         """
-        here, there = self.boundary.draped, last.boundary.draped
-        if here is None or there is None or last.shell.angles:
+        here, there = self.boundary.draped, warm_start.boundary.draped
+        if here is None or there is None or warm_start.shell.angles:
             return None
-        shell, mesh, before = self.shell(last.ends), self.footprint.mesh, last.footprint.mesh
-        moved = transferred_nodes(last.positions - there, before, mesh)
+        shell, mesh, before = self.shell(warm_start.ends), self.footprint.mesh, warm_start.footprint.mesh
+        moved = transferred_nodes(warm_start.positions - there, before, mesh)
         moved[mesh.ends] = 0.0
         state = self.upright(shell, here + moved, self.boundary.tangents)
-        stiffer = shell.stretch.stiffness.mean() / last.shell.stretch.stiffness.mean()
+        stiffer = shell.stretch.stiffness.mean() / warm_start.shell.stretch.stiffness.mean()
         found = find_stable(
             self.problem(shell),
             state,
-            stiffer * transferred_edges(last.forces, before, mesh),
+            stiffer * transferred_edges(warm_start.forces, before, mesh),
             most_iterations=MOST_AGAIN,
             progress=lambda k, step: self.progress(
-                "pop-up", f"{last.ends}, again, iteration {k} of at most {MOST_AGAIN}", step
+                "pop-up", f"{warm_start.ends}, again, iteration {k} of at most {MOST_AGAIN}", step
             ),
         )
         strayed = np.abs(shell.positions(found.state) - here - moved).max() > NEARBY * self.length
@@ -306,11 +316,11 @@ def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
     """
     flat, ends = mesh.flat, mesh.flat[mesh.ends.ravel()]
     centre, there = ends.mean(axis=0), points.mean(axis=0)
-    a, b = (ends - centre)[:, :2], (points - there)[:, :2]
-    angle = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    a, b = (ends - centre) * (1.0, 1.0, 0.0), (points - there) * (1.0, 1.0, 0.0)
+    angle = np.arctan2(cross(a, b)[:, 2].sum(), np.sum(a * b))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     result = np.empty_like(flat)
-    result[:, :2] = (flat - centre)[:, :2] @ turn.T + there[:2]
+    result[:, :2] = (flat - centre)[:, :2] @ turn + there[:2]
     result[:, 2] = height + flat[:, 2]
     return result
 

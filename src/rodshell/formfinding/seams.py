@@ -13,7 +13,7 @@ from rodshell.formfinding.trim import NEAREST_JOINT
 from rodshell.geometry.vectors import unit
 from rodshell.layout import FlatGrid, FlatRod, GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.targets.patch import Patch
+from rodshell.targets import Patch
 
 REMEDY = "turn the layout (layout.rotate), so that its rods cross the seams, or use a smaller spacing"
 FEWEST = 2  # joints of a rod: one that is left out takes those with it that it meets

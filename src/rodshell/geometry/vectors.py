@@ -1,4 +1,4 @@
-"""Small vector maths on arrays of three-vectors."""
+"""Vector algebra on arrays of vectors with three components."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from rodshell.arrays import Floats
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """Cross products of (n, 3) arrays, several times faster than numpy's on short arrays."""
+    """Cross products (..., 3) of arrays (..., 3); several times faster than numpy's on short arrays."""
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))
     result[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     result[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
@@ -15,10 +15,10 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Inner products (n,) of (n, 3) arrays."""
+    """Inner products (...) of arrays (..., 3)."""
     return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
 def unit(a: Floats) -> Floats:
-    """Vectors (n, 3) scaled to length 1."""
+    """Vectors (..., 3) scaled to length 1."""
     return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))

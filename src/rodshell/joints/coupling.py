@@ -61,7 +61,13 @@ class ImplicitPenalty(_Penalty):
     __repr__ = brief
 
     def with_defaults(self, rod: Rod, edge: float) -> Self:
-        """The same with the defaults for a `rod` with edges of the length `edge` [m] filled in."""
+        """The same with the defaults for a `rod` with edges of the length `edge` [m] filled in.
+
+        Parameters
+        ----------
+        rod : section and material of the rods.
+        edge : length of their edges [m].
+        """
         return replace(
             self,
             C1=self.C1 or 1e4 * rod.stretch_stiffness / edge,
@@ -83,7 +89,13 @@ class ExplicitPenalty(_Penalty):
     __repr__ = brief
 
     def with_defaults(self, rod: Rod, edge: float) -> Self:
-        """The same with the defaults for a `rod` with edges of the length `edge` [m] filled in."""
+        """The same with the defaults for a `rod` with edges of the length `edge` [m] filled in.
+
+        Parameters
+        ----------
+        rod : section and material of the rods.
+        edge : length of their edges [m].
+        """
         return replace(
             self,
             C1=self.C1 or (1.5 / edge) ** 3 * min(rod.bend_stiffnesses),

@@ -19,7 +19,6 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import adapted, parallel_transport
 from rodshell.geometry.vectors import unit
 from rodshell.layout import GridMesh
-from rodshell.records import brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +37,8 @@ class RodNodes:
     blocks: Ints
     first_angle: int
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        return f"RodNodes({len(self.blocks)} of {len(self.mesh.rod_start)} rods)"
 
     @cached_property
     def rods(self) -> Ints:
@@ -54,21 +54,45 @@ class RodNodes:
         return np.asarray(order[np.searchsorted(key[order], wanted)])
 
     def has_edge(self, rod_nodes: Ints, side: int) -> Bools:
-        """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`."""
+        """Whether the rod has an edge before (side 0) or after (side 1) each of the `rod_nodes`.
+
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
         rods = self.rods[rod_nodes]
         limit = self.mesh.rod_start[rods] if side == 0 else self.mesh.rod_stop[rods] - 1
         return np.asarray(rod_nodes != limit)
 
     def edge(self, rod_nodes: Ints, side: int) -> Ints:
-        """Edge before (side 0) or after (side 1) each rod node, where there is one; edges are counted rod by rod."""
+        """Edge before (side 0) or after (side 1) each rod node, where there is one; edges are counted rod by rod.
+
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
         return np.asarray(rod_nodes - self.rods[rod_nodes] - (1 - side))
 
     def angle(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of that edge's twist angle."""
+        """Block of that edge's twist angle.
+
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
         return np.asarray(self.first_angle + self.edge(rod_nodes, side))
 
     def neighbour(self, rod_nodes: Ints, side: int) -> Ints:
-        """Block of the node at that edge's other end."""
+        """Block of the node at that edge's other end.
+
+        Parameters
+        ----------
+        rod_nodes : (k,) indices of rod nodes.
+        side : 0 before, 1 after.
+        """
         return np.asarray(self.blocks[rod_nodes + (1 if side else -1)])
 
     def directions(self, rod_nodes: Ints) -> Floats:
@@ -108,12 +132,25 @@ T = TypeVar("T", bound=SectionElements)
 
 
 def edge_tangents(state: Floats, blocks: Ints, legs: Ints) -> Floats:
-    """(m, l, 3) unit tangents at `state` (N, 3) of the edges `legs` (l, 4) of the joints on `blocks` (m, k)."""
+    """(m, l, 3) unit tangents at `state` (N, 3) of the edges `legs` (l, 4) of the joints on `blocks` (m, k).
+
+    Parameters
+    ----------
+    state : (N, 3) node positions [m] and twist angles [rad].
+    blocks : (m, k) nodes and twist angles of the joints.
+    legs : (l, 4) edges of each joint, see `Stencils`.
+    """
     return unit(state[blocks[:, legs[:, 1]]] - state[blocks[:, legs[:, 0]]])
 
 
 def with_source(elements: T, state: Floats) -> T:
-    """An energy of sections with its source frames moved to `state` (N, 3)."""
+    """An energy of sections with its source frames moved to `state` (N, 3).
+
+    Parameters
+    ----------
+    elements : joints or ties.
+    state : (N, 3) the state of the new source frames.
+    """
     tangents = edge_tangents(state, elements.blocks, elements.legs)
     directors = parallel_transport(elements.source_directors, elements.source_tangents, tangents)
     return replace(elements, source_tangents=tangents, source_directors=adapted(directors, tangents))  # type: ignore[type-var]
@@ -138,7 +175,13 @@ class Stencils(NamedTuple):
 
 
 def stencils(rod_nodes: RodNodes, pairs: Ints) -> Iterator[Stencils]:
-    """The joints between the rod nodes `pairs` (m, 2), set by set of those that are alike."""
+    """The joints between the rod nodes `pairs` (m, 2), set by set of those that are alike.
+
+    Parameters
+    ----------
+    rod_nodes : of the mesh.
+    pairs : (m, 2) rod nodes that meet, on the first and on the second rod.
+    """
     sides = np.column_stack([rod_nodes.has_edge(pairs[:, rod], side) for rod in range(2) for side in range(2)])
     for pattern in np.unique(sides, axis=0):
         members = (sides == pattern).all(axis=1)

@@ -14,7 +14,7 @@ from typing import Literal, Protocol
 from rodshell.errors import InputError
 from rodshell.records import brief
 from rodshell.rods.section import Rod
-from rodshell.validation import instance, not_negative, number
+from rodshell.validation import described, instance, not_negative, number
 
 
 class Joint(Protocol):
@@ -206,6 +206,10 @@ class Linker:
 def require_joint(joint: object) -> None:
     """Refuse a value that is neither a joint, nor a sequence of joints, nor None.
 
+    Parameters
+    ----------
+    joint : what a caller has passed.
+
     Raises
     ------
     InputError : it is something else, such as the name of a kind, or the class itself.
@@ -213,8 +217,7 @@ def require_joint(joint: object) -> None:
     several = isinstance(joint, Sequence) and not isinstance(joint, str)
     for value in joint if several else (joint,):  # type: ignore[attr-defined]
         if value is not None and (isinstance(value, type) or not hasattr(value, "turns_frames")):
-            what = f"the class {value.__name__} itself" if isinstance(value, type) else repr(value)
-            raise InputError(f"joint must be a rodshell joint such as rodshell.Pin(), not {what}")
+            raise InputError(f"joint must be a rodshell joint such as rodshell.Pin(), not {described(value)}")
 
 
 def joint_parameters(joint: Joint) -> dict[str, object]:

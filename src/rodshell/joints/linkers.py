@@ -132,7 +132,12 @@ class LinkerBend:
         return replace(self, bends=self.bends.refreshed(_signed(state, self.blocks, self.signs)))
 
     def moments(self, state: Floats) -> Floats:
-        """(n, 3) moments of the two bends and of the twist of each linker at `state` (N, 3) [N m]."""
+        """(n, 3) moments of the two bends and of the twist of each linker at `state` (N, 3) [N m].
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         bends = self.bends
         strains = bends.strains(_signed(state, self.blocks, self.signs))
         natural = np.column_stack([bends.natural_curvature, bends.natural_twist])

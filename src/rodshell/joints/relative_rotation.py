@@ -105,7 +105,12 @@ class RelativeRotation:
         return with_source(self, state)
 
     def sections(self, state: Floats) -> Floats:
-        """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B at `state` (N, 3)."""
+        """(m, 2, 2, 3) tangent T and normal N of the sections of A and of B at `state` (N, 3).
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         moved = self.refreshed(state)
         t, d1 = moved.source_tangents, moved.source_directors
         theta = state[self.blocks[:, self.legs[:, 2]], 0][..., None]
@@ -119,14 +124,24 @@ class RelativeRotation:
         return result
 
     def strains(self, state: Floats) -> Floats:
-        """(m, 3) shear, and tilt about minus A's tangent and across it, at `state` (N, 3) [rad]."""
+        """(m, 3) shear, and tilt about minus A's tangent and across it, at `state` (N, 3) [rad].
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         full = self._both_tilts(state)
         of_a, of_b = full[:, 1] + 1j * full[:, 2], full[:, 3] + 1j * full[:, 4]
         tilt = 0.5 * (of_a + of_b * np.exp(-1j * (full[:, 0] + self.rest_angle)))
         return np.column_stack([full[:, 0], tilt.real, tilt.imag])
 
     def moments(self, state: Floats) -> Floats:
-        """(m, 3) moments of the joint, conjugate to the strains [N m]: about its normal, and two in its plane."""
+        """(m, 3) moments of the joint, conjugate to the strains [N m]: about its normal, and two in its plane.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         forces, scrap = self._both_tilts(state), np.empty((5, 5))
         parts = (forces, self.rest_angle, self.stiffness, self.deviators)
         for strain, rest_angle, stiffness, deviators in zip(*parts, strict=True):

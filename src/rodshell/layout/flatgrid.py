@@ -1,7 +1,8 @@
 """Straight rods lying in a plane, where they cross, and which lies over which."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from reprlib import repr as short
 from typing import Literal
 
 import numpy as np
@@ -17,16 +18,19 @@ Family = Literal["u", "v", "free"]
 class FlatRod:
     """A straight rod in the flat state: the points `origin + s * direction` for `start <= s <= end`.
 
-    Rods of family `u` run along the layout's x axis at y = `offset`, rods of family `v` along y at
-    x = `offset`, and s is measured from the middle of the layout. A rod of family `free` is given by its
-    two ends, and s is measured from the first.
+    Rods of family "u" run along the layout's x axis at y = `offset`, rods of family "v" along y at x = `offset`, and s
+    is measured from the middle of the layout. A rod of family "free" is given by its two ends, and s is measured from
+    the first.
 
     Parameters
     ----------
     name : label such as "U09".
-    offset, start, end : [m].
-    origin, direction : (2,) floats [m], [-]; the direction is a unit vector.
-    virtual : a line that shapes the net but is not built (numerics: "lines left out").
+    family : "u", "v" or "free".
+    offset : of the rod's line; 0 for a free one [m].
+    start, end : material coordinates of the ends [m].
+    origin : point of the rod's line at which s is 0 [m].
+    direction : unit vector along the rod.
+    virtual : whether the line only shapes the net and is not built.
     """
 
     name: str
@@ -40,23 +44,26 @@ class FlatRod:
 
     @staticmethod
     def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
+        """A rod of family "u", along x at y = `offset` [m], from x = `start` to `end` [m]."""
         return FlatRod(name, "u", offset, start, end, (0.0, offset), (1.0, 0.0), virtual)
 
     @staticmethod
     def v(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
+        """A rod of family "v", along y at x = `offset` [m], from y = `start` to `end` [m]."""
         return FlatRod(name, "v", offset, start, end, (offset, 0.0), (0.0, 1.0), virtual)
 
     @property
     def length(self) -> float:
+        """From end to end [m]."""
         return self.end - self.start
 
     def point(self, s: ArrayLike) -> Floats:
-        """Flat positions (..., 2) [m] at the material coordinates `s` [m]."""
-        return np.asarray(self.origin) + np.asarray(s, dtype=float)[..., None] * np.asarray(self.direction)
+        """Flat positions (..., 2) [m] at the material coordinates `s` (...) [m]."""
+        return np.asarray(np.asarray(self.origin) + np.asarray(s, dtype=float)[..., None] * np.asarray(self.direction))
 
     @property
     def line(self) -> tuple[object, ...]:
-        """The line on which it lies, whatever its ends."""
+        """Key of the line that the rod is on, which does not depend on its ends."""
         return self.family, self.offset, self.origin, self.direction
 
     def contains(self, piece: "FlatRod") -> bool:
@@ -65,17 +72,25 @@ class FlatRod:
         return self.line == piece.line and self.start - tiny <= piece.start and piece.end <= self.end + tiny
 
     def cut(self, start: float, end: float) -> "FlatRod":
-        return FlatRod(
-            self.name, self.family, self.offset, start, end, self.origin, self.direction, self.virtual
-        )  # fmt: skip
+        """The same rod with other ends, given by their material coordinates [m]."""
+        return replace(self, start=start, end=end)
 
 
 def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:
-    """For each piece the index of the rod that it is, or is a piece of.
+    """Find the rods that pieces of rods belong to.
+
+    Parameters
+    ----------
+    rods : whole rods.
+    pieces : rods, each of which is one of the whole rods or a piece of one.
+
+    Returns
+    -------
+    The index of the whole rod of each piece.
 
     Raises
     ------
-    ValueError : a piece lies on no rod.
+    ValueError : a piece belongs to no rod.
     """
     on_line: dict[tuple[object, ...], list[int]] = {}
     for k, rod in enumerate(rods):
@@ -84,14 +99,20 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:
     for piece in pieces:
         whole = [k for k in on_line.get(piece.line, []) if rods[k].contains(piece)]
         if not whole:
-            raise ValueError(f"{piece.name} is no piece of any rod")
+            raise ValueError(f"{piece.name} is not a piece of any rod")
         found.append(whole[0])
     return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Crossings:
-    """Where rods cross: `rods` (c, 2) indices, `at` (c, 2) material coordinates on each of the two [m]."""
+    """Where rods cross. Those with the same content are equal.
+
+    Parameters
+    ----------
+    rods : (c, 2) indices of the two rods.
+    at : (c, 2) material coordinates on each of the two [m].
+    """
 
     rods: Ints
     at: Floats
@@ -99,20 +120,44 @@ class Crossings:
     def __len__(self) -> int:
         return len(self.rods)
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Crossings):
+            return NotImplemented
+        return np.array_equal(self.rods, other.rods) and np.array_equal(self.at, other.at)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.rods.ravel().tolist()))
+
+    def __repr__(self) -> str:
+        return f"Crossings({len(self)})"
+
     def select(self, keep: Bools) -> "Crossings":
+        """The crossings marked in `keep` (c,)."""
         return Crossings(self.rods[keep], self.at[keep])
 
 
 @dataclass(frozen=True)
 class FlatGrid:
-    """Straight rods and the crossings at which they are joined."""
+    """Straight rods and the crossings at which they are joined. Grids with the same content are equal.
+
+    Parameters
+    ----------
+    rods : straight rods in the plane.
+    crossings : of these rods; not all places where lines cross need be joined.
+    """
 
     rods: tuple[FlatRod, ...]
     crossings: Crossings
 
     @staticmethod
     def of(rods: Sequence[FlatRod], *, margin: float = 0.0) -> "FlatGrid":
-        """Join the rods wherever they cross, `margin` [m] or more away from the ends of both."""
+        """Join rods wherever they cross.
+
+        Parameters
+        ----------
+        rods : straight rods.
+        margin : crossings closer to an end of either rod are not joined [m].
+        """
         rods = tuple(rods)
         origin = np.array([rod.origin for rod in rods])
         direction = np.array([rod.direction for rod in rods])
@@ -131,12 +176,24 @@ class FlatGrid:
             at[:, side] = np.clip(at[:, side], start[rod], end[rod])
         return FlatGrid(rods, Crossings(np.column_stack([a, b])[met], at[met]))
 
+    def __repr__(self) -> str:
+        return f"FlatGrid({len(self.rods)} rods, {len(self.crossings)} crossings)"
+
     def joint_counts(self) -> Ints:
         """(m,) number of joints on each rod."""
         return np.bincount(self.crossings.rods.ravel(), minlength=len(self.rods))
 
     def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:
-        """Leave out the rods that `leave_out` marks, again and again until it marks none; and their names."""
+        """Remove rods repeatedly, until none is to be removed.
+
+        Parameters
+        ----------
+        leave_out : marks the rods (m,) of a grid that are to be removed.
+
+        Returns
+        -------
+        The grid, and the names of the rods that were removed.
+        """
         grid, names = self, list[str]()
         while (out := leave_out(grid)).any():
             names += [rod.name for rod, gone in zip(grid.rods, out, strict=True) if gone]
@@ -150,25 +207,28 @@ class FlatGrid:
 
 
 def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> FlatGrid:
-    """A flat grid of straight rods given by their end points, joined wherever they cross.
+    """Make a flat grid of straight rods, joined wherever they cross.
 
     Parameters
     ----------
-    ends : (m, 2, 2), two end points of each rod in the plane [m].
-    names : m labels; default "R01", "R02", ...
+    ends : (m, 2, 2) the two end points of each rod in the plane [m].
+    names : m different labels; default "R01", "R02", ...
 
     Raises
     ------
-    InputError : a rod has no length or a coordinate is not finite; a rod crosses no other; two rods overlap.
+    InputError : the ends are not finite numbers of that shape; a rod has no length or crosses no other; two overlap.
     """
-    points = np.asarray(ends, dtype=float)
+    try:
+        points = np.asarray(ends, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"rod ends must be numbers of the shape (rods, 2, 2), not {short(ends)}") from None
     if points.ndim != 3 or points.shape[1:] != (2, 2) or len(points) == 0:
         raise InputError(f"rod ends must have the shape (rods, 2, 2), not {points.shape}")
     if not np.isfinite(points).all():
         raise InputError(f"rod {int(np.argwhere(~np.isfinite(points))[0, 0]) + 1} has an end that is not finite")
     digits = len(str(len(points)))
     labels = list(names) if names is not None else [f"R{k + 1:0{max(digits, 2)}d}" for k in range(len(points))]
-    if len(set(labels)) != len(points):
+    if not len(labels) == len(set(labels)) == len(points):
         raise InputError(f"{len(points)} rods need as many different names, not {len(set(labels))}")
     apart = points[:, 1] - points[:, 0]
     length = np.linalg.norm(apart, axis=1)
@@ -184,13 +244,13 @@ def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> Fla
     if lonely:
         raise InputError(
             f"{len(lonely)} of {len(rods)} rods cross no other rod (the first: {lonely[0]}): "
-            "give rods whose lines cross between their ends, or leave it out"
+            "give rods that cross between their ends, or remove them"
         )
     return grid
 
 
 def _refuse_overlaps(rods: Sequence[FlatRod]) -> None:
-    """Two rods along one line must not share a stretch of it: no crossing point would be defined."""
+    """Refuse rods that share a part of one line: their crossing would not be a point."""
     origin = np.array([rod.origin for rod in rods])
     direction = np.array([rod.direction for rod in rods])
     length = np.array([rod.length for rod in rods])
@@ -214,33 +274,42 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def layers(rods: int, crossings: Iterable[tuple[int, int]]) -> Ints:
-    """(rods,) layer of each rod, 1 the lowest, for `crossings` given as pairs of rods.
+    """Assign rods to layers such that rods of one layer do not cross.
 
-    Rod by rod, outwards from the first of each connected part, each takes the lowest layer that it crosses no rod of.
-    Two families of rods get two layers, the first rod's family the lower one.
+    From the first rod of each connected part outwards, each rod gets the lowest layer in which it crosses no rod. Two
+    families of rods get two layers; that of the first rod is the lower one.
+
+    Parameters
+    ----------
+    rods : number of rods.
+    crossings : pairs of indices of rods that cross.
+
+    Returns
+    -------
+    (rods,) layer of each rod, 1 the lowest.
     """
-    met: list[list[int]] = [[] for _ in range(rods)]
+    crossed: list[list[int]] = [[] for _ in range(rods)]
     for a, b in crossings:
-        met[a].append(b)
-        met[b].append(a)
+        crossed[a].append(b)
+        crossed[b].append(a)
     layer = np.zeros(rods, dtype=np.intp)
     for first in range(rods):
         waiting = [first] if not layer[first] else []
         for rod in waiting:
             if layer[rod]:
                 continue
-            taken = {int(layer[other]) for other in met[rod]}
+            taken = {int(layer[other]) for other in crossed[rod]}
             layer[rod] = next(k for k in range(1, len(taken) + 2) if k not in taken)
-            waiting += [other for other in met[rod] if not layer[other]]
+            waiting += [other for other in crossed[rod] if not layer[other]]
     return layer
 
 
 def sides(grid: FlatGrid) -> Floats:
-    """(m,) -1 for rods of the lower layer and 1 for those of the upper.
+    """Side of each rod (m,) of a grid in two layers: -1 for the lower layer, 1 for the upper.
 
     Raises
     ------
-    InputError : rods cannot be laid in two layers, such as three that cross each other.
+    InputError : the rods need more than two layers, such as three that cross each other.
     """
     layer = layers(len(grid.rods), grid.crossings.rods.tolist())
     if layer.max(initial=0) > 2:

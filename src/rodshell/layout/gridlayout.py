@@ -1,8 +1,8 @@
-"""Two orthogonal families of parallel rods: what the user asks for, before it meets a target."""
+"""Two orthogonal families of parallel rods, before they are cut to a target."""
 
-from dataclasses import asdict, dataclass
-from math import isfinite
+from dataclasses import asdict, dataclass, fields
 from numbers import Real
+from reprlib import repr as short
 from typing import Literal
 
 import numpy as np
@@ -10,33 +10,34 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.layout.flatgrid import Family, FlatGrid, FlatRod
-from rodshell.validation import positive
+from rodshell.validation import instance, number, numbers, positive
 
 Auto = Literal["auto"]
 
-EDGES_A_SPAN = 6  # of the mesh to a spacing, where the edge is "auto"
+EDGES_A_SPAN = 6  # edges of the mesh to a spacing, where the edge is "auto"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class GridLayout:
     """Two orthogonal families of rods [HQK section 3.2]; make one with `GridLayout.orthogonal`.
 
     Parameters
     ----------
-    rods : number of rods (along x: family u, along y: family v), or "auto": every line that touches the target.
-    spacing : (su, sv) [m]; su is the distance between neighbouring rods of family u (measured along y),
-        sv that between rods of family v (measured along x).
-    length : of every rod before trimming [m], or "auto": long enough to be trimmed.
+    rods : number of rods of family u (along x) and of family v (along y), or "auto" for every line that touches the
+        target.
+    spacing : distance between neighbouring rods of family u (measured along y) and of family v (along x) [m].
+    length : of every rod before trimming [m], or "auto" for the length that is needed.
     edge : longest edge of the mesh [m].
     rotate : angle of family u against the target's x axis [rad].
-    offset : (x, y) shift of the lattice against the axes through the anchor [m].
-    lines : ascending offsets of some rods of families u and v [m], where these do not lie at equal spacing; beyond the
-        first and the last of them the spacing goes on. Empty for a family whose rods all lie at equal spacing.
+    offset : shift (x, y) of the lattice against the axes through the anchor [m].
+    lines : ascending offsets of rods of families u and v that are not equally spaced [m]; before the first and after
+        the last of them the spacing continues. Empty for a family whose rods are all equally spaced.
     left_out : names of rods that are not built; their lines still shape the net.
 
     Raises
     ------
-    InputError : a count below 2, a spacing, length or edge that is not positive, an edge above the spacing.
+    InputError : a value of the wrong kind or not finite; a count below 2; a spacing, length or edge that is not
+        positive; an edge longer than the spacing.
     """
 
     rods: tuple[int, int] | Auto
@@ -49,24 +50,39 @@ class GridLayout:
     left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, two in (("spacing", self.spacing), ("offset", self.offset)):
-            _require_two(name, two)
-        for name, value in (("spacing", self.spacing[0]), ("spacing", self.spacing[1]), ("edge", self.edge)):
-            positive(f"layout {name}", value, "m")
-        if self.length != "auto":
-            positive("layout length", self.length, "m")
-        if self.rods != "auto":
-            counts = tuple(self.rods) if isinstance(self.rods, tuple | list) else ()
-            if len(counts) != 2 or not all(isinstance(n, Real) and int(n) == n >= 2 for n in counts):
-                raise InputError(f'layout rods must be "auto" or two counts of at least 2, not {self.rods}')
-            object.__setattr__(self, "rods", (int(counts[0]), int(counts[1])))
+        for name in ("spacing", "offset"):
+            _require_two(name, getattr(self, name))
+        values: dict[str, object] = {
+            "spacing": tuple(positive("layout spacing", value, "m") for value in self.spacing),
+            "offset": tuple(number("layout offset", value, "m") for value in self.offset),
+            "edge": positive("layout edge", self.edge, "m"),
+            "rotate": number("layout rotate", self.rotate, "rad"),
+            "lines": _offsets(self.lines),
+        }
+        if not _is_auto(self.length):
+            values["length"] = positive("layout length", self.length, "m")
+        if not _is_auto(self.rods):
+            values["rods"] = _counts(self.rods)
+        if isinstance(self.left_out, str) or not all(isinstance(name, str) for name in self.left_out):
+            raise InputError(f"layout left_out must be names of rods, not {short(self.left_out)}")
+        values["left_out"] = tuple(self.left_out)
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
         if self.edge > min(self.spacing):
             raise InputError(
                 f"layout edge {self.edge} m is longer than the spacing {min(self.spacing)} m: use a shorter edge"
             )
-        if not all(isfinite(one) for one in (self.rotate, *self.offset)):
-            raise InputError(f"layout rotate and offset must be finite, not {self.rotate} and {self.offset}")
-        object.__setattr__(self, "spacing", (float(self.spacing[0]), float(self.spacing[1])))
+
+    def __repr__(self) -> str:
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        if self.edge == auto_edge(self.spacing):
+            values["edge"] = "auto"
+        if any(self.lines):
+            values["lines"] = "..."
+        if len(self.left_out) > 2:
+            values["left_out"] = f"{len(self.left_out)} rods"
+        shown = (f"{name}={value!r}" for name, value in values.items() if value not in (0.0, (0.0, 0.0), ((), ()), ()))
+        return f"GridLayout({', '.join(shown)})"
 
     @staticmethod
     def orthogonal(
@@ -78,24 +94,36 @@ class GridLayout:
         rotate: float = 0.0,
         offset: tuple[float, float] = (0.0, 0.0),
     ) -> "GridLayout":
-        """Rods along x and along y; an edge "auto" is a sixth of the smaller spacing.
+        """Make a layout of equally spaced rods along x and along y.
+
+        Parameters
+        ----------
+        rods : number of rods along x and along y, or "auto" for every line that touches the target.
+        spacing : between neighbouring rods: one length, or one for each family [m].
+        length : of every rod before trimming [m], or "auto" for the length that is needed.
+        edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing.
+        rotate : angle of family u against the target's x axis [rad].
+        offset : shift (x, y) of the lattice against the axes through the anchor [m].
 
         Raises
         ------
         InputError : as of the class.
         """
+        instance("layout spacing", spacing, Real | tuple | list, "one or two lengths in m")
         pair = spacing if isinstance(spacing, tuple | list) else (spacing, spacing)
         _require_two("spacing", pair)
-        return GridLayout(rods, pair, length, auto_edge(pair) if edge == "auto" else edge, rotate, offset)
+        pair = (positive("layout spacing", pair[0], "m"), positive("layout spacing", pair[1], "m"))
+        longest = auto_edge(pair) if isinstance(edge, str) and edge == "auto" else edge
+        return GridLayout(rods, pair, length, longest, rotate, offset)
 
     def phase(self, family: Family) -> float:
-        """Offset [m] of one line of the lattice of this family; the others lie whole spacings away."""
+        """Offset of one line of the lattice of a family [m]; the others are whole spacings away."""
         side = 0 if family == "u" else 1
         half = 0.0 if self.rods == "auto" else (self.rods[side] - 1) / 2 % 1
         return self.offset[1 - side] + half * self.spacing[side]
 
     def lattice(self, family: Family, low: float, high: float) -> Floats:
-        """Offsets [m] of the lines of a family from `low` to `high`, both within a spacing."""
+        """Offsets of the lines of a family [m], from at most a spacing below `low` to at most one above `high` [m]."""
         spacing, given = self.spacing[0 if family == "u" else 1], self.lines[0 if family == "u" else 1]
         if given:
             before = given[0] + spacing * np.arange(min(np.floor((low - given[0]) / spacing), 0), 0)
@@ -106,7 +134,7 @@ class GridLayout:
         return np.asarray(phase + spacing * np.arange(first, last + 1))
 
     def offsets(self, family: Family) -> Floats | None:
-        """Offsets [m] of the rods of a family, ascending, or None where the count is "auto"."""
+        """Ascending offsets of the rods of a family [m], or None where the count is "auto"."""
         if self.rods == "auto":
             return None
         side = 0 if family == "u" else 1
@@ -118,16 +146,21 @@ class GridLayout:
         return np.inf if self.length == "auto" else self.length / 2
 
     def middle(self, family: Family) -> float:
-        """Material coordinate [m] of the middle of the rods of a family: the layout moves with its offset."""
+        """Material coordinate of the middle of the rods of a family [m]: the layout moves with its offset."""
         return self.offset[0 if family == "u" else 1]
 
     def parameters(self) -> dict[str, object]:
-        """The layout in SI, as it stands in a case file."""
-        own = asdict(self)
-        return {key: value for key, value in own.items() if key not in ("lines", "left_out")}
+        """The layout in SI, as it is written in a case file."""
+        return {key: value for key, value in asdict(self).items() if key not in ("lines", "left_out")}
 
     def flat_grid(self, counts: tuple[int, int], length: float) -> FlatGrid:
-        """The whole rectangular grid before trimming, with `counts` and `length` [m] standing in for "auto"."""
+        """The rectangular grid before trimming.
+
+        Parameters
+        ----------
+        counts : number of rods of families u and v, used instead of those of the layout.
+        length : of every rod, used instead of that of the layout [m].
+        """
         whole = GridLayout(counts, self.spacing, length, self.edge, self.rotate, self.offset)
         rods = list[FlatRod]()
         families: tuple[Family, ...] = ("u", "v")
@@ -144,16 +177,43 @@ class GridLayout:
 
 
 def auto_edge(spacing: tuple[float, float]) -> float:
-    """The edge of the mesh [m] that goes with spacings [m]."""
+    """The default edge of the mesh [m] for the spacings of both families [m]."""
     return min(spacing) / EDGES_A_SPAN
 
 
-def _require_two(name: str, two: object) -> None:
+def _is_auto(value: object) -> bool:
+    return isinstance(value, str) and value == "auto"
+
+
+def _require_two(name: str, pair: object) -> None:
     """Refuse what is not a pair of numbers [m]."""
-    if not isinstance(two, tuple | list) or len(two) != 2 or not all(isinstance(one, Real) for one in two):
-        raise InputError(f"layout {name} must be two lengths in m, not {two!r}")
+    if not isinstance(pair, tuple | list) or len(pair) != 2 or not all(isinstance(value, Real) for value in pair):
+        raise InputError(f"layout {name} must be two lengths in m, not {short(pair)}")
+
+
+def _offsets(lines: object) -> tuple[tuple[float, ...], ...]:
+    sentence = "two lists of finite offsets in m"
+    families = lines if isinstance(lines, tuple | list) else ()
+    if len(families) != 2:
+        raise InputError(f"layout lines must be {sentence}, not {short(lines)}")
+    return tuple(numbers("layout lines", family, sentence, np.size(family)) for family in families)
+
+
+def _counts(rods: object) -> tuple[int, int]:
+    sentence = 'two counts of at least 2, or "auto"'
+    first, second = numbers("layout rods", rods, sentence, 2)
+    if not (first.is_integer() and second.is_integer() and min(first, second) >= 2):
+        raise InputError(f"layout rods must be {sentence}, not {short(rods)}")
+    return int(first), int(second)
 
 
 def rod_name(family: Family, index: int, count: int) -> str:
-    """U01, U02, ... in ascending offset."""
+    """Name of a rod: U01, U02, ... in ascending offset.
+
+    Parameters
+    ----------
+    family : of the rod.
+    index : of the rod in its family, from 0 on.
+    count : of rods of the family, which gives the number of digits.
+    """
     return f"{family.upper()}{index + 1:0{max(2, len(str(count)))}d}"

@@ -10,20 +10,25 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.layout.flatgrid import FlatGrid, FlatRod, sides, whole_rods
 
+CROWDED = 0.01  # of the usual edge: nodes closer to an end are left out, as round-off in forces goes with its cube
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class GridMesh:
-    """A flat grid divided into edges; rods share one node at a joint, or lie in two layers (`in_layers`).
+    """A flat grid divided into edges; make one with `mesh_grid`.
+
+    Rods share one node at a joint, or are in two layers (`in_layers`). Two meshes are equal only if they are the same
+    object.
 
     Parameters
     ----------
     grid : the rods and joints that were meshed.
     flat : (n, 3) node positions in the flat, unstressed state [m]; z = 0, or the height of the rod's layer.
-    rod_nodes : (k,) nodes of all rods in a row, in the order of `grid.rods`.
+    rod_nodes : (k,) nodes of all rods, one rod after the other in the order of `grid.rods`.
     rod_start : (m,) where each rod begins in `rod_nodes`.
     stations : (k,) material coordinate of each entry of `rod_nodes` on its rod [m].
     joint_nodes : (c,) node of each of the grid's crossings, on its first rod.
-    second_nodes : (c,) the same on its second rod, where rods lie in layers and share no nodes; None: the same node.
+    second_nodes : (c,) the same on its second rod, where rods are in layers and share no nodes; None: the same node.
     """
 
     grid: FlatGrid
@@ -36,15 +41,20 @@ class GridMesh:
 
     @cached_property
     def apart(self) -> "GridMesh":
-        """The same rods, each with nodes of its own, k in all, in the order of `rod_nodes`; joints have none."""
+        """The same rods, each with its own nodes, k in all, in the order of `rod_nodes`; without joints."""
         nodes = np.arange(len(self.rod_nodes))
         return replace(self, flat=self.flat[self.rod_nodes], rod_nodes=nodes, joint_nodes=np.arange(0))
 
+    def __repr__(self) -> str:
+        return f"GridMesh({len(self.grid.rods)} rods, {self.node_count} nodes, {len(self.joint_nodes)} joints)"
+
     @property
     def node_count(self) -> int:
+        """Number of nodes n."""
         return len(self.flat)
 
     def rod_slice(self, rod: int) -> slice:
+        """The entries of `rod_nodes` and `stations` that belong to a rod."""
         stop = self.rod_start[rod + 1] if rod + 1 < len(self.rod_start) else len(self.rod_nodes)
         return slice(int(self.rod_start[rod]), int(stop))
 
@@ -65,12 +75,12 @@ class GridMesh:
     @cached_property
     def edge_rods(self) -> Ints:
         """(e,) rod of each edge."""
-        return self._rod_of[:-1][self._rod_of[1:] == self._rod_of[:-1]]
+        return np.asarray(self._rod_of[:-1][self._rod_of[1:] == self._rod_of[:-1]])
 
     @cached_property
     def edge_lengths(self) -> Floats:
         """(e,) rest lengths [m]."""
-        return np.diff(self.stations)[self._rod_of[1:] == self._rod_of[:-1]]
+        return np.asarray(np.diff(self.stations)[self._rod_of[1:] == self._rod_of[:-1]])
 
     @cached_property
     def bends(self) -> Ints:
@@ -80,13 +90,13 @@ class GridMesh:
     @cached_property
     def bend_rods(self) -> Ints:
         """(b,) rod of each bend."""
-        return self._rod_of[:-2][self._rod_of[2:] == self._rod_of[:-2]]
+        return np.asarray(self._rod_of[:-2][self._rod_of[2:] == self._rod_of[:-2]])
 
     @cached_property
     def voronoi_lengths(self) -> Floats:
-        """(b,) half the rest length of the two edges of each bend [m] (HQK Eq 1b, of the rest state: ERRATA)."""
+        """(b,) half the rest length of the two edges of each bend [m] [HQK Eq 1b, of the rest state: see ERRATA]."""
         whole = (self.stations[2:] - self.stations[:-2])[self._rod_of[2:] == self._rod_of[:-2]]
-        return 0.5 * whole
+        return np.asarray(0.5 * whole)
 
     @cached_property
     def ends(self) -> Ints:
@@ -95,13 +105,13 @@ class GridMesh:
 
     @property
     def joint_pairs(self) -> Ints:
-        """(c, 2) node of each crossing on either of its rods."""
+        """(c, 2) nodes of each crossing on its two rods."""
         second = self.joint_nodes if self.second_nodes is None else self.second_nodes
         return np.column_stack([self.joint_nodes, second])
 
     @property
     def layered(self) -> bool:
-        """Whether rods lie in two layers, with nodes of their own."""
+        """Whether rods are in two layers, each with its own nodes."""
         return self.second_nodes is not None
 
     @property
@@ -110,11 +120,15 @@ class GridMesh:
         return self.flat[:, 2]
 
     def in_layers(self, eccentricity: float) -> "GridMesh":
-        """The same rods in two layers, so far apart [m]; node k is entry k of this mesh's `rod_nodes`.
+        """The same rods in two layers; node k of the result is entry k of this mesh's `rod_nodes`.
+
+        Parameters
+        ----------
+        eccentricity : distance of the layers [m].
 
         Raises
         ------
-        InputError : the rods cannot be laid in two layers.
+        InputError : the rods need more than two layers.
         """
         side = sides(self.grid)[self._rod_of]
         flat = self.flat[self.rod_nodes]
@@ -123,11 +137,12 @@ class GridMesh:
         order = np.argsort(key, kind="stable")
         wanted = self.grid.crossings.rods * self.node_count + self.joint_nodes[:, None]
         pairs = order[np.searchsorted(key[order], wanted)]
-        own = np.arange(len(self.rod_nodes))
-        return GridMesh(self.grid, flat, own, self.rod_start, self.stations, pairs[:, 0], pairs[:, 1])
+        nodes = np.arange(len(self.rod_nodes))
+        return GridMesh(self.grid, flat, nodes, self.rod_start, self.stations, pairs[:, 0], pairs[:, 1])
 
     @property
     def rod_stop(self) -> Ints:
+        """(m,) where each rod ends in `rod_nodes`: one past its last entry."""
         return np.append(self.rod_start[1:], len(self.rod_nodes))
 
     def _windows(self, width: int) -> Ints:
@@ -137,15 +152,23 @@ class GridMesh:
         return np.column_stack(columns)
 
     def tributary_lengths(self) -> Floats:
-        """(n,) rod length that each node stands for: half of every edge that meets there [m]."""
+        """Rod length (n,) that each node represents: half of every edge at the node [m]."""
         total = np.zeros(self.node_count)
         np.add.at(total, self.edges, 0.5 * self.edge_lengths[:, None])
         return total
 
     def prolong(self, positions: Floats, fine: "GridMesh", *, rods: Sequence[int] | None = None) -> Floats:
-        """Positions (n, 3) of the nodes of `fine`, by local cubics along each rod of this mesh [m].
+        """Interpolate positions on another mesh of the same rods, by local cubics along each rod.
 
-        `rods` names, for each rod of `fine`, the rod of this mesh that it is a part of; default: the same.
+        Parameters
+        ----------
+        positions : (n, 3) of the nodes of this mesh [m].
+        fine : the other mesh.
+        rods : for each rod of `fine` the rod of this mesh that it is a part of; default: the same.
+
+        Returns
+        -------
+        (n, 3) positions of the nodes of `fine` [m].
         """
         result = np.empty((fine.node_count, 3))
         for k, rod in enumerate(rods if rods is not None else range(len(self.rod_start))):
@@ -155,17 +178,18 @@ class GridMesh:
         return result
 
 
-CROWDED = 0.01  # of the usual edge: a node that near to a rod's end is left out; round-off in forces goes with its cube
-
-
 def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] | None = None) -> GridMesh:
-    """Divide a flat grid: every span between joints and every tail into the fewest equal edges of at most `edge` [m].
+    """Divide a flat grid into edges: each span between joints, and each end of a rod, into the fewest equal edges.
 
-    `marks`, for each rod the material coordinates [m] of further points that must be nodes.
+    Parameters
+    ----------
+    grid : rods and joints.
+    edge : longest edge [m].
+    marks : for each rod the material coordinates of further points that must be nodes [m].
     """
     merged = _merge_joints(grid)
     rod_of, s, nodes, count = _fixed_points(grid, merged, marks)
-    edges = np.ones(len(s), dtype=np.intp)  # from each fixed point to the next of its rod, and one place for the last
+    edges = np.ones(len(s), dtype=np.intp)  # from each fixed point to the next of its rod; 1 for the last
     spans = np.flatnonzero(rod_of[1:] == rod_of[:-1])
     edges[spans] = edge_counts(s[spans + 1] - s[spans], edge)
     after = np.repeat(np.arange(len(s)), edges)
@@ -185,43 +209,54 @@ def mesh_grid(grid: FlatGrid, edge: float, *, marks: Sequence[Sequence[float]] |
 def _fixed_points(
     grid: FlatGrid, merged: Ints, marks: Sequence[Sequence[float]] | None
 ) -> tuple[Ints, Floats, Ints, int]:
-    """What must be a node, along one rod after the other: rod, material coordinate [m] and node; and how many nodes.
+    """The points that must be nodes, along one rod after the other: rod, material coordinate [m] and node; and the
+    number of nodes.
 
-    Joints of nodes `merged`, each once; then ends and marks, each a node of its own unless one is there already.
+    The joints have the nodes `merged`. Ends and marks get a new node each, unless there is one already.
     """
     given = [[rod.start, *(marks[k] if marks is not None else ()), rod.end] for k, rod in enumerate(grid.rods)]
-    own_rod = np.repeat(np.arange(len(given)), [len(places) for places in given])
-    own = np.array([s for places in given for s in places])
-    # a joint comes once on each of its rods: three rods make three crossings
+    rod_of_given = np.repeat(np.arange(len(given)), [len(stations) for stations in given])
+    added = np.array([s for stations in given for s in stations])
+    # each joint once on each of its rods: three rods make three crossings
     rod, s, nodes = grid.crossings.rods.ravel(), grid.crossings.at.ravel(), np.repeat(merged, 2)
     order = np.lexsort((s, nodes, rod))
     once = order[np.diff(rod[order] * len(rod) + nodes[order], prepend=-1) > 0]
-    rod, s = np.concatenate([rod[once], own_rod]), np.concatenate([s[once], own])
-    nodes = np.concatenate([nodes[once], np.full(len(own), -1)])
-    turn = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(own))])  # who comes first
+    rod, s = np.concatenate([rod[once], rod_of_given]), np.concatenate([s[once], added])
+    nodes = np.concatenate([nodes[once], np.full(len(added), -1)])
+    turn = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(added))])  # precedence
     order = np.lexsort((turn, s, rod))
     rod, s, nodes, turn = rod[order], s[order], nodes[order], turn[order]
     tiny = 1e-9 * np.array([rod.length for rod in grid.rods])
     near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
-    place = np.cumsum(np.append(0, ~near))  # points of a rod in one place: the first to come stays, and every joint
-    first = np.full(place[-1] + 1, len(turn))
-    np.minimum.at(first, place, turn)
-    out = turn > first[place]
+    group = np.cumsum(np.append(0, ~near))  # points of a rod at one place: the first is kept, and every joint
+    first = np.full(group[-1] + 1, len(turn))
+    np.minimum.at(first, group, turn)
+    out = turn > first[group]
     joints, fresh = int(merged.max(initial=-1)) + 1, np.flatnonzero(~out & (nodes < 0))
     nodes[fresh[np.argsort(turn[fresh])]] = joints + np.arange(len(fresh))
     return rod[~out], s[~out], nodes[~out], joints + len(fresh)
 
 
 def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
-    """The part of a mesh that belongs to `rods`: pieces of its rods, cut at nodes; and its nodes (n,) in `mesh`.
+    """Cut a part out of a mesh.
 
-    Joints closer than `margin` [m] to an end of either rod are not made: each rod keeps a node of its own, unless
-    it would crowd the end, where it would make an edge far shorter and stiffer than the others.
+    Joints too close to an end of either rod are not made: each rod keeps its own node there, unless that would be so
+    close to the end that it makes an edge far shorter and stiffer than the others.
+
+    Parameters
+    ----------
+    mesh : to be cut.
+    rods : pieces of its rods, cut at nodes.
+    margin : smallest distance of a joint from the ends of its rods [m].
+
+    Returns
+    -------
+    The part, and its nodes (n,) in `mesh`.
     """
     index, count = np.array(whole_rods(mesh.grid.rods, rods)), len(mesh.grid.rods)
     grid = FlatGrid.of(rods, margin=margin)
     pairs = np.sort(index[grid.crossings.rods], axis=1) @ [count, 1]
-    known = np.append(mesh.grid.crossings.rods @ [count, 1], -1)  # the last is no pair: there may be none
+    known = np.append(mesh.grid.crossings.rods @ [count, 1], -1)  # the last is not a pair: there may be none
     order = np.argsort(known, kind="stable")
     found = order[np.minimum(np.searchsorted(known, pairs, sorter=order), len(known) - 1)]
     kept = known[found] == pairs
@@ -231,21 +266,32 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     joint = rank[joint]
     shared = mesh.joint_nodes[found[kept]][np.sort(first)]
     piece, s, node = nodes_along(mesh, rods, index)
-    place = np.full(len(mesh.flat), -1)
-    place[shared] = np.arange(len(shared))
+    node_of = np.full(len(mesh.flat), -1)
+    node_of[shared] = np.arange(len(shared))
     joined = np.isin(piece * mesh.node_count + node, (grid.crossings.rods * mesh.node_count + shared[joint][:, None]))
     starts = np.searchsorted(piece, np.arange(len(rods) + 1))
     from_end = np.minimum(s - s[starts[piece]], s[starts[piece + 1] - 1] - s)
-    own = ~joined & ~((from_end > 0.0) & (from_end < CROWDED * _usual_edges(mesh)[index][piece]))
-    nodes = np.where(joined, place[node], len(shared) - 1 + np.cumsum(own))
-    made = joined | own
-    chosen = np.concatenate([shared, node[own]])
+    single = ~joined & ~((from_end > 0.0) & (from_end < CROWDED * _usual_edges(mesh)[index][piece]))
+    nodes = np.where(joined, node_of[node], len(shared) - 1 + np.cumsum(single))
+    made = joined | single
+    chosen = np.concatenate([shared, node[single]])
     starts = np.searchsorted(piece[made], np.arange(len(rods)))
     return GridMesh(grid, mesh.flat[chosen], nodes[made], starts, s[made], joint), chosen
 
 
 def nodes_along(mesh: GridMesh, rods: Sequence[FlatRod], whole: Ints) -> tuple[Ints, Floats, Ints]:
-    """All nodes on pieces of the rods `whole` of a mesh: piece, material coordinate [m] and node."""
+    """Find all nodes on pieces of rods.
+
+    Parameters
+    ----------
+    mesh : of the whole rods.
+    rods : pieces.
+    whole : (m,) the rod of the mesh that each piece belongs to.
+
+    Returns
+    -------
+    Piece (k,), material coordinate (k,) [m] and node (k,) of each.
+    """
     begin, length = mesh.rod_start[whole], (mesh.rod_stop - mesh.rod_start)[whole]
     piece = np.repeat(np.arange(len(rods)), length)
     entry = np.arange(len(piece)) + np.repeat(begin - (np.cumsum(length) - length), length)
@@ -260,18 +306,28 @@ def _usual_edges(mesh: GridMesh) -> Floats:
     order = np.lexsort((mesh.edge_lengths, mesh.edge_rods))
     count = np.bincount(mesh.edge_rods, minlength=len(mesh.grid.rods))
     low, high = (np.cumsum(count) - count + half for half in ((count - 1) // 2, count // 2))
-    return 0.5 * (mesh.edge_lengths[order[low]] + mesh.edge_lengths[order[high]])
+    return np.asarray(0.5 * (mesh.edge_lengths[order[low]] + mesh.edge_lengths[order[high]]))
 
 
 def edge_counts(lengths: Floats, edge: float) -> Ints:
-    """(n,) fewest equal edges of at most `edge` that make up each of `lengths` (an edge may be 1e-6 too long)."""
+    """Number of equal edges into which lengths are divided.
+
+    Parameters
+    ----------
+    lengths : (n,) [m].
+    edge : longest edge, which may be exceeded by 1e-6 of it [m].
+
+    Returns
+    -------
+    (n,) the smallest possible numbers.
+    """
     return np.maximum(1, np.ceil(lengths / edge - 1e-6)).astype(np.intp)
 
 
 def _merge_joints(grid: FlatGrid) -> Ints:
-    """Node of each crossing: crossings at one point (three rods or more) share their node.
+    """Node of each crossing: crossings at one point (of three rods or more) share their node.
 
-    They are neighbours along each of their rods, no further apart than round-off takes them.
+    They are neighbours along each of their rods, with no more than round-off between them.
     """
     rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
     order = np.lexsort((at, rods))

@@ -14,11 +14,18 @@ FEWEST = 3  # ends of an outline
 
 
 def outlines(rods: Floats) -> list[Ints]:
-    """Ends (k,) along each outline of straight rods (m, 2, 2) [m], those with most ends first.
+    """Find the outlines of a flat grid.
 
-    2 r is the start of rod r, 2 r + 1 its end.
-    Around a grid they follow each other counterclockwise, around an opening clockwise. Grids that do not touch each
-    other have one each. No end is in two; fewer than three ends make none.
+    Grids that do not touch each other have one outline each. No end is in two outlines, and none has fewer than three.
+
+    Parameters
+    ----------
+    rods : (m, 2, 2) the two ends of each straight rod [m].
+
+    Returns
+    -------
+    For each outline the ends (k,) along it, 2 r for the start of rod r and 2 r + 1 for its end: counterclockwise around
+    a grid, clockwise around an opening. Outlines with most ends come first.
     """
     if not len(rods):
         return []
@@ -45,7 +52,7 @@ def _line(ends: Floats) -> FlatRod:
 
 
 def opens(outline: Floats) -> bool:
-    """Whether an outline (k, 2) runs around an opening."""
+    """Whether an outline of points (k, 2) runs around an opening."""
     x, y = outline.T
     return bool(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0)
 
@@ -61,7 +68,7 @@ def _faces(edges: Ints, flat: Floats) -> list[list[int]]:
     onward = dict[tuple[int, int], tuple[int, int]]()
     for node, fan in fans.items():
         for k, other in enumerate(fan):
-            onward[other, node] = (node, fan[k - 1])  # clockwise from where it came: the sharpest left turn but one
+            onward[other, node] = (node, fan[k - 1])  # the next one clockwise from where it came
     faces = list[list[int]]()
     while onward:
         step, face = next(iter(onward)), list[int]()

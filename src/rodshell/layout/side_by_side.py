@@ -10,14 +10,14 @@ from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod
 from rodshell.layout.mesh import GridMesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SideBySide:
-    """Grids in a row along x, each moved but not turned.
+    """Grids in a row along x, each moved but not rotated.
 
     Parameters
     ----------
-    mesh : all of them: rods, nodes and joints one grid after the other; rod U01 of grid A is A-U01.
-    shifts : (2,) by which each was moved [m].
+    mesh : all grids: rods, nodes and joints, one grid after the other; rod U01 of grid A is A-U01.
+    shifts : for each grid the displacement (2,) [m].
     """
 
     mesh: GridMesh
@@ -25,7 +25,13 @@ class SideBySide:
 
 
 def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> SideBySide:
-    """Lay grids out in a row with a `gap` [m] between them, each centred on the x axis; the row on the origin."""
+    """Lay grids out in a row, each centred on the x axis, and the row on the origin.
+
+    Parameters
+    ----------
+    meshes : the grids by name.
+    gap : between two grids [m].
+    """
     low = {name: mesh.flat[:, :2].min(axis=0) for name, mesh in meshes.items()}
     high = {name: mesh.flat[:, :2].max(axis=0) for name, mesh in meshes.items()}
     width = sum(float(high[name][0] - low[name][0]) + gap for name in meshes) - gap
@@ -34,11 +40,11 @@ def side_by_side(meshes: Mapping[str, GridMesh], gap: float) -> SideBySide:
         shifts[name] = np.array([left - low[name][0], -0.5 * (low[name][1] + high[name][1])])
         left += float(high[name][0] - low[name][0]) + gap
     moved = [_moved(name, mesh, shifts[name]) for name, mesh in meshes.items()]
-    return SideBySide(_joined(moved), shifts)
+    return SideBySide(_merged(moved), shifts)
 
 
 def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
-    """A mesh at another place of the plane, `name` in front of its rods' names."""
+    """A mesh displaced in the plane, with `name` before the names of its rods."""
     along = np.array([_along(rod, shift) for rod in mesh.grid.rods])
     rods = tuple(_moved_rod(name, rod, shift) for rod in mesh.grid.rods)
     crossings = Crossings(mesh.grid.crossings.rods, mesh.grid.crossings.at + along[mesh.grid.crossings.rods])
@@ -52,7 +58,7 @@ def _moved(name: str, mesh: GridMesh, shift: Floats) -> GridMesh:
 
 
 def _along(rod: FlatRod, shift: Floats) -> float:
-    """By how much a rod's material coordinates grow: those of u and v are measured from the middle of the layout."""
+    """Change of a rod's material coordinates: those of families u and v are measured from the middle of the layout."""
     return 0.0 if rod.family == "free" else float(shift @ np.array(rod.direction))
 
 
@@ -65,8 +71,8 @@ def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
     return make(label, rod.offset + float(across), rod.start + by, rod.end + by)
 
 
-def _joined(meshes: list[GridMesh]) -> GridMesh:
-    """One mesh of several that share nothing."""
+def _merged(meshes: list[GridMesh]) -> GridMesh:
+    """One mesh of several that have nothing in common."""
     rods = np.cumsum([0, *(len(mesh.grid.rods) for mesh in meshes)])
     nodes = np.cumsum([0, *(mesh.node_count for mesh in meshes)])
     entries = np.cumsum([0, *(len(mesh.rod_nodes) for mesh in meshes)])

@@ -35,11 +35,22 @@ class Freedom:
 
     @staticmethod
     def free(blocks: int) -> "Freedom":
-        """So many `blocks`, each free along x, y and z."""
+        """So many `blocks`, each free along x, y and z.
+
+        Parameters
+        ----------
+        blocks : number of blocks.
+        """
         return Freedom(np.tile(np.eye(3), (blocks, 1, 1)), np.full(blocks, 3, dtype=np.intp))
 
     def with_directions(self, blocks: Ints, *directions: tuple[float, float, float]) -> "Freedom":
-        """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed)."""
+        """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed).
+
+        Parameters
+        ----------
+        blocks : (k,) indices of blocks.
+        directions : orthonormal vectors, up to three.
+        """
         table, count = self.directions.copy(), self.count.copy()
         for k, direction in enumerate(directions):
             table[blocks, k] = direction
@@ -68,15 +79,30 @@ class Freedom:
         return np.flatnonzero(~self.directions[block, k].any(axis=1))
 
     def expand(self, q: Floats) -> Floats:
-        """Displacements (n, 3) of reduced DOFs (size,)."""
+        """Displacements (n, 3) of reduced DOFs (size,).
+
+        Parameters
+        ----------
+        q : (size,) values of the reduced DOFs.
+        """
         return np.asarray(_expand(q, self.directions, self.count))
 
     def reduce(self, gradient: Floats) -> Floats:
-        """Components (size,) of a gradient (n, 3) in the free directions."""
+        """Components (size,) of a gradient (n, 3) in the free directions.
+
+        Parameters
+        ----------
+        gradient : (n, 3) [N].
+        """
         return np.asarray(_reduce(gradient, self.directions, self.count, self.size))
 
     def reduce_diagonal(self, diagonal: Floats) -> Floats:
-        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses."""
+        """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses.
+
+        Parameters
+        ----------
+        diagonal : (n, 3) components of d.
+        """
         block, k = self._slots
         return np.asarray(np.einsum("ij,ij->i", diagonal[block], self.directions[block, k] ** 2))
 
@@ -103,7 +129,13 @@ class Assembly:
 
     @staticmethod
     def of(element_blocks: Sequence[Ints], freedom: Freedom) -> "Assembly":
-        """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`."""
+        """Plan the assembly of element sets on `element_blocks`, (m, k) each, in the directions of `freedom`.
+
+        Parameters
+        ----------
+        element_blocks : of each element set, (m, k) blocks of its elements.
+        freedom : free directions of all blocks.
+        """
         count = freedom.count
         everywhere = np.arange(len(count))[:, None]
         start, rows = _pattern([*element_blocks, everywhere], count)
@@ -112,14 +144,30 @@ class Assembly:
         return Assembly(indptr, indices, count, above, slots)
 
     def assemble(self, hessians: Sequence[Floats], element_blocks: Sequence[Ints], freedom: Freedom) -> Floats:
-        """(nnz,) values of the reduced Hessian, from the element Hessians (m, 3k, 3k) and blocks (m, k) of each set."""
+        """(nnz,) values of the reduced Hessian, from the element Hessians (m, 3k, 3k) and blocks (m, k) of each set.
+
+        Parameters
+        ----------
+        hessians : of each element set, (m, 3k, 3k) element Hessians.
+        element_blocks : of each element set, (m, k) blocks of its elements.
+        freedom : free directions, as many of each block as in the plan.
+        """
         data = np.zeros(len(self.indices))
         for index, (hessian, blocks) in enumerate(zip(hessians, element_blocks, strict=True)):
             self.add(index, hessian, blocks, freedom, data)
         return data
 
     def add(self, index: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
-        """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,)."""
+        """Add the Hessians (m, 3k, 3k) of the element set `index`, on `blocks` (m, k), to the values `data` (nnz,).
+
+        Parameters
+        ----------
+        index : of the element set.
+        hessian : (m, 3k, 3k) element Hessians.
+        blocks : (m, k) blocks of the elements.
+        freedom : free directions, as many of each block as in the plan.
+        data : (nnz,) values to which theirs are added.
+        """
         if len(blocks):
             _scatter(hessian, blocks, self._slots[index], self._count, self._above, freedom.directions, data)
 

@@ -26,7 +26,7 @@ from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.rods.stretch import Stretch
-from rodshell.validation import choice, direction, finite, vector
+from rodshell.validation import described, direction, finite, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike
 _ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used
@@ -234,7 +234,10 @@ class ElasticRod:
         InputError : an array has another shape; the rod has no twist angles; a tangent is for an end not clamped.
         """
         for end in tangents or {}:
-            choice("an end in tangents", end, self.clamps)
+            if end not in self.clamps:
+                raise InputError(f'this rod is not clamped at its "{end}", where a tangent is given: leave it out')
+        if positions is not None and np.ndim(positions) != 2:
+            raise InputError(f"the positions of this rod's nodes must be (n, 3) in m, not {described(positions)}")
         state = np.zeros((self.block_count, 3))
         nodes = self.rest if positions is None else positions
         state[self.nodes] = finite("the positions of this rod's nodes", nodes, self.node_count, 3)
@@ -264,7 +267,12 @@ class ElasticRod:
         return replace(self, elements=tuple(element.refreshed(state) for element in self.elements))
 
     def reference_directors(self, state: Floats) -> Floats:
-        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3)."""
+        """(edges + clamps, 3) first reference director of each edge, then of each ghost edge, at `state` (N, 3).
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         bends = self._bend_twist.refreshed(state)
         directors = np.empty((self.block_count, 3))
         for side in range(2):
@@ -272,7 +280,12 @@ class ElasticRod:
         return np.vstack([directors[self.angles], directors[self.ghost_angles]])
 
     def material_frames(self, state: Floats) -> Floats:
-        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3)."""
+        """(edges, 3, 3) rows m1, m2, t of each edge at `state` (N, 3).
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         edge = state[self.stretch.blocks[:, 1]] - state[self.stretch.blocks[:, 0]]
         d1, t = self.reference_directors(state)[: self.edge_count], unit(edge)
         theta = state[self.angles, :1]
@@ -280,7 +293,12 @@ class ElasticRod:
         return np.stack([m1, cross(t, m1), t], axis=1)
 
     def strains(self, state: Floats) -> RodStrains:
-        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0)."""
+        """Strains at `state` (N, 3); without twist angles there are no directors: curvatures are (size, 0).
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         bends = self.elements[0]
         if isinstance(bends, IsotropicBend):
             curvature = bends.curvatures(state)
@@ -303,7 +321,13 @@ class ElasticRod:
         return gradient
 
     def hessian(self, state: Floats, freedom: Freedom | None = None) -> csc_matrix:
-        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's."""
+        """Symmetric Hessian of the energy at `state` (N, 3) in the directions of `freedom`, by default the rod's.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        freedom : free directions of the blocks.
+        """
         free = self.freedom() if freedom is None else freedom
         parts = (*self.elements, self.stretch)
         hessians = [np.empty((len(p.blocks), 3 * p.blocks.shape[1], 3 * p.blocks.shape[1])) for p in parts]
@@ -316,7 +340,12 @@ class ElasticRod:
         return csc_matrix(upper + upper.T - diags(upper.diagonal()))
 
     def weight(self, gravity: ArrayLike) -> Floats:
-        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2]."""
+        """(N, 3) forces of gravity [N] for its acceleration `gravity` (3,) [m/s2].
+
+        Parameters
+        ----------
+        gravity : (3,) acceleration [m/s2].
+        """
         load = np.zeros_like(self.mass)
         load[self.nodes] = self.mass[self.nodes] * vector("gravity", gravity)
         return load

@@ -13,7 +13,7 @@ from rodshell.geometry.frames import adapted, directors_along, parallel_transpor
 from rodshell.geometry.vectors import cross, dot
 from rodshell.records import brief
 from rodshell.rods.section import Rod
-from rodshell.validation import direction, finite, instance
+from rodshell.validation import described, direction, finite, instance
 
 End = Literal["start", "end"]
 Rods = Rod | Sequence[Rod] | Callable[[float], Rod]
@@ -55,9 +55,7 @@ class RodLine:
         InputError : there are fewer than 3 nodes, an edge has no length, the rod folds back on itself, or a clamp is
             not an end or points against the rod.
         """
-        count = np.shape(rest)[0] if np.ndim(rest) == 2 else 0
-        if count < 3:
-            raise InputError(f"a rod needs 3 nodes or more, (n, 3), not an array {np.shape(rest)}")
+        count = _points(rest)
         nodes = finite("the positions of a rod's nodes", rest, count, 3).copy()
         starts = np.arange(count if closed else count - 1)
         edges = np.column_stack([starts, (starts + 1) % count])
@@ -76,6 +74,10 @@ class RodLine:
     def rods(self, rod: Rods) -> list[Rod]:
         """The rod of each edge: the same for all, one for each, or a function of the arc length of its middle [m].
 
+        Parameters
+        ----------
+        rod : one rod, a sequence of them, or a function.
+
         Raises
         ------
         InputError : they are not rods, or not as many as there are edges.
@@ -86,7 +88,7 @@ class RodLine:
         if callable(rod):
             result = [rod(float(s)) for s in np.cumsum(self.lengths) - 0.5 * self.lengths]
         else:
-            result = list(rod) if isinstance(rod, Sequence) else [rod]
+            result = list(rod) if isinstance(rod, Sequence) and not isinstance(rod, str) else [rod]
             if len(result) != count and all(isinstance(item, Rod) for item in result):
                 raise InputError(f"a rod of {count} edges takes as many rods, one for each edge, not {len(result)}")
         for item in result:
@@ -118,7 +120,13 @@ class RodLine:
         return np.asarray(self.nodes[node] + outward * self.lengths[edge] * self.clamps[end])
 
     def end_director(self, directors: Floats, end: End) -> Floats:
-        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges."""
+        """(3,) director at a clamp: that of the last edge, transported there with the twist of the two last edges.
+
+        Parameters
+        ----------
+        directors : (e, 3) first material directors of the edges.
+        end : the clamped end.
+        """
         order = slice(0, 2) if end == "start" else slice(-1, -3, -1)
         (d0, d1), (t0, t1), (l0, l1) = directors[order], self.tangents[order], self.lengths[order]
         twist = signed_angle(parallel_transport(d1, t1, t0), d0, t0)  # from the inner edge to the last
@@ -196,7 +204,13 @@ class RodBends:
         return RodBends(size, angles, blocks, lengths, at_bends, like)
 
     def rest_state(self, line: RodLine, directors: Floats) -> tuple[Floats, Floats]:
-        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges."""
+        """(size, 3) state at rest, and in the rows of the twist angles the directors of their edges.
+
+        Parameters
+        ----------
+        line : the rod at rest.
+        directors : (e, 3) first material directors of its edges.
+        """
         state, frames = np.zeros((self.size, 3)), np.zeros((self.size, 3))
         state[: len(line.nodes)], frames[self.angles] = line.nodes, directors
         for k, end in enumerate(line.clamps):
@@ -206,11 +220,23 @@ class RodBends:
         return state, frames
 
 
+def _points(rest: ArrayLike) -> int:
+    """How many nodes there are."""
+    try:
+        shape = np.shape(rest)
+    except ValueError:  # rows of different lengths
+        shape = ()
+    if len(shape) != 2 or shape[0] < 3:
+        what = f"an array {shape}" if shape else described(rest)
+        raise InputError(f"a rod needs 3 nodes or more, (n, 3) in m, not {what}")
+    return int(shape[0])
+
+
 def _clamps(clamped: Clamps, tangents: Floats, lengths: Floats, closed: bool) -> dict[End, Floats]:
     """Unit tangent at each clamp."""
     wanted: dict[End, ArrayLike | None]
-    if isinstance(clamped, str):
-        raise InputError(f'clamped takes the ends in a row, such as ("{clamped}",), not {clamped!r}')
+    if isinstance(clamped, str) or not isinstance(clamped, Sequence | Mapping):
+        raise InputError(f'clamped must be a sequence of ends, such as ("start",), not {described(clamped)}')
     wanted = dict(clamped) if isinstance(clamped, Mapping) else dict.fromkeys(clamped)
     if wanted and closed:
         raise InputError("a closed ring has no ends to clamp")

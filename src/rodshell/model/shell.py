@@ -175,7 +175,12 @@ class Shell:
         return state
 
     def positions(self, state: Floats) -> Floats:
-        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean."""
+        """(n, 3) positions of the mesh's nodes in a `state` (N, 3) [m]; of nodes that a penalty ties, their mean.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         result, visits = np.zeros((self.mesh.node_count, 3)), np.zeros(self.mesh.node_count)
         np.add.at(result, self.mesh.rod_nodes, state[self.node_blocks])
         np.add.at(visits, self.mesh.rod_nodes, 1.0)
@@ -188,7 +193,12 @@ class Shell:
         return free.with_directions(turning, ANGLE).with_directions(self.spinning)
 
     def with_elements(self, elements: tuple[Elements, ...]) -> "Shell":
-        """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere."""
+        """The same shell with other `elements`, as many and in the same order: with their source frames elsewhere.
+
+        Parameters
+        ----------
+        elements : those within rods and linkers, then those between them.
+        """
         count = len(self.within)
         return replace(self, within=elements[:count], between=elements[count:])
 
@@ -205,7 +215,13 @@ class Shell:
         self.turn_edges(state, signed_angle(moved, wanted, now))
 
     def turn_edges(self, state: Floats, turns: Floats) -> None:
-        """Add `turns` (e,) [rad] to the twist angles in `state` of the edges, and of linkers that share them."""
+        """Add `turns` (e,) [rad] to the twist angles in `state` of the rods' edges and their copies.
+
+        Parameters
+        ----------
+        state : (N, 3), which is changed.
+        turns : (e,) of the mesh's edges [rad].
+        """
         first = self.mesh.node_count + len(self.ghosts)
         turning = np.flatnonzero((self.like >= first) & (self.like < first + len(turns)))
         state[turning, 0] += turns[self.like[turning] - first]
@@ -420,6 +436,11 @@ def _inner_nodes(mesh: GridMesh) -> Ints:
 
 
 def last_edges(mesh: GridMesh) -> Floats:
-    """(2m,) rest length of the edge at each rod end of a `mesh` [m]."""
+    """(2m,) rest length of the edge at each rod end of a `mesh` [m].
+
+    Parameters
+    ----------
+    mesh : with m rods.
+    """
     s, first, stop = mesh.stations, mesh.rod_start, mesh.rod_stop
     return np.column_stack([s[first + 1] - s[first], s[stop - 1] - s[stop - 2]]).ravel()

@@ -1,9 +1,9 @@
 """The inextensible net of a layout on a target, and the footprint that it cuts out of the flat grid.
 
-Two crossing geodesics through the anchor determine the net (`compass`). It is marched at two steps, cut at
-the target's end and extrapolated (Richardson), so that each rod end is known far better than the mesh of any
-mechanical model; the difference of the two marches estimates the error. Lines of the lattice that are not
-built still shape the net: they are kept as virtual rods.
+Two crossing geodesics through the anchor determine the net (`compass`). It is marched with two step sizes, cut at the
+target's end and extrapolated (Richardson), so that each rod end is far more accurate than the mesh of any mechanical
+model; the difference of the two marches estimates the error. Lines of the lattice that are not built still shape the
+net: they are kept as virtual rods.
 """
 
 from dataclasses import dataclass
@@ -24,25 +24,29 @@ from rodshell.nets.cuts import Cut, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.targets import Target
 from rodshell.units import length_text
+from rodshell.validation import number, point
 
-SMALLEST_ANGLE = 10.0  # degrees; no gridshell can be built beyond
+SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
 SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further
-LOOSE = 0.05  # spacings: ends known no better than that are warned of
-GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and does not count
+LOOSE = 0.05  # spacings: a larger error of a rod end gives a warning
+GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and is ignored
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ChebyshevNet:
     """The net of a layout on a target.
 
     Parameters
     ----------
+    target : the surface.
+    layout : the flat grid.
     rods : rods and virtual rods, each from end to end of the target: the footprint G0.
-    lines : (u, v) offsets of all lines of the lattice near the target: `lines[0]` are the u at which lines of
-        family v lie, `lines[1]` the v of family u [m].
+    lines : offsets of all lines of the lattice near the target [m]: `lines[0]` (nu,) are the u of the lines of family
+        v, `lines[1]` (nv,) the v of those of family u.
     net : the finer march, from which positions are taken.
-    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all rod ends [m]: the error before extrapolation.
-    min_angle : smallest angle between the families on the target [rad], at the point `min_angle_at` (3,) [m].
+    error_estimate : largest |G0(fine) - G0(coarse)| / 3 over all rod ends: the error before extrapolation [m].
+    min_angle : smallest angle between the families on the target [rad].
+    min_angle_at : x, y, z of the point where it is [m].
     dropped : rods of the layout that are not in `rods`, with the reason.
     warnings : sentences.
     """
@@ -59,7 +63,17 @@ class ChebyshevNet:
     warnings: tuple[str, ...]
 
     def positions(self, rod: FlatRod, s: Floats) -> Floats:
-        """Points (n, 3) of the net at material coordinates `s` (n,) of a rod, by local cubics [m]."""
+        """Interpolate the net along a rod, by local cubics.
+
+        Parameters
+        ----------
+        rod : one of `rods`, or a piece of one.
+        s : (n,) material coordinates [m].
+
+        Returns
+        -------
+        (n, 3) points [m].
+        """
         if rod.family == "u":
             knots, points = self.net.u, self.net.points[:, int(np.argmin(np.abs(self.net.v - rod.offset)))]
         else:
@@ -67,31 +81,40 @@ class ChebyshevNet:
         known = np.flatnonzero(np.isfinite(points[:, 0]))
         return on_curve(knots[known], points[known], s)
 
+    def __repr__(self) -> str:
+        built = sum(not rod.virtual for rod in self.rods)
+        return f"ChebyshevNet({built} rods on {self.target}, smallest angle {degrees(self.min_angle):.3g} deg)"
+
 
 def chebyshev_net(
     target: Target,
     layout: GridLayout,
     *,
     anchor: tuple[float, float] | None = None,
-    near: ChebyshevNet | None = None,
+    warm_start: ChebyshevNet | None = None,
     eccentricity: float = 0.0,
 ) -> ChebyshevNet:
     """March the net of `layout` over `target` and cut it at the target's end.
 
     Parameters
     ----------
+    target : the surface.
+    layout : the flat grid.
     anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
-    near : a net that may be similar, from which this one is found sooner; it is the same without.
-    eccentricity : distance of the rods' centre lines at their joints [m]. Rods of family u lie half of it below the
+    warm_start : a similar net, from which this one is computed faster; the result is the same to round-off.
+    eccentricity : distance of the rods' centre lines at their joints [m]. Rods of family u are half of it below the
         target and those of family v half of it above, each on the parallel surface there: a rod's material length is
-        that of its own line, so that the flat grid is the layout's straight lattice, and its ends lie over the
+        that of its own line, so that the flat grid is the layout's straight lattice, and its ends are over the
         target's end, along the normal.
 
     Raises
     ------
-    NetLimitError : the crossing angle falls to 10 degrees or the march fails inside the target; names the place.
-    InputError : the anchor lies outside, the spacing is too large, or a rod is too short to reach the end.
+    NetLimitError : the crossing angle falls below 10 degrees or the march fails inside the target; names the place.
+    InputError : the anchor is outside the target, the spacing is too large, or a rod is too short to reach the end.
     """
+    if anchor is not None:
+        point("anchor", anchor)
+    number("eccentricity", eccentricity, "m")
     start, heading = _start(target, layout, anchor)
     if max(layout.spacing) >= 2 * target.size:
         raise InputError(
@@ -104,8 +127,9 @@ def chebyshev_net(
             f"{length_text(min(layout.spacing))}: check its unit"
         )
     heights = (-0.5 * eccentricity, 0.5 * eccentricity) if eccentricity else ON_SURFACE
+    similar = warm_start.net if warm_start else None
     for parts in SEARCHES:
-        lines, rough = find_lines(target, layout, start, heading, near.net if near else None, parts, heights)
+        lines, rough = find_lines(target, layout, start, heading, similar, parts, heights)
         coarse = march_lines(target, layout, lines, start, heading, 2, rough, heights=heights)
         fine = march_lines(target, layout, lines, start, heading, 1, coarse, rough, heights=heights)
         if not (fine.inside[[0, -1]].any() or fine.inside[:, [0, -1]].any()):
@@ -122,13 +146,11 @@ def chebyshev_net(
     ends, error, loosest = _extrapolate(target, lines, (coarse, fine), GRAZING * min(layout.spacing))
     rods, dropped, warnings = _name_rods(layout, lines, ends)
     if all(rod.virtual for rod in rods):
-        raise InputError(
-            "none of the layout's rods touches the target: move the layout (offset, anchor), or give more rods"
-        )
+        raise InputError("no rod of the layout touches the target: move the layout (offset, anchor), or give more rods")
     if error > LOOSE * min(layout.spacing):
         x, y, z = np.where(np.abs(loosest) < 1e-6 * target.size, 0.0, loosest)
         warnings.append(
-            f"rod ends on the line through ({x:.4g}, {y:.4g}, {z:.4g}) m are known within {error:.3g} m only: the "
+            f"rod ends on the line through ({x:.4g}, {y:.4g}, {z:.4g}) m have an error of up to {error:.3g} m: the "
             "target bends too sharply for the steps of the march, or the line runs along its end; use a smaller "
             "spacing or shorter edges"
         )
@@ -139,22 +161,22 @@ def chebyshev_net(
 
 
 def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
-    """The anchor lifted vertically onto the target, and the tangent that points along the heading in plan."""
+    """The anchor, lifted vertically onto the target, and the tangent that points along the heading in plan."""
     x, y = anchor if anchor is not None else target.summit
-    other = "leave it out for the highest point, or let a search choose (--anchor auto)"
+    remedy = "leave it out for the highest point, or let a search choose (--anchor auto)"
     try:
-        point = target.lift(np.array([[x, y]]))
+        lifted = target.lift(np.array([[x, y]]))
     except InputError as reason:
-        raise InputError(f"the anchor: {reason}, {other}") from None
-    if not target.covers(point)[0]:
-        raise InputError(f"the anchor ({x:g}, {y:g}) m lies outside the target: choose a point inside its rim, {other}")
-    n = target.on_surface(point).normal[0]
+        raise InputError(f"the anchor: {reason}, {remedy}") from None
+    if not target.covers(lifted)[0]:
+        raise InputError(f"the anchor ({x:g}, {y:g}) m is outside the target: choose a point inside its rim, {remedy}")
+    n = target.on_surface(lifted).normal[0]
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])
-    return point[0], np.array([*plan * n[2], -plan @ n[:2]])
+    return lifted[0], np.array([*plan * n[2], -plan @ n[:2]])
 
 
 def _require_room(target: Target, net: Covering, height: float) -> None:
-    """Refuse layers beyond a centre of the target's curvature."""
+    """Refuse layers beyond a centre of curvature of the target."""
     points = net.points[net.inside]
     curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
     k = int(np.argmax(curvature))
@@ -167,10 +189,10 @@ def _require_room(target: Target, net: Covering, height: float) -> None:
 
 
 def _hole(net: Covering) -> NetLimitError:
-    """The net ends at a node that the march could not find beside one inside the target: of these at the nearest."""
+    """The error for a net with inside nodes next to nodes that the march did not find; it names the first of them."""
     lost = np.pad(np.isnan(net.points[:, :, 0]), 1)
-    beside = lost[:-2, 1:-1] | lost[2:, 1:-1] | lost[1:-1, :-2] | lost[1:-1, 2:]
-    holes = np.argwhere(beside & net.inside)
+    next_to_lost = lost[:-2, 1:-1] | lost[2:, 1:-1] | lost[1:-1, :-2] | lost[1:-1, 2:]
+    holes = np.argwhere(next_to_lost & net.inside)
     i, j = holes[np.argmin(np.abs(net.u[holes[:, 0]]) + np.abs(net.v[holes[:, 1]]))]
     return _net_limit(tuple(net.points[i, j].tolist()), "the rods of the two families become parallel")
 
@@ -189,7 +211,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
 
     Raises
     ------
-    NetLimitError : a node beside an inside one is missing.
+    NetLimitError : a node next to an inside one is missing.
     """
     i, j, whole = _sharpest(net.points, net.inside)
     if not whole:
@@ -202,7 +224,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
 @nb.njit(cache=True, error_model="numpy")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
     """Indices of the inside node with the smallest angle, which has the largest cosine; and whether the net has all
-    nodes beside the inside ones."""
+    nodes next to the inside ones."""
     i_found, j_found, largest, whole = 0, 0, -1.0, True
     for i in range(1, len(inside) - 1):
         for j in range(1, inside.shape[1] - 1):
@@ -219,7 +241,7 @@ def _sharpest(points, inside):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class _Ends:
-    """Pieces of the lines of both families, extrapolated."""
+    """Extrapolated pieces of the lines of both families."""
 
     u: list[list[Cut]]
     v: list[list[Cut]]
@@ -251,7 +273,7 @@ def _extrapolate(
 def _name_rods(
     layout: GridLayout, lines: LatticeLines, ends: _Ends
 ) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
-    """Rods from the lines: those of the layout get their labels, all other lines are virtual."""
+    """Rods from the lines: those of the layout get their names, all other lines are virtual."""
     rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), list[str]()
     families: tuple[tuple[Family, Floats, list[list[Cut]]], ...] = (("u", lines.v, ends.u), ("v", lines.u, ends.v))
     for family, offsets, cuts in families:
@@ -280,21 +302,21 @@ def _name_rods(
 
 
 def _in_pieces(names: list[str]) -> str:
-    """That some rods do not go from rim to rim."""
+    """The warning that some rods do not go from rim to rim."""
     return (
-        f"{len(names)} rods meet the target in several pieces, each with ends of its own: {', '.join(names)}; an "
-        "opening where they end needs a ring that carries their reactions; where they only run out over the edge and "
-        "in again another offset of the layout may help"
+        f"{len(names)} rods are on the target in several pieces, each with its own ends: {', '.join(names)}; an "
+        "opening where they end needs a ring that carries their reactions; where they only cross the edge twice, "
+        "another offset of the layout may help"
     )
 
 
 def piece_names(rod: str, count: int) -> list[str]:
-    """U07, or U07a, U07b, ... where a line meets the target more than once."""
+    """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several."""
     return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 
 
 def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:
-    """Refuse a layout whose rods end above the end of the target."""
+    """Refuse a layout whose rods are too short to reach the end of the target."""
 
     def needed(rod: FlatRod) -> float:
         middle = layout.middle(rod.family)

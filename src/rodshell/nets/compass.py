@@ -4,9 +4,9 @@ A net of inextensible rods is a Chebyshev net; two geodesics through the anchor 
 axes every new node P lies at one step from its neighbours A and B and on the surface: the compass rule,
 second order in the step, with an error expansion in even powers when every interval is halved.
 
-Where joints hold the two families apart, each rod lies on a surface of its own, parallel to the target: the rule then
-holds for the points P + h n(P), h being the height of the rod's layer and n the target's normal, and the axes are
-geodesics of their layers. The net's points P stay on the target, between the layers.
+Where joints are eccentric, each family lies on a surface parallel to the target: the rule then holds for the points
+P + h n(P), h being the height of the rod's layer and n the target's normal, and the axes are geodesics of their layers.
+The net's points P are on the target, between the layers.
 """
 
 from dataclasses import dataclass, field
@@ -22,12 +22,12 @@ from rodshell.targets import Implicit, Target
 Heights = tuple[float, float]
 
 ON_SURFACE: Heights = (0.0, 0.0)
-SMALLEST_SINE = 0.02  # of a crossing angle: beyond it the two circles of the compass hardly cut (1.1 degrees)
+SMALLEST_SINE = 0.02  # of a crossing angle (1.1 degrees): below it the two circles of the compass hardly intersect
 NEWTON_STEPS = 12
-TOLERANCE = 1e-7  # of the step: Newton doubles its digits, so that the change that is below it leaves 1e-14
+TOLERANCE = 1e-7  # of the step: Newton doubles the digits, so that a change below it leaves an error of 1e-14
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Net:
     """Nodes of a net on a surface.
 
@@ -43,6 +43,10 @@ class Net:
     points: Floats
     heights: Heights = field(default=ON_SURFACE, kw_only=True)
 
+    def __repr__(self) -> str:
+        known = np.count_nonzero(np.isfinite(self.points[..., 0]))
+        return f"{type(self).__name__}({len(self.u)} x {len(self.v)} nodes, {known} known)"
+
     @cached_property
     def origin(self) -> tuple[int, int]:
         """Indices of the anchor, (u, v) = (0, 0)."""
@@ -56,9 +60,10 @@ def march(
 
     Parameters
     ----------
+    target : the surface.
     u, v : ascending material coordinates of the lines, both containing 0 [m].
     anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there; its part in the tangent plane counts.
+    heading : (3,) direction of the u axis there; its part in the tangent plane is used.
     heights : see `Net`.
     """
     points = np.full((len(u), len(v), 3), np.nan)
@@ -69,7 +74,13 @@ def march(
 
 
 def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
-    """Two discrete geodesics through the anchor: equal chords, straightest at every node; each of its own layer."""
+    """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
+
+    Parameters
+    ----------
+    target, anchor, heading : see `march`.
+    net : whose points on the axes are set.
+    """
     i0, j0 = net.origin
     net.points[i0, j0] = anchor
     steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
@@ -78,16 +89,16 @@ def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
         arms = geodesics(target, np.tile(anchor, (4, 1)), directions, steps)
     else:
         arms = list[Floats]()
-        for height, own in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
+        for height, pair in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
             layer = Layer(target, height)
             start = np.tile(layer.of(anchor[None]), (2, 1))
-            arms += [layer.below(arm) for arm in geodesics(layer, start, directions[own], steps[own])]
+            arms += [layer.below(arm) for arm in geodesics(layer, start, directions[pair], steps[pair])]
     net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
     net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
 
 
 def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
-    """(4, 3) unit tangents at the anchor towards +u, -u, +v and -v; see `march`."""
+    """Unit tangents (4, 3) at the anchor towards +u, -u, +v and -v; see `march`."""
     normal = target.on_surface(anchor[None]).normal[0]
     along = unit(heading - (heading @ normal) * normal)
     across = cross(normal, along)
@@ -96,13 +107,19 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Layer:
-    """The surface at a `height` [m] above a target, along its normals: as far as a march asks about it."""
+    """The surface parallel to a target, as far as a march needs it.
+
+    Parameters
+    ----------
+    target : the surface.
+    height : of the layer above it, along its normals [m].
+    """
 
     target: Target
     height: float
 
     def implicit(self, x: Floats) -> Implicit:
-        """The distance to the layer (n,), its gradient and its Hessian: those of the target's own distance."""
+        """Distance (n,) of the points `x` (n, 3) to the layer, its gradient and Hessian: those of the target."""
         gap = self.target.gap(x)
         return Implicit(gap.distance - self.height, gap.normal, gap.hessian)
 
@@ -112,11 +129,11 @@ class Layer:
         return value, gradient
 
     def of(self, x: Floats) -> Floats:
-        """The layer's points (n, 3) over points of the target."""
+        """Points (n, 3) of the layer over points `x` (n, 3) of the target."""
         return x + self.height * self.target.on_surface(x).normal
 
     def below(self, x: Floats) -> Floats:
-        """The target's points (n, 3) under points of the layer; NaN stays NaN."""
+        """Points (n, 3) of the target under points `x` (n, 3) of the layer; NaN stays NaN."""
         result, known = np.full_like(x, np.nan), np.isfinite(x[:, 0])
         result[known] = self.target.closest(x[known])
         return result
@@ -126,11 +143,13 @@ def geodesics(target: Target | Layer, start: Floats, direction: Floats, steps: l
     """Discrete geodesics, several at once, by given chord lengths; second order.
 
     The next chord lies in the plane of the last chord's direction and the surface normal at the node, so that
-    the curve turns about nothing but the tangent plane.
+    the curve has no geodesic curvature.
 
     Parameters
     ----------
-    start : (k, 3) points of the surface [m]; direction : (k, 3) unit tangents.
+    target : the surface.
+    start : (k, 3) points of the surface [m].
+    direction : (k, 3) unit tangents there.
     steps : k arrays of chord lengths [m].
 
     Returns
@@ -167,7 +186,8 @@ def geodesics(target: Target | Layer, start: Floats, direction: Floats, steps: l
 
 @nb.njit(cache=True, error_model="numpy")
 def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # type: ignore[no-untyped-def]
-    """One Newton step of all chords, in place; `swing` is the derivative of `chord` by `turn`. Whether to go on."""
+    """One Newton step of all chords, in place; `swing` is the derivative of `chord` by `turn`. Returns whether another
+    step is needed."""
     going = False
     for m in range(len(turn)):
         slope = 0.0
@@ -185,8 +205,16 @@ def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # ty
 
 
 def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None) -> None:
-    """What is not known of all four quadrants, all nodes or those `wanted` (nu, nv): again and again those whose
-    neighbours are known. Of a net of which only the axes are known these lie on one anti-diagonal after the other."""
+    """Find the unknown nodes of all four quadrants, repeatedly those whose neighbours are known.
+
+    If only the axes are known, these are on one anti-diagonal after the other.
+
+    Parameters
+    ----------
+    target : the surface.
+    net : whose points are set.
+    wanted : (nu, nv) nodes to find; default all.
+    """
     tried = np.zeros(net.points.shape[:2], dtype=bool) if wanted is None else ~wanted
     diagonal = 2
     while True:
@@ -200,8 +228,8 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None) -> Non
 @nb.njit(cache=True)
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
-    The anti-diagonal to go on from; their indices; the neighbours A towards the u axis, B towards the v axis, and D
-    across; the two chords; and the side of the net's quadrant."""
+    Returns the anti-diagonal to continue from; their indices; the neighbours A towards the u axis, B towards the v
+    axis, and D across; the two chords; and the sign of the quadrant."""
     nodes, count, first = np.empty((tried.size, 4), dtype=np.intp), 0, len(u) + len(v)
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
@@ -227,8 +255,8 @@ def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyp
 def _compass(
     target: Target, heights: Heights, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: Floats
 ) -> Floats:
-    """Points P (n, 3) of the surface with |P - A| = from_a and |P - B| = from_b, across from D; for rods at `heights`
-    the same of the points of their layers.
+    """Points P (n, 3) of the surface with |P - A| = from_a and |P - B| = from_b, opposite to D; for rods at `heights`
+    the distances are those of points of their layers.
 
     NaN where there is none, or where the net folds: (P - B) x (P - A) no longer points along the normal.
     """
@@ -248,9 +276,9 @@ def _compass(
 @nb.njit(cache=True, error_model="numpy")
 def _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change, sine):  # type: ignore[no-untyped-def]
     """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
-    the crossing angle's before it. Whether to go on, as long as there is hope for any.
+    of the crossing angle before it. Returns whether another step is needed.
 
-    hessian : (n, 3, 3) of the surface, for layers at `heights`; none without.
+    hessian : (n, 3, 3) of the surface, for layers at `heights`; otherwise empty.
     """
     going = False
     for m in range(len(p)):
@@ -273,10 +301,10 @@ def _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change,
 @nb.njit(cache=True, error_model="numpy")
 def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
-    gradient g, to be taken away from P; and the sine of the crossing angle, y x x along the normal.
+    gradient g, to be subtracted from P; and the sine of the crossing angle, y x x along the normal.
 
-    `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, but for layers. The inverse of the
-    three gradients is made of their cross products.
+    `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers. The inverse of
+    the three gradients consists of their cross products.
     """
     normal, along, across = _cross(by_x, by_y), _cross(by_y, g), _cross(g, by_x)
     volume = _dot(normal, g)

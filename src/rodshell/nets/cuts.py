@@ -17,16 +17,30 @@ SQUARE = 5  # nodes each way
 
 
 class Cut(NamedTuple):
-    """A part of one line that lies on the target: material coordinates of its two ends [m]."""
+    """A part of one line that is on the target.
+
+    Parameters
+    ----------
+    start, end : material coordinates of its ends [m].
+    """
 
     start: float
     end: float
 
 
 def inside_nodes(target: Target, net: Net) -> Bools:
-    """(nu, nv) nodes inside the target's end and connected with the anchor through inside nodes.
+    """Nodes inside the target's end that are connected with the anchor through inside nodes.
 
-    Where the anchor lies in an opening, with the first inside nodes along the axes.
+    If the anchor is in an opening, they are connected with the first inside nodes along the axes.
+
+    Parameters
+    ----------
+    target : the surface.
+    net : on it.
+
+    Returns
+    -------
+    (nu, nv) booleans.
     """
     region = _region(target, net)
     reached = np.zeros_like(region)
@@ -42,7 +56,7 @@ def inside_nodes(target: Target, net: Net) -> Bools:
 
 @nb.njit(cache=True)
 def _connect(region, reached):  # type: ignore[no-untyped-def]
-    """Extend the nodes `reached` (nu, nv) to all of the `region` (nu, nv) that hang together with them."""
+    """Extend the nodes `reached` (nu, nv) to all nodes of the `region` (nu, nv) that are connected with them."""
     nu, nv = region.shape
     stack, top = np.empty((region.size, 2), dtype=np.intp), 0
     for i in range(nu):
@@ -63,7 +77,7 @@ def _connect(region, reached):  # type: ignore[no-untyped-def]
 def _region(target: Target, net: Net) -> Bools:
     """(nu, nv) nodes inside the target's end.
 
-    A square of nodes in whose middle the end is further away than the way to its corners is asked about but once.
+    A square of nodes whose corners are closer to its middle than the end is needs only one evaluation.
     """
     middles, way = _squares(net.points, net.u, net.v)
     margin = target.margin(net.points[middles[:, 0], middles[:, 1]])
@@ -74,7 +88,7 @@ def _region(target: Target, net: Net) -> Bools:
 
 @nb.njit(cache=True)
 def _squares(points, u, v):  # type: ignore[no-untyped-def]
-    """Indices (n, 2) of the middle of each square of nodes that are all known, and the ways (n,) to its corners."""
+    """Indices (n, 2) of the middle of each square of nodes that are all known, and path lengths (n,) to its corners."""
     half, count = SQUARE // 2, 0
     middles = np.empty(((len(u) // SQUARE) * (len(v) // SQUARE), 2), dtype=np.intp)
     way = np.empty(len(middles))
@@ -89,8 +103,8 @@ def _squares(points, u, v):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True)
 def _by_squares(points, middles, margin):  # type: ignore[no-untyped-def]
-    """Which nodes (nu, nv) lie in squares with a positive `margin` (n,), and indices (m, 2) of the known ones that lie
-    in none with a margin other than 0."""
+    """Which nodes (nu, nv) are in squares with a positive `margin` (n,), and indices (m, 2) of the known nodes that
+    are in no square with a margin other than 0."""
     nu, nv = points.shape[:2]
     half, count = SQUARE // 2, 0
     inside, asked = np.zeros((nu, nv), dtype=np.bool_), np.empty((nu * nv, 2), dtype=np.intp)
@@ -108,8 +122,14 @@ def _by_squares(points, middles, margin):  # type: ignore[no-untyped-def]
 
 
 class Lines(NamedTuple):
-    """Lines of a net: material coordinates `s` (n,) along them [m], `points` (m, n, 3) of each, NaN where there are
-    none, and which are `inside` (m, n)."""
+    """Lines of one family of a net.
+
+    Parameters
+    ----------
+    s : (n,) material coordinates of the nodes along them [m].
+    points : (m, n, 3) nodes of each line [m]; NaN where there is none.
+    inside : (m, n) which nodes are inside the target's end.
+    """
 
     s: Floats
     points: Floats
@@ -121,8 +141,9 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
 
     Parameters
     ----------
+    target : the surface.
     sets : lines of one family of one net each.
-    depth : pieces that lie nowhere further inside than this [m] only graze the end and do not count.
+    depth : pieces that are nowhere further inside than this only graze the end and are ignored [m].
 
     Returns
     -------
@@ -141,7 +162,7 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
 
 
 def _runs(target: Target, lines: Lines, depth: float) -> tuple[Ints, Ints, Ints]:
-    """The line, and the first and the last node, of each run of inside nodes that is `depth` [m] inside somewhere."""
+    """The line, the first and the last node of each run of inside nodes that is `depth` [m] inside somewhere."""
     change = np.diff(lines.inside.astype(np.int8), axis=1, prepend=0, append=0)
     (row, first), last = np.nonzero(change == 1), np.nonzero(change == -1)[1] - 1
     deep = target.margin(lines.points[row, (first + last) // 2]) > depth
@@ -151,11 +172,20 @@ def _runs(target: Target, lines: Lines, depth: float) -> tuple[Ints, Ints, Ints]
 
 
 def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[Cut], float]:
-    """The cuts of one line from two marches, by Richardson; and a bound of the finer one's error [m].
+    """Extrapolate the cuts of one line from two marches (Richardson).
 
-    Each end is matched with the nearest of its kind in the coarse march, within a `step` [m]: where a line grazes
-    the end, the marches may find different pieces. An end that only one of them finds stays where it is; its
-    error is at most about half the gap or piece that the other march does not see, or the way to its nearest end.
+    Each end is matched with the nearest of its kind in the coarse march: where a line grazes the end of the target, the
+    marches may find different pieces. An end that only the finer march finds is kept; its error is at most about half
+    the gap or piece that the other march does not find, or the distance to its nearest end.
+
+    Parameters
+    ----------
+    coarse, fine : cuts of the line from the two marches.
+    step : distance within which ends are matched [m].
+
+    Returns
+    -------
+    The cuts, and a bound of the finer march's error [m].
     """
     ends, error = [end for cut in fine for end in cut], 0.0
     better = list[float]()
@@ -180,31 +210,31 @@ def _roots(target: Target, sets: Sequence[Lines], runs: Sequence[tuple[Ints, Int
         i = np.column_stack([first - 1, last]).ravel()  # the cut is between nodes i and i + 1
         side = np.tile([-1, 1], len(line))
         window = np.clip(i - 1, 0, len(s) - 4)
-        for shift in (-1, 1):  # next to the net's limit, four nodes further in
+        for shift in (-1, 1):  # near the net's limit, four nodes further inside
             lost = ~np.isfinite(points[row[:, None], window[:, None] + np.arange(4), 0]).all(axis=1)
             window = np.where(lost, np.clip(i - 1 + shift, 0, len(s) - 4), window)
         nodes = window[:, None] + np.arange(4)
         gathered.append((s[nodes], points[row[:, None], nodes], s[i + (side > 0)], s[i + (side < 0)]))
     knots, points, outer, inner = (np.concatenate(part) for part in zip(*gathered, strict=True))
-    return _bracketed(lambda at, which: target.margin(lagrange(knots[which], points[which], at)), outer, inner)
+    return _bracketed(lambda at, index: target.margin(lagrange(knots[index], points[index], at)), outer, inner)
 
 
 def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: Floats) -> Floats:
-    """Roots (n,) of functions that are positive at `inner` (n,) and not at `outer`, to their rounding.
+    """Roots (n,) of functions that are positive at `inner` (n,) and not at `outer` (n,), to round-off.
 
-    `margin(at, which)` takes places (k,) and whose functions they are asked of. By false position (Illinois): an end
-    that stays twice counts half at the next step. Each root is left alone once it is found.
+    `margin(at, index)` evaluates the functions `index` (k,) at `at` (k,). By false position (Illinois): an end that
+    does not move twice is weighted by half in the next step. A root that was found is not evaluated again.
     """
-    which = np.arange(len(inner))
-    below, above = np.minimum(margin(outer, which), 0.0), margin(inner, which)
+    index = np.arange(len(inner))
+    below, above = np.minimum(margin(outer, index), 0.0), margin(inner, index)
     tiny = 1e-15 * (np.abs(outer) + np.abs(inner))
     side = np.zeros(len(inner))  # which end moved last: 1 the inner, -1 the outer one
     found, at = inner.copy(), inner
     for _ in range(100):
         share = above / (above - below)
         before, at = at, inner + np.where(np.isfinite(share), share, 0.5) * (outer - inner)
-        value = margin(at, which)
-        found[which] = at
+        value = margin(at, index)
+        found[index] = at
         inside = value > 0
         below = np.where(inside, np.where(side > 0, 0.5, 1.0) * below, value)
         above = np.where(inside, value, np.where(side < 0, 0.5, 1.0) * above)
@@ -212,7 +242,7 @@ def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: F
         left = (np.abs(at - before) > tiny) & (np.abs(outer - inner) > tiny) & (value != 0.0)
         if not left.any():
             break
-        which, at, outer, inner, below, above, side, tiny = (
-            array[left] for array in (which, at, outer, inner, below, above, side, tiny)
+        index, at, outer, inner, below, above, side, tiny = (
+            array[left] for array in (index, at, outer, inner, below, above, side, tiny)
         )
     return found

@@ -1,4 +1,9 @@
-"""How far a net is marched: the lines of the lattice that can touch the target, and the nodes along them."""
+"""How far a net is marched: the lines of the lattice that can touch the target, and the nodes that are needed.
+
+Needed are nodes inside the target's end and up to a margin past it: what is bound to a target continues past its end
+(`apron`), and a rod is cut between nodes on both sides. Which nodes these are is known beforehand from the same net in
+longer steps; the first of these nets has a few long steps only.
+"""
 
 from dataclasses import dataclass
 
@@ -18,15 +23,15 @@ from rodshell.targets import Target
 from rodshell.units import length_text
 
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `apron`
-STRIDE = 0.2  # of the target's size: the steps of the first march of all
-STRIDES = 10  # from the anchor, each way
+STRIDE = 0.2  # of the target's size: steps of the first march
+STRIDES = 10  # of the first march, from the anchor each way
 FEWEST_STEPS = 6  # from line to line
 MOST_NODES = 4_000_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Covering(Net):
-    """A net that covers a target: it is known where nodes are inside, and some way past them.
+    """A net that covers a target: its points are known inside the target's end, and some way past it.
 
     Parameters
     ----------
@@ -36,7 +41,16 @@ class Covering(Net):
     inside: Bools
 
     def reach(self, past: int) -> Floats:
-        """How far it is inside towards -u, +u, -v and +v, and so many nodes more [m]."""
+        """How far the inside nodes reach towards -u, +u, -v and +v.
+
+        Parameters
+        ----------
+        past : number of nodes that are added each way.
+
+        Returns
+        -------
+        (4,) [m].
+        """
         result = list[float]()
         for s, touched in ((self.u, self.inside.any(axis=1)), (self.v, self.inside.any(axis=0))):
             on = np.flatnonzero(touched) if touched.any() else np.array([0, len(s) - 1])
@@ -44,10 +58,102 @@ class Covering(Net):
         return np.array(result)
 
 
-@dataclass(frozen=True)
+def march_covering(
+    target: Target,
+    u: Floats,
+    v: Floats,
+    anchor: Floats,
+    heading: Floats,
+    margin: Floats,
+    near: Covering,
+    coarser: Net | None = None,
+    *,
+    heights: Heights = ON_SURFACE,
+) -> Covering:
+    """March a net as far as the target, and a margin past its end.
+
+    Where the target ends is taken from a net in longer steps; where that was wrong, the march is continued.
+
+    Parameters
+    ----------
+    target : the surface.
+    u, v : (nu,), (nv,) ascending material coordinates of the lines, both containing 0 [m].
+    anchor : (3,) point of the surface where the axes cross [m].
+    heading : (3,) direction of the u axis there.
+    margin : (2,) along u and v [m].
+    near : the net in longer steps.
+    coarser : the same net in yet longer steps, see `march_near`.
+    heights : see `Net`.
+    """
+    wanted = wanted_nodes(near, 1, u, v, margin)
+    net = march_near(target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted, heights=heights)
+    while True:
+        found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
+        more = wanted_nodes(found, 0, u, v, SURELY * margin) & ~wanted
+        if not more.any():
+            return found
+        wanted |= more
+        fill_quadrants(target, net, wanted)
+
+
+def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
+    """Nodes inside the target's end or within a margin of it, and all between these and the axes.
+
+    Parameters
+    ----------
+    near : a net in longer steps; if it has no inside nodes, all nodes are wanted.
+    past : the end may be so many of its nodes past the inside ones.
+    u, v : (nu,), (nv,) material coordinates of the lines [m].
+    margin : (2,) along u and v [m].
+
+    Returns
+    -------
+    (nu, nv) booleans.
+    """
+    if not near.inside.any():
+        return np.ones((len(u), len(v)), dtype=bool)
+    return np.asarray(_wanted(near.inside, near.u, near.v, past, u, v, *margin))
+
+
+@nb.njit(cache=True)
+def _wanted(inside, known_u, known_v, past, u, v, margin_u, margin_v):  # type: ignore[no-untyped-def]
+    """See `wanted_nodes`. In each quadrant the nodes are below a staircase that only descends, away from the axis."""
+    wanted = np.zeros((len(u), len(v)), dtype=np.bool_)
+    i_axis, j_axis, (nu, nv) = np.argmin(np.abs(u)), np.argmin(np.abs(v)), inside.shape
+    for quadrant in range(4):
+        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
+        ends, height = np.full(nu + 1, np.inf), np.full(nu + 1, -np.inf)  # end and height of each step
+        for k in range(nu - 1, -1, -1):
+            i, height[k] = (k if i_side > 0 else nu - 1 - k), height[k + 1]
+            ends[k] = i_side * known_u[min(max(i + i_side * past, 0), nu - 1)]
+            for m in range(nv - 1, -1, -1):
+                j = m if j_side > 0 else nv - 1 - m
+                if inside[i, j]:
+                    height[k] = max(height[k], j_side * known_v[min(max(j + j_side * past, 0), nv - 1)])
+                    break
+        k, shifted = 0, 0
+        for i in range(i_axis, len(u) if i_side > 0 else -1, i_side):
+            while ends[k] < abs(u[i]):
+                k += 1
+            while ends[shifted] + margin_u < abs(u[i]):
+                shifted += 1
+            for j in range(j_axis, len(v) if j_side > 0 else -1, j_side):
+                if abs(v[j]) > max(height[shifted], height[k] + margin_v):
+                    break
+                wanted[i, j] = True
+    return wanted
+
+
+@dataclass(frozen=True, eq=False)
 class LatticeLines:
-    """Offsets of the lines of a net: `u` are those of family v (they cross the u axis), `v` those of u; and `nodes`,
-    the u and the v of all nodes that the finer march has [m]."""
+    """The lines of the lattice that can touch a target.
+
+    Parameters
+    ----------
+    u : offsets of the lines of family v, which cross the u axis [m].
+    v : offsets of the lines of family u [m].
+    nodes : the u and the v of all nodes of the finer march [m].
+    """
 
     u: Floats
     v: Floats
@@ -63,8 +169,26 @@ def find_lines(
     parts: int,
     heights: Heights = ON_SURFACE,
 ) -> tuple[LatticeLines, Covering]:
-    """All lattice lines that can touch the target, with `MARGIN` spacings to spare; and the march that found them, in
-    so many parts of a spacing."""
+    """Find the lattice lines that can touch the target, and `MARGIN` spacings more.
+
+    Parameters
+    ----------
+    target : the surface.
+    layout : whose lines are wanted.
+    start : (3,) the anchor [m].
+    heading : (3,) direction of the u axis there.
+    near : a net that may be similar, or None.
+    parts : steps to a spacing of the march.
+    heights : see `Net`.
+
+    Returns
+    -------
+    The lines, and the march that found them.
+
+    Raises
+    ------
+    InputError : there would be too many lines or nodes, or none inside the target.
+    """
     step, margin = _across(layout) / parts, MARGIN * _across(layout)
     spare = np.repeat(margin, 2)
     near = near or _stride(target, start, heading, heights)
@@ -82,7 +206,7 @@ def find_lines(
             )
         near = march_covering(target, u, v, start, heading, margin, near, heights=heights)
         if not near.inside.any():
-            raise InputError("no node of the net lies inside the target: move the anchor away from the rim")
+            raise InputError("no node of the net is inside the target: move the anchor away from the rim")
         needed = near.reach(0) + spare
         if np.all(needed <= reach + 1e-12):
             break
@@ -94,12 +218,12 @@ def find_lines(
 
 
 def _across(layout: GridLayout) -> Floats:
-    """(2,) distance of the lines that are met along u, which are those of family v, and along v [m]."""
+    """(2,) distance of the lines crossed along u, which are those of family v, and along v [m]."""
     return np.array(layout.spacing[::-1])
 
 
 def _stride(target: Target, start: Floats, heading: Floats, heights: Heights) -> Covering:
-    """The first net of all, in long steps: its axes, and what lies between those parts of them that are inside."""
+    """The first net, in long steps: its axes, and the nodes between the parts of them that are inside."""
     s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
     net = Net(s, s, np.full((len(s), len(s), 3), np.nan), heights=heights)
     lay_axes(target, net, start, heading)
@@ -110,14 +234,14 @@ def _stride(target: Target, start: Floats, heading: Floats, heights: Heights) ->
 
 
 def _around(inside: Bools) -> Bools:
-    """Nodes of an axis from the one before the first inside, or the anchor, to one past the last; all where none is."""
+    """Nodes of an axis from one before the first inside, or the anchor, to one past the last; all where none is."""
     on = np.append(np.flatnonzero(inside), STRIDES) if inside.any() else np.array([0, len(inside)])
     k = np.arange(len(inside))
     return np.asarray((k >= on.min() - 1) & (k <= on.max() + 1))
 
 
 def _lattice(layout: GridLayout, family: Family, below: float, above: float) -> Floats:
-    """Offsets of the lattice lines of a family between -below and above, with the axis."""
+    """Offsets of the lattice lines of a family from -below to above, and of the axis."""
     spacing = layout.spacing[0 if family == "u" else 1]
     offsets = layout.lattice(family, -below, above)
     offsets[np.abs(offsets) < 1e-9 * spacing] = 0.0
@@ -134,13 +258,25 @@ def march_lines(
     *near: Covering,
     heights: Heights = ON_SURFACE,
 ) -> Covering:
-    """The net at all of its nodes or at `every` second one, from one or two nets in longer steps."""
+    """March the net of lines at some of its nodes.
+
+    Parameters
+    ----------
+    target : the surface.
+    layout : of the lines.
+    lines : see `find_lines`.
+    start : (3,) the anchor [m].
+    heading : (3,) direction of the u axis there.
+    every : 1 for all nodes, 2 for every second one.
+    near : one or two nets in longer steps, the finer one first.
+    heights : see `Net`.
+    """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
     return march_covering(target, u, v, start, heading, MARGIN * _across(layout), *near, heights=heights)
 
 
 def _refuse_too_many(target: Target, layout: GridLayout, lines: LatticeLines) -> None:
-    """Before the finer march takes memory for nodes that are too many."""
+    """Refuse a finer march with more nodes than the memory should hold."""
     counts = [len(nodes) for nodes in lines.nodes]
     if counts[0] * counts[1] > MOST_NODES:
         auto = auto_edge(layout.spacing)
@@ -157,7 +293,8 @@ def _coarser(target: Target) -> str:
 
 
 def _subdivided(offsets: Floats, edge: float) -> Floats:
-    """Six steps or more from line to line, an even number: as many as edges, or twice as many where these are few."""
+    """Material coordinates of nodes: from line to line an even number of at least six steps, as many as edges if
+    these are enough."""
     edges, gaps = edge_counts(np.diff(offsets), edge), np.diff(offsets)
     steps = 2 * np.where(edges < FEWEST_STEPS, np.maximum(FEWEST_STEPS // 2, edges), (edges + 1) // 2)
     span = np.repeat(np.arange(len(edges)), steps)
@@ -166,68 +303,3 @@ def _subdivided(offsets: Floats, edge: float) -> Floats:
 
 
 SURELY = 0.96  # of the margin: two nets in different steps end a little elsewhere
-
-
-def march_covering(
-    target: Target,
-    u: Floats,
-    v: Floats,
-    anchor: Floats,
-    heading: Floats,
-    margin: Floats,
-    near: Covering,
-    coarser: Net | None = None,
-    *,
-    heights: Heights = ON_SURFACE,
-) -> Covering:
-    """As `march_near`, as far as the target and a `margin` (2,) along u and v past its end [m]. Where it ends is taken
-    from the net `near` in longer steps; where that was wrong, the march goes on."""
-    wanted = wanted_nodes(near, 1, u, v, margin)
-    net = march_near(target, u, v, anchor, heading, near, coarser=coarser, wanted=wanted, heights=heights)
-    while True:
-        found = Covering(u, v, net.points, inside_nodes(target, net), heights=heights)
-        more = wanted_nodes(found, 0, u, v, SURELY * margin) & ~wanted
-        if not more.any():
-            return found
-        wanted |= more
-        fill_quadrants(target, net, wanted)
-
-
-def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats) -> Bools:
-    """(nu, nv) nodes of the lines u and v that lie no further than a `margin` (2,) along u or v [m] outside what is
-    inside of a net `near`, and all between these and the axes. Its end may lie so many nodes `past` the inside ones.
-
-    All nodes where that net tells nothing, since it has none inside.
-    """
-    if not near.inside.any():
-        return np.ones((len(u), len(v)), dtype=bool)
-    return np.asarray(_wanted(near.inside, near.u, near.v, past, u, v, *margin))
-
-
-@nb.njit(cache=True)
-def _wanted(inside, known_u, known_v, past, u, v, margin_u, margin_v):  # type: ignore[no-untyped-def]
-    """See `wanted_nodes`. In each quadrant the nodes lie under a stair that only goes down, away from the axis."""
-    wanted = np.zeros((len(u), len(v)), dtype=np.bool_)
-    i_axis, j_axis, (nu, nv) = np.argmin(np.abs(u)), np.argmin(np.abs(v)), inside.shape
-    for quadrant in range(4):
-        i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
-        ends, height = np.full(nu + 1, np.inf), np.full(nu + 1, -np.inf)  # where each step ends, and how high it is
-        for k in range(nu - 1, -1, -1):
-            i, height[k] = (k if i_side > 0 else nu - 1 - k), height[k + 1]
-            ends[k] = i_side * known_u[min(max(i + i_side * past, 0), nu - 1)]
-            for m in range(nv - 1, -1, -1):
-                j = m if j_side > 0 else nv - 1 - m
-                if inside[i, j]:
-                    height[k] = max(height[k], j_side * known_v[min(max(j + j_side * past, 0), nv - 1)])
-                    break
-        k, beside = 0, 0
-        for i in range(i_axis, len(u) if i_side > 0 else -1, i_side):
-            while ends[k] < abs(u[i]):
-                k += 1
-            while ends[beside] + margin_u < abs(u[i]):
-                beside += 1
-            for j in range(j_axis, len(v) if j_side > 0 else -1, j_side):
-                if abs(v[j]) > max(height[beside], height[k] + margin_v):
-                    break
-                wanted[i, j] = True
-    return wanted

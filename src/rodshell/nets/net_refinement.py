@@ -1,9 +1,9 @@
-"""A net near one that is known: all its nodes are found together.
+"""A net from one that is similar: Newton's method for all nodes together.
 
-The march asks the target for a few points at a time, from node to node. Where a net is known nearby, from a coarser
-march or from a form found before, the target is asked once for all nodes, and the march is repeated on its local
+The march evaluates the target at a few points at a time, from node to node. Where a similar net is known, from a
+coarser march or from an earlier form, the target is evaluated once at all nodes, and the march is repeated on its local
 models there. That is Newton's method for the whole net, whose matrix is triangular in the order of the march: two or
-three rounds, whatever the number of nodes. The equations are those of `compass`, and so is the net.
+three rounds, whatever the number of nodes. The equations, and so the net, are those of `compass`.
 """
 
 import numba as nb
@@ -30,10 +30,10 @@ from rodshell.nets.compass import (
 from rodshell.targets import Implicit, Target
 
 ROUNDS = 6
-SETTLED = 2e-5  # of the target's size: what a round moves; the error left is its third power
+CONVERGED = 2e-5  # of the target's size: motion in a round; the remaining error is its third power
 EXACT = 1e-13  # of the step, on a local model
-CLEARLY = 1.5  # times the square of the step: what two nets in steps nearer to each other differ by tells little
-BEYOND = 2.5  # steps of the known net that a guess may lie outside it
+CLEARLY = 1.5  # ratio of the squares of the steps of two nets, above which their difference can be extrapolated
+BEYOND = 2.5  # steps of the known net by which a guess may be outside it
 
 
 def march_near(
@@ -48,24 +48,27 @@ def march_near(
     wanted: Bools | None = None,
     heights: Heights = ON_SURFACE,
 ) -> Net:
-    """As `march`, from a guess taken out of a net `near`; any guess is safe, a bad one is only of no use.
+    """March a net as `march` does, starting from a similar one; a bad start costs time, not accuracy.
 
-    coarser : the same net as `near` in longer steps: what the two differ by tells by how much this one will.
-    wanted : (nu, nv) nodes to find beside the axes, with all between them and the axes; the others stay NaN.
+    Parameters
+    ----------
+    target, u, v, anchor, heading, heights : see `march`.
+    near : the similar net.
+    coarser : the same net as `near` in longer steps, from which the start is extrapolated.
+    wanted : (nu, nv) nodes to find in addition to the axes, with all between them and the axes; others stay NaN.
     """
-    guess = near if coarser is None else _foreseen(near, coarser, u, v)
+    guess = near if coarser is None else _extrapolated(near, coarser, u, v)
     net = Net(u, v, interpolated(guess, u, v), heights=heights)
-    if not _settle_axes(target, net, anchor, heading):
+    if not _refine_axes(target, net, anchor, heading):
         lay_axes(target, net, anchor, heading)
-    _settle(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted)
+    _refine(target, net, np.ones(net.points.shape[:2], dtype=bool) if wanted is None else wanted)
     fill_quadrants(target, net, wanted)
     return net
 
 
-def _foreseen(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
-    """The nodes of `near` moved to where the net with the lines u and v has them: errors go with the square of the
-    step."""
-    own, once, twice = (
+def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
+    """Extrapolate the nodes of `near` to the steps of the lines u and v: errors go with the square of the step."""
+    wanted, once, twice = (
         (along[-1] - along[0]) * (across[-1] - across[0]) / ((len(along) - 1) * (len(across) - 1))
         for along, across in ((u, v), (near.u, near.v), (coarser.u, coarser.v))
     )
@@ -73,18 +76,27 @@ def _foreseen(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
         return near
     change = near.points - interpolated(coarser, near.u, near.v)
     change[np.isnan(change)] = 0.0
-    return Net(near.u, near.v, near.points + (once - own) / (twice - once) * change)
+    return Net(near.u, near.v, near.points + (once - wanted) / (twice - once) * change)
 
 
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
-    """(nu, nv, 3) points of a net at other coordinates, by local cubics both ways, which go on some way past its last
-    nodes; NaN further away."""
+    """Interpolate a net by local cubics both ways, which also extrapolate a little past its last nodes.
+
+    Parameters
+    ----------
+    net : that is known.
+    u, v : (nu,), (nv,) material coordinates wanted [m].
+
+    Returns
+    -------
+    (nu, nv, 3) points [m]; NaN further away.
+    """
     i0, j0 = net.origin
     return np.asarray(resampled(net.v, resampled(net.u, net.points, i0, u, BEYOND), j0, v, BEYOND))
 
 
-def _settle_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
-    """Move the guess of the axes to the two geodesics through the anchor; whether they were found."""
+def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
+    """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
     i0, j0 = net.origin
     along, back, across, aback = axes(target, anchor, heading)
     normal = cross(along, across)
@@ -102,37 +114,37 @@ def _settle_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
     starts = [anchor] * 4
     if layers and np.isfinite(points).all():
         starts = [layer.of(anchor[None])[0] for layer, _ in layers for _ in range(2)]
-        points = np.concatenate([layer.of(points[own]) for layer, own in layers])
+        points = np.concatenate([layer.of(points[part]) for layer, part in layers])
     moved = np.inf if np.isfinite(points).all() else np.nan
     for _ in range(ROUNDS):
-        if not moved >= SETTLED * target.size:
+        if not moved >= CONVERGED * target.size:
             break
         if layers:
-            parts = [layer.implicit(points[own]) for layer, own in layers]
-            model = Implicit(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+            parts = [layer.implicit(points[part]) for layer, part in layers]
+            model = Implicit(*(np.concatenate(values) for values in zip(*parts, strict=True)))
         else:
             model = target.implicit(points)
         moved = 0.0
         for k, (_, _, direction) in enumerate(arms):
             here = slice(stops[k], stops[k + 1])
             moved += _geodesic(starts[k], direction, normal, steps[here], points[here], *(part[here] for part in model))
-    if not moved < SETTLED * target.size:
+    if not moved < CONVERGED * target.size:
         return False
     if layers:
-        points = np.concatenate([layer.below(points[own]) for layer, own in layers])
+        points = np.concatenate([layer.below(points[part]) for layer, part in layers])
     for k, (arm, _, _) in enumerate(arms):
         arm[:] = points[stops[k] : stops[k + 1]]
     return True
 
 
 def _layers_of_axes(target: Target, heights: Heights, middle: int, stop: int) -> tuple[tuple[Layer, slice], ...]:
-    """The layer of either axis, and where its nodes stand among those of both."""
+    """The layer of each axis, and which of the nodes of both axes are its own."""
     return (Layer(target, heights[0]), slice(0, middle)), (Layer(target, heights[1]), slice(middle, stop))
 
 
 @nb.njit(cache=True, error_model="numpy")
 def _geodesic(start, direction, normal, steps, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
-    """One arm of `compass.geodesics` on second order models at `points`, which move; by how much, or NaN."""
+    """Move the `points` of one arm of `compass.geodesics`, on second order models there; return by how much, or NaN."""
     point, tangent, normal, moved = start.copy(), direction.copy(), normal.copy(), 0.0
     flat, chord, swing, away, slope = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for s in range(len(steps)):
@@ -168,11 +180,9 @@ def _geodesic(start, direction, normal, steps, points, value, gradient, hessian)
     return moved
 
 
-def _settle(target: Target, net: Net, wanted: Bools) -> None:
-    """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for what does not settle.
-
-    A round asks the target only where the last one moved a node: elsewhere its model is still good.
-    """
+def _refine(target: Target, net: Net, wanted: Bools) -> None:
+    """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for nodes that do not
+    converge. A round evaluates the target only where the last one moved a node: elsewhere its model is still good."""
     i0, j0 = net.origin
     models, row = np.empty_like(net.points), np.empty(wanted.shape, dtype=np.intp)
     value, gradient, hessian = target.implicit(_chosen(net.points, wanted, i0, j0, models, row))
@@ -180,23 +190,23 @@ def _settle(target: Target, net: Net, wanted: Bools) -> None:
     layered = net.heights != ON_SURFACE
     normals = np.zeros_like(net.points) if layered else np.empty((0, 0, 3))
     if layered:
-        normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others are found in order
+        normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others follow in order
     for _ in range(ROUNDS):
         _sweep(
             net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved
         )
-        new = moved >= SETTLED * target.size
+        new = moved >= CONVERGED * target.size
         if not new.any():
             return
         models[new], rows = net.points[new], row[new]
         value[rows], gradient[rows], hessian[rows] = target.implicit(models[new])
-    _forget(net.points, moved >= SETTLED * target.size, i0, j0)
+    _forget(net.points, moved >= CONVERGED * target.size, i0, j0)
 
 
 @nb.njit(cache=True)
 def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def]
     """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
-    `row` (nu, nv) is where each stands there, -1 for the others; `models` (nu, nv, 3) is a copy of all."""
+    `row` (nu, nv) is the index of each in the result, -1 for the others; `models` (nu, nv, 3) is a copy of all."""
     chosen, count = np.empty((row.size, 3)), 0
     for i in range(row.shape[0]):
         for j in range(row.shape[1]):
@@ -214,11 +224,11 @@ def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def
 def _sweep(  # type: ignore[no-untyped-def]
     points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
 ):
-    """One march of the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), whose values, gradients and
-    Hessians are in the rows `row` (nu, nv), -1 where there is none; from them the points then lie away by `moved`
-    (nu, nv). Nodes whose models and neighbours are not `new` (nu, nv) stay.
+    """March the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), whose values, gradients and
+    Hessians are in the rows `row` (nu, nv), -1 where there is none; `moved` (nu, nv) returns the distance from them.
+    Nodes whose models and neighbours are not `new` (nu, nv) do not move.
 
-    `normals` (nu, nv, 3) of the surface at the points follow them where rods lie at `heights` above it; none without.
+    `normals` (nu, nv, 3) of the surface at the points are updated if rods are at `heights` above it; empty otherwise.
     """
     layered = len(normals) > 0
     for quadrant in range(4):
@@ -235,7 +245,7 @@ def _sweep(  # type: ignore[no-untyped-def]
                 if r < 0:
                     continue
                 a, b, d, here = _at(points, i, q), _at(points, p, j), _at(points, p, q), _at(models, i, j)
-                away = less(d, _at(models, p, q))  # as far from its model as its neighbours are from theirs
+                away = less(d, _at(models, p, q))  # guess: as far from its model as its neighbours are from theirs
                 away = less(_plus(less(a, _at(models, i, q)), less(b, _at(models, p, j))), away)
                 from_a, from_b = abs(v[j] - v[q]), abs(u[i] - u[p])
                 if layered:
@@ -266,7 +276,7 @@ def _sweep(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True)
 def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
-    """Value and gradient `away` from where the second order model r was made."""
+    """Value and gradient of the second order model r, at a distance `away` from its point."""
     x, y, z = away
     bx = hessian[r, 0, 0] * x + hessian[r, 0, 1] * y + hessian[r, 0, 2] * z
     by = hessian[r, 1, 0] * x + hessian[r, 1, 1] * y + hessian[r, 1, 2] * z
@@ -295,9 +305,9 @@ def _plus(a, b):  # type: ignore[no-untyped-def]
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-def _forget(points: Floats, unsettled: Bools, i0: int, j0: int) -> None:
-    """NaN for every node that has not settled, and for all that hang on it: those beyond it in its quadrant."""
+def _forget(points: Floats, unconverged: Bools, i0: int, j0: int) -> None:
+    """NaN for every node that did not converge, and for all that depend on it: those beyond it in its quadrant."""
     for rows in (slice(i0, None), slice(i0, None, -1)):
         for columns in (slice(j0, None), slice(j0, None, -1)):
-            lost = np.logical_or.accumulate(unsettled[rows, columns], axis=0)
+            lost = np.logical_or.accumulate(unconverged[rows, columns], axis=0)
             points[rows, columns][np.logical_or.accumulate(lost, axis=1)] = np.nan

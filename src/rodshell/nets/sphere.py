@@ -18,14 +18,15 @@ if TYPE_CHECKING:  # scipy.integrate costs a third of a second, and only this re
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.validation import number, positive
 
-LIMIT = 1.8616  # f vanishes first at this sigma: the net folds
+LIMIT = 1.8616  # f is 0 first at this sigma: the net folds
 KNOWN = 1.95  # f is integrated to this sigma
 
 
 @lru_cache
 def _crossing_angle() -> "OdeSolution":
-    """f and f' as functions of sigma, started from the series pi/2 - s + s^3/18 off the singular point."""
+    """f and f' as functions of sigma; a series, pi/2 - s + s^3/18, starts the solution off the singular point."""
     from scipy.integrate import solve_ivp
 
     s = 1e-3
@@ -39,7 +40,16 @@ def _crossing_angle() -> "OdeSolution":
 
 
 def crossing_angle(sigma: float) -> tuple[float, float]:
-    """Angle between the families f(sigma) [rad] and its derivative, sigma = u v / R^2; odd about pi/2."""
+    """Angle between the families.
+
+    Parameters
+    ----------
+    sigma : u v / R^2.
+
+    Returns
+    -------
+    f(sigma) [rad], which is odd about pi/2, and its derivative.
+    """
     size = abs(sigma)
     if size < 1e-3:
         f, slope = pi / 2 - size + size**3 / 18, -1 + size**2 / 6
@@ -49,18 +59,33 @@ def crossing_angle(sigma: float) -> tuple[float, float]:
 
 
 def sphere_net_rod(radius: float, offset: float, length: float, base: float | None = None) -> "OdeResult":
-    """Path of the rod at `offset` from its middle to `length`, or to z = `base` if it comes first [m].
+    """Compute the path of a rod of a sphere's net, from its middle.
 
-    The anchor is the north pole (0, 0, radius); the rod crosses the great circle x = 0 at arc length `offset`
-    and starts along x. The result's `sol(s / radius)` is the position over the radius (3) and the unit
-    tangent (3); `t_events` holds s / radius where the base is met.
+    The anchor is the north pole (0, 0, radius); the rod crosses the great circle x = 0 and starts along x.
+
+    Parameters
+    ----------
+    radius : of the sphere [m].
+    offset : of the rod, an arc length [m].
+    length : of the path, from the rod's middle [m].
+    base : z of a plane at which the path ends if it reaches it first [m], or None.
+
+    Returns
+    -------
+    A solution of scipy: `sol(s / radius)` is the position over the radius (3) and the unit tangent (3); `t_events` has
+    s / radius where the base is reached.
 
     Raises
     ------
-    InputError : the rod would go on far past the limit of the net, where its equation is not solved.
+    InputError : the path would go far past the limit of the net, where its equation is not solved.
     """
     from scipy.integrate import solve_ivp
 
+    positive("radius", radius, "m")
+    number("offset", offset, "m")
+    positive("length", length, "m")
+    if base is not None:
+        number("base", base, "m")
     a = offset / radius
     known = radius * KNOWN / abs(a) if a else np.inf
     start = np.array([0.0, np.sin(a), np.cos(a), 1.0, 0.0, 0.0])
@@ -70,12 +95,12 @@ def sphere_net_rod(radius: float, offset: float, length: float, base: float | No
         turn = -crossing_angle(s * a)[1] * a  # geodesic curvature times the radius
         return np.concatenate([t, turn * np.cross(n, t) - n])
 
-    def reach(s: float, y: Floats) -> float:
+    def above_base(s: float, y: Floats) -> float:
         return float(y[2] - base / radius) if base is not None else 1.0
 
-    reach.terminal = True  # type: ignore[attr-defined]
+    above_base.terminal = True  # type: ignore[attr-defined]
     path = solve_ivp(frenet, (0.0, min(length, known) / radius), start, method="DOP853", rtol=1e-12, atol=1e-13,
-                     events=reach, dense_output=True)  # fmt: skip
+                     events=above_base, dense_output=True)  # fmt: skip
     if length > known and path.t[-1] >= known / radius:
         raise InputError(
             f"the net of the sphere folds before the rod at offset {offset:g} m is {length:g} m long: "
@@ -85,18 +110,31 @@ def sphere_net_rod(radius: float, offset: float, length: float, base: float | No
 
 
 def sphere_net_end(radius: float, offset: float, base: float = 0.0) -> float:
-    """Half-length [m] of the rod at `offset` [m] on a sphere, from its middle down to z = `base` [m].
+    """Compute the half-length of a rod of a sphere's net, from its middle down to a base plane.
+
+    Parameters
+    ----------
+    radius : of the sphere [m].
+    offset : of the rod, an arc length [m].
+    base : z of the plane; the centre of the sphere is at 0 [m].
+
+    Returns
+    -------
+    Half-length [m].
 
     Raises
     ------
-    InputError : the rod's middle lies below the base, or the net folds before the rod reaches the base.
+    InputError : the rod's middle is below the base, or the net folds before the rod reaches the base.
     """
+    positive("radius", radius, "m")
+    number("offset", offset, "m")
+    number("base", base, "m")
     a = abs(offset) / radius
     if not abs(base) < radius or a >= pi or np.cos(a) * radius <= base:
         raise InputError(f"the rod at offset {offset} m does not touch the cap above z = {base} m")
     furthest = radius * min(LIMIT / a if a else np.inf, 2 * pi)
     events = sphere_net_rod(radius, offset, furthest, base).t_events
-    met = np.empty(0) if events is None else events[0]
-    if len(met) == 0:
+    reached = np.empty(0) if events is None else events[0]
+    if len(reached) == 0:
         raise InputError(f"the net folds before the rod at offset {offset} m reaches z = {base} m")
-    return float(radius * met[0])
+    return float(radius * reached[0])

@@ -28,13 +28,14 @@ FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
 @dataclass(frozen=True)
 class Scale:
-    """Colours of a shell.
+    """What colours a shell's rods.
 
     Parameters
     ----------
-    values : (k,) at each entry of `rod_nodes`.
+    values : (k,) at each entry of `rod_nodes`, in the unit that the caption names.
     low, high : values at both ends of the map.
-    colours : control points of the map.
+    colours : control points of the map, evenly spaced, "#rrggbb".
+    caption : what the values are, with their unit.
     """
 
     values: Floats
@@ -55,7 +56,10 @@ class Scale:
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
-    """The scale of a shape, one for all shapes of the archive, which are compared; None where nothing colours it."""
+    """The scale of a shape, the same for all shapes of an archive; None where its rods have the colours of families.
+
+    colour : "stress", or "gap": signed distance to the target, or height where there is none.
+    """
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
         return None if shape.stress is None else _stress_scale(archive, shape)
@@ -73,7 +77,7 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
-    """The largest gap [mm] with its sign, and where (3,) [m]: the agreement's own, which also looks between the nodes.
+    """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too.
 
     shape : one whose gaps are known.
     """
@@ -109,7 +113,7 @@ def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     if strength:
         unit, caption = strength / 100, "utilisation in %"
     else:
-        unit, name = next((one for one in PRESSURES if top >= one[0]), PRESSURES[-1])
+        unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
         caption = f"stress in {name}"
     largest = float(np.max(shape.stress)) / unit
     limit = _rounded_up(max(top / unit, FINEST))
@@ -123,7 +127,10 @@ def _rounded_up(largest: float) -> float:
 
 
 def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
-    """The map with its ticks and its caption, ending at x = `right`, ticks' baseline at `y`."""
+    """Draw the map with ticks and caption.
+
+    right : x at which it ends; y : baseline of the numbers [drawing units].
+    """
     length = 200.0
     left, step = right - length, length / BINS
     for k, colour in enumerate(scale.palette):  # each under the next: no seams
@@ -138,7 +145,10 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
 
 
 def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
-    """Colours at `shares` (k,) of the way through a map, 0 to 1."""
+    """Colours "#rrggbb" in a map of evenly spaced control points.
+
+    shares : (k,) 0 (its first point) to 1 (its last).
+    """
     table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
     at = np.linspace(0.0, 1.0, len(points))
     channels = [np.interp(shares, at, table[:, k]) for k in range(3)]

@@ -1,4 +1,4 @@
-"""A drawing: paths, marks and texts on named layers, in mm, y up. DXF, SVG, PDF and PNG are written from it."""
+"""A drawing: paths, marks and texts on named layers, y up [mm]. DXF, SVG, PDF and PNG are written from it."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,15 @@ BELOW = 0.2  # of which this much is below its baseline
 
 @dataclass(frozen=True)
 class Layer:
-    """How a layer looks: colour, pen [mm of paper], and AutoCAD's number of the colour."""
+    """How a layer looks.
+
+    Parameters
+    ----------
+    colour : "#rrggbb".
+    pen : width of its lines [mm of paper].
+    number : of the colour in AutoCAD's table.
+    dash : lengths of a dash and of the gap after it [mm of paper]; empty: lines are solid.
+    """
 
     colour: str
     pen: float
@@ -44,7 +52,15 @@ LAYERS = {
 
 @dataclass(frozen=True)
 class Pen:
-    """A look of its own: colour, width [mm], dashes [mm], and a colour to fill the inside with."""
+    """How a path or mark looks that does not look like its layer.
+
+    Parameters
+    ----------
+    colour : of the line, "#rrggbb".
+    width : of the line [mm]; 0: there is none.
+    dash : lengths of dashes and gaps in turn [mm].
+    fill : colour of the inside; "": it is not filled.
+    """
 
     colour: str
     width: float
@@ -54,7 +70,15 @@ class Pen:
 
 @dataclass(frozen=True)
 class Path:
-    """A polyline (k, 2), or (k, 3) in space, which only DXF shows. `name` says what it is, `note` tells more."""
+    """A polyline.
+
+    Parameters
+    ----------
+    points : (k, 2) [mm], or (k, 3) in space, which only DXF shows.
+    layer : a key of `LAYERS`.
+    pen : None: that of the layer.
+    name : the rod that it stands for; note : shown where the pointer is, in SVG.
+    """
 
     points: Floats
     layer: str
@@ -70,7 +94,14 @@ class Path:
 
 @dataclass(frozen=True)
 class Mark:
-    """A circle around a place (2,)."""
+    """A circle.
+
+    Parameters
+    ----------
+    at : (2,) its middle [mm].
+    radius : [mm].
+    layer, pen, note : as of `Path`.
+    """
 
     at: Floats
     radius: float
@@ -81,9 +112,15 @@ class Mark:
 
 @dataclass(frozen=True)
 class Text:
-    """One line of text: its baseline starts, is centred or ends at a place (2,), turned by `angle` [rad].
+    """One line of text.
 
-    A `halo` of another colour sets it off against lines behind it.
+    Parameters
+    ----------
+    at : (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
+    size : of the font [mm].
+    angle : of the baseline against x [rad].
+    colour : "": that of the layer.
+    halo : colour of a rim that sets it off against lines behind it; "": none. PDF and DXF have none.
     """
 
     text: str
@@ -97,7 +134,7 @@ class Text:
     halo: str = ""
 
     def box(self) -> Floats:
-        """(4, 2) corners of the room that it takes, by the width of a broad letter."""
+        """(4, 2) corners of the room that it takes [mm], each letter taken as wide as a broad one."""
         return self._box
 
     @cached_property
@@ -139,7 +176,7 @@ class Drawing:
         return self.text / TEXT
 
     def box(self) -> tuple[Floats, Floats]:
-        """Lowest and highest x and y of all that is in the plane (2,), (2,)."""
+        """Lowest and highest x and y (2,), (2,) of all that is in the plane [mm]."""
         parts = [np.zeros((0, 2)), *(path.points for path in self.paths if path.flat)]
         if self.marks:
             at, radius = np.array([mark.at for mark in self.marks]), np.array([[mark.radius] for mark in self.marks])
@@ -149,9 +186,15 @@ class Drawing:
         return (cloud.min(axis=0), cloud.max(axis=0)) if len(cloud) else (np.zeros(2), np.ones(2))
 
     def placed(self, scale: float, shift: Floats) -> "Drawing":
-        """Scaled about the origin, then shifted (2,); own pens and texts too. Paths in space are left out."""
+        """The drawing scaled about the origin, with its pens and texts, then shifted. Paths in space are left out.
+
+        Parameters
+        ----------
+        scale : new lengths over old ones.
+        shift : (2,) [mm].
+        """
         pens = {path.pen for path in self.paths} | {mark.pen for mark in self.marks}
-        pen = {one: _scaled(one, scale) for one in pens}
+        pen = {old: _scaled(old, scale) for old in pens}
         return Drawing(
             self.name,
             self.title,
@@ -173,7 +216,10 @@ class Drawing:
         )
 
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
-        """What is inside a rectangle; marks and texts that cross its border, and paths in space, are left out."""
+        """The part within a rectangle; marks and texts that cross its border, and paths in space, are left out.
+
+        low, high : (2,) its lower left and upper right corner [mm].
+        """
         paths = [
             replace(path, points=part, closed=False)
             for path in self.paths
@@ -195,7 +241,7 @@ class Drawing:
 
 @dataclass
 class Pencil:
-    """Collects the parts of a drawing."""
+    """Collects the parts of a drawing; `look` are further fields of `Path`, `Mark` and `Text`."""
 
     paths: list[Path] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
@@ -203,20 +249,24 @@ class Pencil:
     left_out: list[str] = field(default_factory=list)
 
     def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
+        """Add a polyline through points (k, 2) or (k, 3) [mm]."""
         self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
 
     def mark(self, at: Iterable[float], radius: float, layer: str, **look: object) -> None:
+        """Add a circle around a point (2,) [mm]."""
         self.marks.append(Mark(np.array(at, dtype=float), radius, layer, **look))  # type: ignore[arg-type]
 
     def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
+        """Add a line of text at a point (2,) [mm]."""
         self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
 
     def leave_out(self, count: int, of: int, what: str) -> None:
-        """Record that `count` of so many texts found no room."""
+        """Record that `count` of so many texts, which are `what`, found no room."""
         if count:
             self.left_out.append(f"{count if count < of else 'all'} of {of} {what}")
 
     def done(self, name: str, title: str, text: float) -> Drawing:
+        """The drawing, with the usual size of its texts [mm]."""
         return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
 
 

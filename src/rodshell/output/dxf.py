@@ -41,6 +41,8 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
             space.add_circle(mark.at.tolist(), float(mark.radius), dxfattribs={"layer": layers[mark.layer]})
         for text in drawing.texts:
             _add_text(space, text, layers[text.layer])
+        for kind in sorted(document.entitydb.dxf_types_in_use()):
+            document.classes.add_class(kind)  # in a fixed order: `write` has that of a set
         stream = StringIO()
         document.write(stream)
     return stream.getvalue()

@@ -33,7 +33,7 @@ def save(
 
     Parameters
     ----------
-    kinds : of files beside the archive (see `KINDS`); default: all that every installation can.
+    kinds : of files in addition to the archive (see `KINDS`); default: all but 3dm.
     force : also replace files that rodshell did not write, or that were changed since, where it has to write.
     more : other files, by name.
     progress : called for each file; a time limit does not apply, since what was found is to be kept.
@@ -65,7 +65,7 @@ def export(
 
     Parameters
     ----------
-    kinds : see `KINDS`; default: all that every installation can.
+    kinds : see `KINDS`; default: all but 3dm.
     force, progress : as of `save`.
 
     Raises
@@ -103,7 +103,7 @@ class Content:
 
 
 def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
-    """Names in the result's folder and contents of the files of some kinds; default: all that every installation can.
+    """Names in the result's folder and contents of the files of some kinds; default: all but 3dm.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def _shells(archive: Archive) -> list[str]:
 
 
 def _meshed(archive: Archive) -> bool:
-    """Whether the archive knows which nodes belong to which rod."""
+    """Whether the archive knows the nodes of each rod."""
     return "rod_nodes" in archive.states
 
 
@@ -244,7 +244,7 @@ KINDS: dict[str, Callable[[Content], Files]] = {
     "dxf": _dxf, "svg": _svg, "pdf": _pdf, "csv": _csv, "obj": _obj, "gltf": _gltf, "vtp": _vtp, "compas": _compas,
     "3dm": _rhino, "png": _png, "report": _report,
 }  # fmt: skip
-DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # which needs another package
+DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
 _SCHEDULES = ("rods", "joints", "supports", "bracing", "stock", "seams", "end_paths")

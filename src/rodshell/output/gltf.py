@@ -53,9 +53,9 @@ def section_outline(archive: Archive, size: float) -> Floats:
 
 
 def swept(curve: Floats, outline: Floats) -> tuple[Floats, Floats, NDArray[np.uint32]]:
-    """A tube: points and normals (k s, 3), triangles (t, 3), the outline (s, 2) carried along a curve (k, 3).
+    """A tube: points and normals (k s, 3), triangles (t, 3), the outline (s, 2) swept along a curve (k, 3).
 
-    The frame goes along without twist, from one that is as upright as it can be. The ends are open.
+    The frame has no twist and begins as upright as possible. The ends are open.
     """
     edges = unit(np.diff(curve, axis=0))
     up = np.array([0.0, 0.0, 1.0]) if abs(edges[0, 2]) < 0.9 else np.array([1.0, 0.0, 0.0])

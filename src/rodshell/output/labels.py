@@ -12,8 +12,8 @@ from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Text
 Extent = tuple[float, float, float, float]
 
 LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
-CLOSE = 5  # places that are tried on a label's own line
-STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # beside it
+CLOSE = 5  # positions that are tried on a label's line
+STEPS, TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # and next to it
 THIN = 0.1  # what a line takes, over the size of its text
 
 
@@ -56,13 +56,13 @@ class Label:
 class Room:
     """The boxes (4, 2) that are taken, found by the square of the plane that they lie in.
 
-    within : another, in which all that is taken is taken here too.
+    within : an outer room; what is taken there is taken here too.
     """
 
     def __init__(self, square: float, within: "Room | None" = None) -> None:
         self._square = square
         self._taken: dict[tuple[int, int], list[tuple[Extent, Floats]]] = {}
-        self._own = list[Floats]()
+        self._boxes = list[Floats]()
         self._within = within
 
     def free(self, box: Floats) -> bool:
@@ -79,7 +79,7 @@ class Room:
         return not near or not boxes_meet(box, np.array(near))
 
     def take(self, box: Floats) -> None:
-        self._own.append(box)
+        self._boxes.append(box)
         extent = _extent(box)
         for square in self._squares(extent):
             self._taken.setdefault(square, []).append((extent, box))
@@ -93,7 +93,7 @@ class Room:
 
     def join(self, other: "Room") -> None:
         """Take all that the other has taken."""
-        for box in other._own:
+        for box in other._boxes:
             self.take(box)
 
     def _squares(self, extent: Extent) -> list[tuple[int, int]]:
@@ -108,7 +108,7 @@ def _extent(box: Floats) -> Extent:
 
 
 def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None = None) -> list[Label]:
-    """Labels at both ends of the rods (m, 2, 2), each on its rod's own line.
+    """Labels at both ends of the rods (m, 2, 2), each on its rod's line.
 
     A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
 
@@ -121,7 +121,7 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
     for end in (0, 1):
         for k in np.flatnonzero(wanted[:, end]).tolist():
             places = _on_own_line(texts[k], rods[k, end], rods[k, 1 - end], size)
-            label = next((one for one in places if fits(one, size, room, rods)), None)
+            label = next((label for label in places if fits(label, size, room, rods)), None)
             if label is not None:
                 placed.append(label)
                 take(label, size, room)
@@ -162,7 +162,7 @@ def take(label: Label, size: float, room: Room) -> None:
 
 
 def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
-    """Whether a label, which is to cover none of the lines, and the line to it find room."""
+    """Whether a label and the line to it find room; the label must cover none of the lines."""
     return (
         room.free(label.box(size))
         and not lines_meet(label.box(size), lines)
@@ -208,7 +208,7 @@ def spread(places: ArrayLike, gap: float) -> Floats:
 
 
 def _on_own_line(text: str, end: Floats, other: Floats, size: float) -> Iterable[Label]:
-    """Places on the rod's own line, from its end outwards."""
+    """Positions on the rod's line, from its end outwards."""
     outward = (end - other) / np.linalg.norm(end - other)
     angle = upright(float(np.arctan2(outward[1], outward[0])))
     first = (0.55 + 0.5 * LETTER * len(text)) * size
@@ -232,8 +232,8 @@ def boxes_meet(box: Floats, others: Floats) -> bool:
     """Whether the rectangle (4, 2) covers a part of one of `others` (m, 4, 2): no axis separates them."""
     if not len(others):
         return False
-    mine = np.broadcast_to(box[[1, 3]] - box[0], (len(others), 2, 2))
-    sides = np.concatenate([mine, others[:, [1, 3]] - others[:, :1]], axis=1)
+    sides_of_box = np.broadcast_to(box[[1, 3]] - box[0], (len(others), 2, 2))
+    sides = np.concatenate([sides_of_box, others[:, [1, 3]] - others[:, :1]], axis=1)
     p, q = np.einsum("mac,pc->map", sides, box), np.einsum("mac,mpc->map", sides, others)
     apart = (p.max(-1) <= q.min(-1)) | (q.max(-1) <= p.min(-1))
     return bool(np.any(~apart.any(axis=1)))
@@ -269,7 +269,7 @@ OFF = 1.3  # from a place to where its name may begin
 GAPS = (1.1, 1.7, np.inf)  # from name to name, or what there is all around; at the wider ones their ways turn evenly
 EVENED = 6  # times
 MANY = 24  # names: where more find no room, the drawing needs a larger scale, not other places for them
-FARTHEST = 8.0  # from a place to where its name's own line begins
+FARTHEST = 8.0  # from a place to the start of its name's line
 
 
 @dataclass(frozen=True)
@@ -294,10 +294,10 @@ def callouts(
 ) -> list[Callout]:
     """Names of the places (k, 2) of one outline, in the order of a walk around it; takes their room.
 
-    Each stands on a line of its own, side by side with its neighbours', and a little farther along it where it would
-    cover a text or one of `lines` (m, 2, 2). Where not all find room, in an opening, they are written smaller,
-    or spaced wider; one that finds none yet stands wherever there is some next to its place, and is left out where
-    there is none, or where it is one of more than MANY.
+    Each name has a line, next to its neighbours' lines, and stands farther along it where it would cover a text or one
+    of `lines` (m, 2, 2). Where not all find room, in an opening, they are written smaller or spaced wider. A name that
+    still finds no room on its line is put anywhere near its place; it is left out if there is no room, or if there are
+    more than MANY such names.
 
     Parameters
     ----------
@@ -337,10 +337,10 @@ class _Tried:
 def _tried(
     names: Sequence[str], places: Floats, away: Floats, size: float, gap: float, room: Room, lines: Floats
 ) -> _Tried:
-    mine = Room(4 * size, room)
+    taken = Room(4 * size, room)
     starts, ways = _slots(places, away, size, gap)
-    labels = [_free(*one, size, mine, lines) for one in zip(names, places, starts, ways, strict=True)]
-    return _Tried(labels, size, mine)
+    labels = [_free(*slot, size, taken, lines) for slot in zip(names, places, starts, ways, strict=True)]
+    return _Tried(labels, size, taken)
 
 
 def _elsewhere(
@@ -356,9 +356,9 @@ def _elsewhere(
 
 
 def _slots(places: Floats, away: Floats, size: float, gap: float) -> tuple[Floats, Floats]:
-    """Where each name's own line begins (k, 2), off the outline and apart from its neighbours', and its way (k, 2).
+    """Start (k, 2) of each name's line, off the outline and apart from its neighbours', and its direction (k, 2).
 
-    gap : from one to the next, in text sizes; as far as all around allows if that is less.
+    gap : from a name to the next, in text sizes; less if the outline is too short.
     """
     for _ in range(EVENED if gap > GAPS[0] else 0):
         away = _unit(np.roll(away, 1, axis=0) + 2 * away + np.roll(away, -1, axis=0))
@@ -388,7 +388,7 @@ def _free(name: str, place: Floats, start: Floats, way: Floats, size: float, roo
     lines = lines_near(lines, start, 2 * half + CLOSE * size) if near else lines
     for step in range(CLOSE if near and room.free(foot) else 0):
         label = Label(name, start + (half + 0.5 * step * size) * way, angle, start, moved=True)
-        if fits(label, size, room, lines):
+        if fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):
             room.take(foot)
             take(label, size, room)
             return label

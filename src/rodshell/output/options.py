@@ -25,7 +25,7 @@ class DrawingStyle:
     ----------
     paper : of the PDF's sheets, landscape: A4 to A0.
     project, revision : for the title block.
-    tolerance : to which lengths are to be kept [m], and by which they are rounded (see `wording.rounding_of`); None:
+    tolerance : of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
         the title block says that it is not given.
     layers : for some of the layers (CUT, MARK, LABEL, BOUNDARY-FLAT, BOUNDARY-FINAL, DIM, TITLE) another name.
     name : of the drawings; "": the target's. author : for the title block.
@@ -74,7 +74,7 @@ class OutputOptions:
     strength : of the rods' material [Pa], by which utilisation is counted; None: it is not counted.
     stages : equilibria of the deployment from flat; 0: it is not followed.
     rod_chosen : which of the rod's "material" and "section" the program chose to fit the target.
-    shear_strength : of the rods' material [Pa], beside its `strength`; None: stress is counted by von Mises.
+    shear_strength : of the rods' material [Pa], in addition to `strength`; None: stress is counted by von Mises.
     strength_of : the preset material that the strengths are of, where they were not given.
     """
 

@@ -48,6 +48,10 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 
     All final shapes share one view, as the stages of the deployment do, and all shapes one colour scale.
 
+    Parameters
+    ----------
+    colour : of the rods: "gap" to the target (without a target: height), or "stress".
+
     Raises
     ------
     OutputError : the archive has no such state.
@@ -56,7 +60,7 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 
 
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
-    """A picture as a drawing in units of about a pixel, y up, on a ground of paper."""
+    """The same as a drawing in units of about a pixel, y up, on a ground of paper."""
     shape, rods = shape_of(archive, state), rods_of(archive)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
@@ -107,7 +111,7 @@ def _pieces(archive: Archive) -> Pieces:
     for length in lengths:
         drawn.append(first + np.unique([*range(0, length - 1, stride), length - 1][:length]))
         first += length
-    owner = np.repeat(np.arange(len(lengths)), [len(own) for own in drawn[1:]])
+    owner = np.repeat(np.arange(len(lengths)), [len(entries) for entries in drawn[1:]])
     begins = np.flatnonzero(owner[1:] == owner[:-1])
     return Pieces(np.concatenate(drawn).astype(np.intp), begins, owner[begins])
 
@@ -146,7 +150,7 @@ class _Rods:
             shade = np.rint(0.5 * (bins[pieces.first] + bins[pieces.first + 1])).astype(np.intp)
             palette, fade = scale.palette, FADE
         pen = float(np.clip(0.12 * WIDTH / max(len(rods), 1), 0.45, 1.7))
-        halos, lines = (_polylines(pieces, layer, one) for one in (np.zeros_like(shade), shade))
+        halos, lines = (_polylines(pieces, layer, shades) for shades in (np.zeros_like(shade), shade))
         return _Rods(view.project(shape.positions)[nodes], halos, lines, palette, fade, pen)
 
     def draw(self, pencil: Pencil, layers: range) -> None:
@@ -179,8 +183,8 @@ def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
     begin, end = (np.concatenate(parts)[: len(first)] for parts in (([0], ends + 1), (ends, [len(first) - 1])))
     columns = (layer[begin], shade[begin], first[begin], first[end] + 2)
     lines: Polylines = [[] for _ in range(LAYERS)]
-    for depth, own, low, high in zip(*(column.tolist() for column in columns), strict=True):
-        lines[depth].append((own, slice(low, high)))
+    for depth, colour, low, high in zip(*(column.tolist() for column in columns), strict=True):
+        lines[depth].append((colour, slice(low, high)))
     return lines
 
 
@@ -214,7 +218,7 @@ def _dot(pencil: Pencil, at: Floats, radius: float, pen: Pen) -> None:
 
 
 def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None:
-    """A ring around the largest gap, and its size: the agreement's own, which also looks between the nodes."""
+    """A ring around the largest gap, and its size, both from the agreement."""
     assert shape.gap is not None
     gap, at = largest_gap(archive, shape)
     if abs(gap) <= FINEST:

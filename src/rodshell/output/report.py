@@ -1,4 +1,4 @@
-"""The report: one page that needs nothing else, neither files nor a network."""
+"""The report: one self-contained page."""
 
 from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
@@ -20,12 +20,12 @@ from rodshell.results.checked import Clearance, Reactions, Stock
 from rodshell.results.inputs import shown_case
 from rodshell.results.records import Agreement, Drape, Ends, PopUp, Record
 from rodshell.results.verdict import ENDS, facts, unknown_below
-from rodshell.results.wording import Rounding, percent, rounding_of, stage
+from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
 
 IN_PAGE = ("supports", "elevations", "erection")
 FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends{gaps}."
 PARTLY = (
-    "Below {share} of the deployment no stage could be found: nothing is known there. Above, every one is an "
+    "Below {share} of the deployment no stage could be found: nothing is known there. Above, every stage is an "
     "equilibrium of the elastic grid with pinned ends{gaps}."
 )
 SNAPS = "; at {places} of the deployment the shell snaps forward"
@@ -105,11 +105,11 @@ def _note(archive: Archive) -> str:
         return NOT_FOLLOWED
     gaps = ""
     if deployment.snaps:
-        gaps += SNAPS.format(places=", ".join(stage(start) for start, _ in deployment.snaps))
+        gaps += SNAPS.format(places=", ".join(whole_percent(start) for start, _ in deployment.snaps))
     if deployment.guided:
         start, stop = deployment.guided
-        gaps += GUIDED.format(start=stage(start), stop=stage(stop))
-    return (PARTLY if unknown else FOLLOWED).format(share=stage(unknown), gaps=gaps)
+        gaps += GUIDED.format(start=whole_percent(start), stop=whole_percent(stop))
+    return (PARTLY if unknown else FOLLOWED).format(share=whole_percent(unknown), gaps=gaps)
 
 
 def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
@@ -131,7 +131,7 @@ def _plan_of(stock: Stock) -> str:
     """How good a cutting plan is."""
     return (
         f"First fit decreasing: {len(stock.bars)} bars, {percent(stock.waste)} waste. By the pieces' total "
-        f"length alone it takes {stock.fewest} bars; that is a bound, which no plan need reach."
+        f"length alone it takes {stock.fewest} bars; that is a lower bound, which may not be reachable."
     )
 
 
@@ -192,7 +192,7 @@ _BENDING: tuple[Entry, ...] = (
     ("Largest stress, bending, axial and torsion", "max_stress", wording.stress),
     ("\N{EN DASH} of torsion alone", "torsion_stress", wording.stress),
     ("Utilisation of the strength", "utilisation", wording.percent),
-    ("Sharpest at this share of the deployment", "share", wording.stage),
+    ("Sharpest at this share of the deployment", "share", wording.whole_percent),
 )
 _REACTIONS: tuple[Entry, ...] = (
     ("Largest support force", "largest_force", wording.newtons),
@@ -233,7 +233,7 @@ def checks_table(results: Results) -> dict[str, Any] | None:
     rows += _side_by_side(_CLEARANCE, [found or Clearance() for found in near], rounding)
     held = {str(end): reactions for end, reactions in results.reactions.items()}
     rows += _side_by_side(_REACTIONS, [held.get(column) or Reactions() for column in columns], rounding)
-    deployment = f"deployment above {stage(unknown)}" if unknown else "deployment"
+    deployment = f"deployment above {whole_percent(unknown)}" if unknown else "deployment"
     heads = [deployment if column == stages else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None
 
@@ -273,7 +273,7 @@ def _shown(show: Callable[[Any], str], value: Any, rounding: Rounding) -> str:
 
 
 def _side_by_side(listed: tuple[Entry, ...], records: Sequence[Record], rounding: Rounding) -> Columns:
-    """A row for each figure that is known of one of the records."""
+    """A row for each figure that is known of at least one record."""
     rows = Columns()
     for title, name, show in listed:
         values = [getattr(record, name) for record in records]
@@ -288,10 +288,14 @@ def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> 
     if not any(found):
         return []
     shares = [wording.share_of_weight(weight) if weight else wording.UNKNOWN for weight in found]
-    sunk = [_shown(wording.millimetres, weight.deflection if weight else None, rounding) for weight in found]
+    deflections = [_shown(wording.millimetres, weight.deflection if weight else None, rounding) for weight in found]
     whose = "the weakest patch, its seam held," if results.patches else "it"
     rows = [(f"Own weight that {whose} bears", shares)]
-    return rows if set(sunk) == {wording.UNKNOWN} else [*rows, ("Largest deflection under its own weight", sunk)]
+    return (
+        rows
+        if set(deflections) == {wording.UNKNOWN}
+        else [*rows, ("Largest deflection under its own weight", deflections)]
+    )
 
 
 def _listed(record: Record | None, listed: tuple[Entry, ...], rounding: Rounding) -> list[Row]:

@@ -82,7 +82,7 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
 
 
 def joints_table(archive: Archive, *, brief: bool = False) -> Table:
-    """One row a joint: where it is on both rods, in plan and in space, the angle between them, and which is over.
+    """One row a joint: where it is on both rods, in plan and in space, the angle between them, and the upper rod.
 
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines. Each entry of
     `columns` is a name and what it says of a joint: more may be added there.
@@ -154,7 +154,7 @@ _REACTIONS = (("force", "N"), ("moment", "Nm"))
 
 
 def seam_meetings(results: Results) -> Iterator[tuple[str, Meeting]]:
-    """Every place where rods of two patches meet, with its number: the seam's, and its own along the seam."""
+    """Every place where rods of two patches meet, with its number: that of the seam and that along the seam."""
     for number, seam in enumerate(results.seams, start=1):
         for k, meeting in enumerate(seam.meetings, start=1):
             yield f"{number}.{k}", meeting

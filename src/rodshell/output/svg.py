@@ -1,4 +1,4 @@
-"""Writing SVG: elements with escaped attributes and text, short numbers, and whole drawings."""
+"""A drawing as SVG, and what other SVG files are written with: elements, escaped texts, short numbers."""
 
 import re
 from collections.abc import Iterator
@@ -13,11 +13,11 @@ from rodshell.output.drawing import LAYERS, PAPER, Drawing, Mark, Path, Pen, Tex
 ZEROS = re.compile(r"\.00(?!\d)|(\.\d)0(?!\d)")
 MINUS_ZERO = re.compile(r"-0(?![.\d])")
 FLIP = np.array([1.0, -1.0])
-SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
+SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans Condensed', sans-serif"
 
 
 def number(value: float, digits: int = 2) -> str:
-    """`value` with at most `digits` decimals, as short as can be."""
+    """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0"."""
     text = f"{value:.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
@@ -25,7 +25,14 @@ def number(value: float, digits: int = 2) -> str:
 
 
 def tag(name: str, *children: str, **attributes: Any) -> str:
-    """An element; `children` are markup, attribute names take - for _, and lose one at their end."""
+    """An element.
+
+    Parameters
+    ----------
+    name : such as "path".
+    children : markup that it holds.
+    attributes : "-" is written "_"; a "_" at the end, which Python's own words need, is dropped: `class_`.
+    """
     words = [name]
     for key, value in attributes.items():
         shown = value if isinstance(value, str) else number(value, 3)
@@ -35,12 +42,25 @@ def tag(name: str, *children: str, **attributes: Any) -> str:
 
 
 def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:
-    """One line of text with its baseline at (x, y)."""
+    """One line of text.
+
+    Parameters
+    ----------
+    x, y : where its baseline begins [units of the view box], y down.
+    size : of the font [units].
+    """
     return tag("text", escape(text), x=x, y=y, font_size=size, **attributes)
 
 
 def document(view: tuple[float, float, float, float], *children: str, unit: str = "") -> str:
-    """A complete SVG with the view box x, y, width, height; its size is the box's, in `unit`."""
+    """A complete SVG file.
+
+    Parameters
+    ----------
+    view : x, y, width and height of the view box.
+    children : markup.
+    unit : of the file's size, which is that of the view box: "mm", or "" for pixels.
+    """
     x, y, width, height = (number(value, 3) for value in view)
     body = "\n".join(child for child in children if child)
     return (
@@ -50,15 +70,18 @@ def document(view: tuple[float, float, float, float], *children: str, unit: str 
 
 
 def inline(svg: str) -> str:
-    """A document as part of an HTML page, where the namespace is known and the size is the page's choice."""
+    """A complete SVG as part of an HTML page, without namespace and size: the page sets the size."""
     head, rest = svg.split("viewBox", 1)
     return f"<svg viewBox{rest}" if head.startswith("<svg") else svg
 
 
 def drawing_svg(drawing: Drawing, *, scale: str = "1:1 in mm") -> str:
-    """A drawing at true scale: one unit is one millimetre, y points up (drawn as -y). A group a layer and pen.
+    """An SVG file at true scale, a unit a millimetre; neighbours of one layer and pen are one path or group.
 
-    scale : what its title says of its size, which is true of the file and not of a page that shows it.
+    Parameters
+    ----------
+    drawing : y up; paths in space are not drawn.
+    scale : named in the title. It is that of the file: a page may show it in any size.
     """
     margin = 2 * drawing.text
     low, high = drawing.box()
@@ -74,14 +97,17 @@ def drawing_svg(drawing: Drawing, *, scale: str = "1:1 in mm") -> str:
 
 
 def picture_document(drawing: Drawing) -> str:
-    """A picture: as large as its page likes."""
+    """An SVG file of a picture, which has no scale.
+
+    drawing : in units of about a pixel, y up.
+    """
     low, high = drawing.box()
     view = (float(low[0]), float(-high[1]), *(high - low).tolist())
     return document(view, *_shapes(drawing), *(_text(text) for text in drawing.texts))
 
 
 def _shapes(drawing: Drawing) -> Iterator[str]:
-    """Neighbours with one layer and one pen: as one path, or as a group where some have names or notes."""
+    """Neighbours of one layer and pen: as one path, or as a group where some have names or notes."""
     items: list[Path | Mark] = [*(path for path in drawing.paths if path.flat), *drawing.marks]
     for (layer, pen), group in groupby(items, key=lambda item: (item.layer, drawing.pen(item))):
         members = list(group)
@@ -94,7 +120,7 @@ def _shapes(drawing: Drawing) -> Iterator[str]:
 
 
 def _data(path: Path) -> str:
-    """Data of an anonymous path, to 0.01 of a unit, not yet shortened."""
+    """Data of a path without a name, to 0.01 of a unit, not yet shortened."""
     flipped = (path.points * FLIP).ravel().tolist()
     words = "L".join(["%.2f %.2f"] * len(path.points)) % tuple(flipped)
     return f"M{words}Z" if path.closed else f"M{words}"

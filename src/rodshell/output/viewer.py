@@ -1,6 +1,6 @@
 """What the report's 3D view shows: the shapes from flat to popped, as small as a picture needs them.
 
-Each frame is a shape that was computed; the view goes from one to the next and draws nothing between them.
+Each frame is a shape that was computed; the view steps from frame to frame and draws nothing between them.
 """
 
 import base64
@@ -32,8 +32,10 @@ def viewer_data(archive: Archive) -> dict[str, Any] | None:
     cloud = np.concatenate([shape.positions[nodes] for shape in shapes])
     low, size = cloud.min(axis=0), float(np.ptp(cloud, axis=0).max())
     scales = [_scales(archive, shape) for shape in shapes]
-    frames = [_frame(shape, own, nodes, entries, low, size) for shape, own in zip(shapes, scales, strict=True)]
-    kinds = {kind: scale for own in scales for kind, scale in own.items()}
+    frames = [
+        _frame(shape, coloured, nodes, entries, low, size) for shape, coloured in zip(shapes, scales, strict=True)
+    ]
+    kinds = {kind: scale for coloured in scales for kind, scale in coloured.items()}
     return {
         "frames": frames,
         "palettes": {kind: scale.palette for kind, scale in kinds.items()},
@@ -50,7 +52,7 @@ def viewer_json(data: dict[str, Any]) -> str:
 
 
 def _frame_shape(archive: Archive, name: str) -> Shape:
-    """The flat grid is shown where the way up begins."""
+    """The flat grid is shown where the deployment begins."""
     shape = shape_of(archive, name)
     if shape.flat and "history" in archive.states:
         return Shape("flat", shape.caption, np.asarray(archive.states["history"][0], dtype=float))
@@ -67,7 +69,7 @@ def _entries(lengths: list[int]) -> tuple[Ints, list[int]]:
 
 
 def _scales(archive: Archive, shape: Shape) -> dict[Colour, Scale]:
-    """What the shape is coloured by; its scales are its own."""
+    """Scales by which the shape is coloured."""
     kinds: tuple[Colour, ...] = () if shape.flat else ("stress", "gap")
     found = {colour: scale_of(archive, shape, colour) for colour in kinds}
     return {colour: scale for colour, scale in found.items() if scale is not None}

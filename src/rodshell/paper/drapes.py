@@ -1,6 +1,6 @@
-"""The paper's targets draped by its own method, by gravity statics and bound: rod ends against the net's."""
+"""Figures 6 and 7: the paper's targets draped by its method, by gravity statics and bound, against the exact net."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -10,49 +10,51 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.formfinding import Bound, Draped, Fall, Gravity, Method, Trimmed, drape, trim
 from rodshell.formfinding.methods import MethodName
-from rodshell.layout import FlatRod, GridLayout
+from rodshell.formfinding.progress import Progress
+from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets import chebyshev_net
-from rodshell.rods.materials import Material
-from rodshell.rods.section import Circle, Rod
-from rodshell.targets import Target
+from rodshell.paper.cases import CASES, HEIGHT, ROD, WIDE_CASES, Case
+from rodshell.paper.figure import Figure
+from rodshell.paper.genetic_records import stored_footprint
+from rodshell.paper.plotting import (
+    FINAL,
+    FLAT,
+    INK,
+    PanelScale,
+    closed,
+    dots,
+    from_above,
+    rod_lines,
+    rows_of_panels,
+    standing,
+)
 
-Progress = Callable[[str, str, float], None]
-
-ROD = Rod(Circle(radius=1e-3), Material(youngs_modulus=1e6, density=1e3))  # [HQK 3.2]
-LENGTH, HEIGHT = 1.2, 0.05  # [m]
-EDGE = 0.015  # [m]; the paper's "8000 DOFs" are this mesh, its stated 5 mm have four times as many
 FALL = Fall(height=HEIGHT, drag=3.0)  # shared DOFs: the paper's *mapping*
 METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")
 WORDS = {"paper": "paper's, in time", "gravity": "gravity statics", "bound": "bound to the target"}
 COLUMNS = (
     "target", "rods", "method", "unknowns", "time [s]", "ends off the net, max [mm]", "rms [mm]", "how it rests",
 )  # fmt: skip
+TITLES = (
+    "1  the flat grid above the target",
+    "2  draped",
+    "3  trimmed",
+    "4  ends of the drape (dots), of the exact net (dashed)",
+)
+WITH_SOUGHT = "4  drape (dots), net (dashed), genetic (violet)"
 
 
 @dataclass(frozen=True)
-class Case:
-    """A target and a grid: `label` is its letter in the paper's figure."""
-
-    label: str
-    target: Target
-    rods: tuple[int, int]
-    spacing: float = 0.03
-    edge: float = EDGE
-
-    @property
-    def layout(self) -> GridLayout:
-        return GridLayout.orthogonal(rods=self.rods, spacing=self.spacing, edge=self.edge, length=LENGTH)
-
-
-@dataclass(frozen=True)
-class Drape:
+class DrapeRun:
     """One case by one method.
 
     Parameters
     ----------
-    seconds : of drape, trim and map back.
-    ends : (m, 2) start and end of each rod where this drape crosses the target's end: those of G0, but by method
-        bound, whose G0 is that of the net it started from, the drape's own [m].
+    case, method : what was draped, and how.
+    draped, trimmed : the result.
+    seconds : time of drape and trim.
+    ends : (m, 2) start and end of each rod at the target's end [m]: those of G0; for the bound drape, whose G0 is that
+        of the net, those of the draped rods.
     net : (m, 2) those of the exact net [m].
     """
 
@@ -66,12 +68,12 @@ class Drape:
 
     @property
     def errors(self) -> Floats:
-        """(2m,) how far the drape's rod ends lie beyond the net's [m]."""
+        """(2m,) distance by which the rod ends of the drape lie beyond those of the net [m]."""
         return np.column_stack([self.net[:, 0] - self.ends[:, 0], self.ends[:, 1] - self.net[:, 1]]).ravel()
 
     @property
-    def rests(self) -> str:
-        """In a few words."""
+    def rest(self) -> str:
+        """Whether it is at rest, and stable, in a few words."""
         rest = self.draped.rest
         if rest is not None:
             if not rest.at_rest:
@@ -85,16 +87,16 @@ class Drape:
         return ("stable" if modes == 0 else f"{modes} negative modes") + held
 
     def row(self) -> tuple[str, ...]:
-        """Of the table."""
+        """Its row of the table."""
         error = 1e3 * np.abs(self.errors)
         return (
             f"({self.case.label}) {self.case.target.name}, {1e3 * self.case.spacing:g} mm",
             f"{self.case.rods[0]}x{self.case.rods[1]}", WORDS[self.method], str(self.draped.report.dofs),
-            f"{self.seconds:.3g}", f"{error.max():.2f}", f"{np.sqrt(np.mean(error**2)):.2f}", self.rests,
+            f"{self.seconds:.3g}", f"{error.max():.2f}", f"{np.sqrt(np.mean(error**2)):.2f}", self.rest,
         )  # fmt: skip
 
     def result(self) -> dict[str, Any]:
-        """Of result.json, SI."""
+        """Its part of result.json, SI."""
         rods = self.trimmed.mesh.grid.rods
         return {
             "case": self.case.label, "target": self.case.target.parameters(), "method": self.method,
@@ -110,24 +112,143 @@ class Drape:
 
 def drape_all(
     cases: Sequence[Case], progress: Progress, *, fall: Fall = FALL, methods: Sequence[MethodName] = METHODS
-) -> tuple[Drape, ...]:
-    """Every case by every method."""
+) -> tuple[DrapeRun, ...]:
+    """Every case by every method, the falls with the settings `fall`.
+
+    Parameters
+    ----------
+    cases : targets and grids.
+    progress : is called at each iteration.
+    fall : settings of the paper's method.
+    methods : by which each case is draped.
+    """
     return tuple(_drape(case, method, fall, progress) for case in cases for method in methods)
 
 
-def _drape(case: Case, method: MethodName, fall: Fall, progress: Progress) -> Drape:
-    def told(stage: str, detail: str, residual: float) -> None:
+def _drape(case: Case, method: MethodName, fall: Fall, progress: Progress) -> DrapeRun:
+    def case_progress(stage: str, detail: str, residual: float) -> None:
         progress(f"({case.label}) {case.target.name}, {stage}", detail, residual)
 
     begun = perf_counter()
     options: dict[MethodName, Method] = {"paper": fall, "gravity": Gravity(), "bound": Bound()}
-    draped = drape(case.layout, ROD, case.target, method=options[method], progress=told)
+    draped = drape(case.layout, ROD, case.target, method=options[method], progress=case_progress)
     trimmed = trim(draped)
     seconds = perf_counter() - begun
     exact: dict[str, FlatRod] = {rod.name: rod for rod in chebyshev_net(case.target, case.layout).rods}
     rods = trimmed.mesh.grid.rods
-    ends, net = (np.array([[rod.start, rod.end] for rod in some]) for some in (rods, [exact[r.name] for r in rods]))
+    of_net = [exact[rod.name] for rod in rods]
+    ends, net = (np.array([[rod.start, rod.end] for rod in found]) for found in (rods, of_net))
     if draped.figures.net_deviation is not None:
         past = dict(zip([rod.name for rod in draped.rods], draped.figures.net_deviation, strict=True))
         ends += np.array([past[rod.name] for rod in rods]) * [-1.0, 1.0]
-    return Drape(case, method, draped, trimmed, seconds, ends, net)
+    return DrapeRun(case, method, draped, trimmed, seconds, ends, net)
+
+
+def rows_svg(drapes: Sequence[DrapeRun]) -> str:
+    """A row of four panels for each drape: setup, draped, trimmed, and the flat grid with its ends.
+
+    Parameters
+    ----------
+    drapes : one for each row.
+    """
+    rows = []
+    for run in drapes:
+        name, spacing = run.case.target.name, 1e3 * run.case.spacing
+        title = f"({run.case.label})  {name}, spacing {spacing:g} mm: {WORDS[run.method]}"
+        captions = TITLES if _sought(run) is None else (*TITLES[:3], WITH_SOUGHT)
+        rows.append((title, list(zip(captions, _panels(run), strict=True))))
+    return rows_of_panels(rows)
+
+
+def _panels(run: DrapeRun) -> list[list[str]]:
+    target, whole, cut = run.case.target, run.draped.mesh, run.trimmed
+    top = float(target.lift(np.array([target.summit]))[0, 2])
+    above = whole.flat + [*target.summit, top + HEIGHT]
+    return [
+        standing(target, whole, above, hides=False),
+        standing(target, whole, run.draped.positions),
+        standing(target, cut.mesh, cut.positions),
+        _plan(run),
+    ]
+
+
+def _plan(run: DrapeRun) -> list[str]:
+    """The trimmed grid in its plane, the drape's ends, those of the net and those that the genetic algorithm found."""
+    mesh, sought = run.trimmed.mesh, _sought(run)
+    ends, net = (from_above(_in_the_grid(mesh.grid, spans)) for spans in (run.ends, run.net))
+    others = [] if sought is None else [from_above(sought)]
+    to_panel = PanelScale(np.vstack([ends, net, *others]))
+    dashed = closed(to_panel(net), INK, stroke_dasharray="5 3")
+    found = [closed(to_panel(other), FINAL) for other in others]
+    return [*rod_lines(mesh, to_panel(from_above(mesh.flat))), *found, dashed, *dots(to_panel(ends), FLAT)]
+
+
+def _sought(run: DrapeRun) -> Floats | None:
+    """(2m, 2) G0 by the genetic algorithm [m], if a search has been stored for this target with these rods."""
+    found = stored_footprint(run.case.target.name)
+    return found if found is not None and len(found) == 2 * sum(run.case.rods) else None
+
+
+def _in_the_grid(grid: FlatGrid, ends: Floats) -> Floats:
+    """(2m, 2) ends of rods (m, 2) in the plane of the flat grid [m]."""
+    along, across = ends.ravel(), np.repeat([rod.offset for rod in grid.rods], 2)
+    of_u = np.repeat([rod.family == "u" for rod in grid.rods], 2)
+    return np.column_stack([np.where(of_u, along, across), np.where(of_u, across, along)])
+
+
+@dataclass(frozen=True)
+class DrapeFigure(Figure):
+    """Every case by every method.
+
+    Parameters
+    ----------
+    name : of the figure, such as "fig6".
+    title : above the table.
+    drapes : case by case, each by every method.
+    """
+
+    name: str
+    title: str
+    drapes: tuple[DrapeRun, ...]
+    columns = COLUMNS
+
+    @property
+    def status(self) -> str:
+        """ "converged", or which drape did not come to rest."""
+        for run in self.drapes:
+            if not run.draped.converged:
+                return f"({run.case.label}) by method {run.method} {run.draped.report.status.sentence}"
+        return "converged"
+
+    def heading(self) -> str:
+        """The title."""
+        return self.title
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """The table, a row for each case and method."""
+        return [run.row() for run in self.drapes]
+
+    def content(self) -> dict[str, Any]:
+        """The drapes."""
+        return {"drapes": [run.result() for run in self.drapes]}
+
+    def pictures(self) -> dict[str, str]:
+        """The paper's method in NAME.svg, each other method in NAME-METHOD.svg."""
+        return {
+            self.name if method == "paper" else f"{self.name}-{method}": rows_svg(
+                [run for run in self.drapes if run.method == method]
+            )
+            for method in METHODS
+        }
+
+
+def make_fig6(progress: Progress) -> DrapeFigure:
+    """Figure 6: the three targets, from the flat grid to G0 [HQK 3.2]."""
+    title = "Fig 6 [HQK 3.2]: from the flat grid to G0, by three methods; where each ends against the inextensible net"
+    return DrapeFigure("fig6", title, drape_all(CASES, progress))
+
+
+def make_fig7(progress: Progress) -> DrapeFigure:
+    """Figure 7: the hemisphere with wider spacings [HQK 3.2]."""
+    title = "Fig 7 [HQK 3.2]: the hemisphere at spacings of 4 and 5 cm, by three methods; ends against the net's"
+    return DrapeFigure("fig7", title, drape_all(WIDE_CASES, progress))

@@ -1,11 +1,10 @@
 """Figure 1: three shells, and the boundaries between which their rods' ends move [HQK 1].
 
-The shells are popped up, as in the paper, their ends pinned on G; ends held in the rods' direction stand beside them
-in the table.
+The shells are popped up, as in the paper, with their ends pinned on G; the table also has clamped ends, which hold the
+rods' direction.
 """
 
 from dataclasses import dataclass, replace
-from os import PathLike
 from time import perf_counter
 from typing import Any
 
@@ -13,12 +12,22 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.formfinding import PatchForm, find_stages
+from rodshell.formfinding.progress import Progress
 from rodshell.output.svg import tag
-from rodshell.paper.drapes import ROD, Case, Progress
-from rodshell.paper.fig6 import CASES
-from rodshell.paper.panels import FINAL, FLAT, SOFT, Place, closed, dots, from_above, rods, rows_of_panels, standing
-from rodshell.paper.tables import aligned, result_of, write
-from rodshell.results.folder import ResultFolder
+from rodshell.paper.cases import CASES, ROD, Case
+from rodshell.paper.figure import Figure
+from rodshell.paper.plotting import (
+    FINAL,
+    FLAT,
+    SOFT,
+    PanelScale,
+    closed,
+    dots,
+    from_above,
+    rod_lines,
+    rows_of_panels,
+    standing,
+)
 
 EDGE = 0.005  # [m], the paper's
 TITLE = "Fig 1 [HQK]: three shells popped up, their ends moved from G0 to G"
@@ -33,8 +42,8 @@ ROWS = (
 
 
 @dataclass(frozen=True)
-class PoppedCase:
-    """One shell, and the seconds it took from target to popped up, pinned and clamped."""
+class PopUpCase:
+    """One shell, and the time from target to popped up, pinned and clamped [s]."""
 
     case: Case
     form: PatchForm
@@ -42,10 +51,11 @@ class PoppedCase:
 
     @property
     def stable(self) -> bool:
-        return all(one.report.stable for one in self.form.popped.values())
+        """Whether it is stable, pinned and clamped."""
+        return all(popup.report.stable for popup in self.form.popped.values())
 
     def row(self) -> tuple[str, ...]:
-        """Of the table."""
+        """Its row of the table."""
         grid, gaps = self.form.footprint.mesh.grid, self.form.agreement
         lengths = [1e3 * (rod.end - rod.start) for rod in grid.rods]
         curves = (self.form.footprint.points, self.form.trimmed.boundary.points)
@@ -53,17 +63,17 @@ class PoppedCase:
         return (
             self.case.target.name, f"{self.case.rods[0]}x{self.case.rods[1]}", str(len(grid.crossings.rods)),
             f"{min(lengths):.1f} to {max(lengths):.1f}", *(f"{area:.0f}" for area in areas),
-            *(f"{1e3 * one:.3f}" for ends in ("pinned", "clamped") for one in (gaps[ends].rms, gaps[ends].max)),
+            *(f"{1e3 * gap:.3f}" for ends in ("pinned", "clamped") for gap in (gaps[ends].rms, gaps[ends].max)),
             "yes" if self.stable else "no", f"{self.seconds:.2g}",
         )  # fmt: skip
 
     def result(self) -> dict[str, Any]:
-        """Of result.json, SI."""
+        """Its part of result.json, SI."""
         return {
             "case": self.case.label, "target": self.case.target.parameters(), "status": self.form.status,
             "stable": self.stable, "seconds": self.seconds, "footprint": self.form.footprint.points.tolist(),
             "boundary": self.form.trimmed.boundary.points.tolist(),
-            "gap": {ends: {"rms": one.rms, "max": one.max} for ends, one in self.form.agreement.items()},
+            "gap": {ends: {"rms": gap.rms, "max": gap.max} for ends, gap in self.form.agreement.items()},
         }  # fmt: skip
 
     def shell(self) -> list[str]:
@@ -72,68 +82,73 @@ class PoppedCase:
         return standing(self.case.target, popped.footprint.mesh, popped.positions)
 
     def plan(self) -> list[str]:
-        """The flat grid, G0 and G, and the ways of the rods' ends."""
+        """The flat grid, G0 and G, and the displacements of the rods' ends."""
         mesh = self.form.footprint.mesh
         start, end = (from_above(points) for points in (self.form.footprint.points, self.form.trimmed.boundary.points))
-        place = Place(np.vstack([start, end]))
-        start, end = place(start), place(end)
-        ways = [
+        to_panel = PanelScale(np.vstack([start, end]))
+        start, end = to_panel(start), to_panel(end)
+        displacements = [
             tag("line", x1=a[0], y1=a[1], x2=b[0], y2=b[1], stroke=SOFT, stroke_width=0.6, stroke_dasharray="2 2")
             for a, b in zip(start.tolist(), end.tolist(), strict=True)
         ]
-        grid = rods(mesh, place(from_above(mesh.flat)))
+        grid = rod_lines(mesh, to_panel(from_above(mesh.flat)))
         curves = [closed(start, FLAT), closed(end, FINAL, stroke_width=1.6)]
-        return [*grid, *ways, *curves, *dots(start, FLAT, 1.8), *dots(end, FINAL, 1.8)]
+        return [*grid, *displacements, *curves, *dots(start, FLAT, 1.8), *dots(end, FINAL, 1.8)]
 
 
 @dataclass(frozen=True)
-class Fig1:
-    """The three of them."""
+class Fig1(Figure):
+    """The three shells."""
 
-    shells: tuple[PoppedCase, ...]
+    shells: tuple[PopUpCase, ...]
+    name = "fig1"
+    columns = COLUMNS
 
     @property
     def status(self) -> str:
         """ "converged", or that of the first shell that is not."""
-        return next((one.form.status for one in self.shells if one.form.status != "converged"), "converged")
+        return next((shell.form.status for shell in self.shells if shell.form.status != "converged"), "converged")
+
+    def heading(self) -> str:
+        """The title."""
+        return TITLE
 
     def rows(self) -> list[tuple[str, ...]]:
         """The table, a row for each shell."""
-        return [one.row() for one in self.shells]
+        return [shell.row() for shell in self.shells]
 
-    def summary(self) -> str:
-        """The table as text."""
-        return f"{TITLE}\n\n{aligned(COLUMNS, self.rows())}"
+    def content(self) -> dict[str, Any]:
+        """The shells."""
+        return {"shells": [shell.result() for shell in self.shells]}
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        return result_of("fig1", self.status, shells=[one.result() for one in self.shells])
-
-    def picture(self) -> str:
+    def pictures(self) -> dict[str, str]:
         """The paper's layout: shells above, boundaries below."""
-        names = [f"{k}  {one.case.target.name}" for k, one in enumerate(self.shells, start=1)]
-        shells, plans = ([draw(one) for one in self.shells] for draw in (PoppedCase.shell, PoppedCase.plan))
+        names = [f"{k}  {shell.case.target.name}" for k, shell in enumerate(self.shells, start=1)]
+        shells, plans = ([draw(shell) for shell in self.shells] for draw in (PopUpCase.shell, PopUpCase.plan))
         above, below = (list(zip(names, panels, strict=True)) for panels in (shells, plans))
-        return rows_of_panels([(ROWS[0], above), (ROWS[1], below)])
-
-    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
-        """Write picture and tables to `folder`."""
-        write(folder, self.result(), self.summary(), COLUMNS, self.rows(), {"fig1": self.picture()})
+        return {"fig1": rows_of_panels([(ROWS[0], above), (ROWS[1], below)])}
 
 
 def make(progress: Progress, *, cases: tuple[Case, ...] = CASES, edge: float = EDGE) -> Fig1:
-    """Form and pop up all of them, the first twice: what it waits for once does not count."""
+    """Form and pop up all `cases` with edges of the length `edge` [m], the first twice: compilation does not count.
+
+    Parameters
+    ----------
+    progress : is called at each iteration.
+    cases : targets and grids.
+    edge : length of the edges [m].
+    """
     _popped(replace(cases[0], edge=edge), progress)
     return Fig1(tuple(_popped(replace(case, edge=edge), progress) for case in cases))
 
 
-def _popped(case: Case, progress: Progress) -> PoppedCase:
-    def told(stage: str, detail: str, residual: float) -> None:
+def _popped(case: Case, progress: Progress) -> PopUpCase:
+    def case_progress(stage: str, detail: str, residual: float) -> None:
         progress(f"{case.target.name}, {stage}", detail, residual)
 
     begun = perf_counter()
-    form = find_stages(case.target, case.layout, ROD, progress=told)
-    return PoppedCase(case, form, perf_counter() - begun)
+    form = find_stages(case.target, case.layout, ROD, progress=case_progress)
+    return PopUpCase(case, form, perf_counter() - begun)
 
 
 def _area(points: Floats) -> float:

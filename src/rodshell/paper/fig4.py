@@ -1,17 +1,23 @@
-"""Figure 4: does rod 2 follow, and how far behind? Both demonstrations, every coupling, linkers and pins; the files."""
+"""Figure 4: does rod 2 follow, and with what lag? Both demonstrations, every coupling, linkers and pins [HQK 2.3].
 
-from collections.abc import Callable, Sequence
+The pictures are instants in the paper's layout, an animation, and the lag against time.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
+from rodshell.arrays import Floats
+from rodshell.formfinding.progress import Progress
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
-from rodshell.paper.fig4_pictures import animation_svg, instants_svg, lag_svg
-from rodshell.paper.tables import aligned, result_of, write
-from rodshell.paper.two_rods import RATE, Demonstration, Run, run, run_statics
-from rodshell.results.folder import ResultFolder
+from rodshell.output.svg import document, label, number, tag
+from rodshell.output.view import RIGHT, UP
+from rodshell.paper.figure import Figure
+from rodshell.paper.plotting import INK, PAPER, SOFT
+from rodshell.paper.two_rods import EDGE, LENGTH, RATE, Demonstration, Run, run_in_time, run_statics
+from rodshell.results.wording import nice_ticks
 
 DEMONSTRATIONS: tuple[Demonstration, ...] = ("twisting", "bending")
 LETTER = {"twisting": "a", "bending": "b"}
@@ -20,76 +26,95 @@ COLUMNS = (
     "demonstration", "joint", "coupling", "step [ms]", "start-up lag [deg]", "steady lag [deg]",
     "rate error [%]", "rod 2 follows",
 )  # fmt: skip
-
-Progress = Callable[[str, str, float], None]
+FAINT = "#c9cdd0"
+RODS = ("#1f5f8b", "#a8552a")
+PANEL = 190.0  # drawing units
+GAP, TEXT, HEAD, FOOT = 14.0, 12.0, 44.0, 30.0
+INSTANTS = 5  # from the start to half a revolution
+FRAMES = 73  # of the animation
+LAG_CHART, CHART_EDGE = (380.0, 210.0), 56.0
+LOOKS = ((INK, "none"), ("#f28c3a", "5 4"), ("#39b5e6", "none"), ("#4cb873", "2 3"))  # colour and dashes of the lines
+TITLES = {
+    "twisting": "(a)  Rod 1 is twisted: \N{GREEK SMALL LETTER THETA}\u2081\u2081 = \N{GREEK SMALL LETTER OMEGA}t",
+    "bending": "(b)  Rod 1 is turned: x\u2081\u2081 circles at \N{GREEK SMALL LETTER OMEGA}",
+}
+SCALE = 0.92 * PANEL / LENGTH  # drawing units per metre
+BIG = 1.4  # panels of the animation, against those of the instants
 
 
 @dataclass(frozen=True)
-class Fig4:
-    """All runs of the figure. Each says itself whether rod 2 follows: not to follow is a result, too."""
+class Fig4(Figure):
+    """All runs of the figure. Each has whether rod 2 follows: not to follow is a result, too."""
 
     runs: tuple[Run, ...]
+    name = "fig4"
+    columns = COLUMNS
     status = "converged"
+
+    def heading(self) -> str:
+        """The motion of rod 1."""
+        turned = np.degrees(self.runs[0].prescribed[-1])
+        return f"Fig 4 [HQK 2.3]: rod 1 of two is driven at {RATE * 30 / np.pi:g} rpm, over {turned:.0f} degrees"
 
     def rows(self) -> list[tuple[str, ...]]:
         """The table, a row for each run."""
         return [
             (
-                f"({LETTER[one.demonstration]}) {one.demonstration}", one.joint, one.coupling,
-                "statics" if one.step is None else f"{1e3 * one.step:.3g}",
-                f"{np.degrees(one.start_up_lag):.3g}", f"{np.degrees(one.steady_lag):.2g}",
-                f"{100 * one.rate_error:.2g}", "yes" if one.follows else "no",
+                f"({LETTER[run.demonstration]}) {run.demonstration}", run.joint, run.coupling,
+                "statics" if run.step is None else f"{1e3 * run.step:.3g}",
+                f"{np.degrees(run.start_up_lag):.3g}", f"{np.degrees(run.steady_lag):.2g}",
+                f"{100 * run.rate_error:.2g}", "yes" if run.follows else "no",
             )
-            for one in self.runs
+            for run in self.runs
         ]  # fmt: skip
 
-    def summary(self) -> str:
-        """The table as text."""
-        turned = np.degrees(self.runs[0].prescribed[-1])
-        head = f"Fig 4 [HQK 2.3]: rod 1 of two is driven at {RATE * 30 / np.pi:g} rpm, over {turned:.0f} degrees"
-        return f"{head}\n\n{aligned(COLUMNS, self.rows())}"
-
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
+    def content(self) -> dict[str, Any]:
+        """The runs."""
         runs = [
             {
-                "demonstration": one.demonstration, "joint": one.joint, "coupling": one.coupling, "step": one.step,
-                "start_up_lag": one.start_up_lag, "steady_lag": one.steady_lag, "rate_error": one.rate_error,
-                "follows": one.follows,
+                "demonstration": run.demonstration, "joint": run.joint, "coupling": run.coupling, "step": run.step,
+                "start_up_lag": run.start_up_lag, "steady_lag": run.steady_lag, "rate_error": run.rate_error,
+                "follows": run.follows,
             }
-            for one in self.runs
+            for run in self.runs
         ]  # fmt: skip
-        return result_of("fig4", self.status, runs=runs)
+        return {"runs": runs}
 
-    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
-        """Write pictures, animation and tables to `folder`."""
-        shown = [self._first(*which) for which in SHOWN]
-        pictures = {
-            "fig4": instants_svg(shown), "fig4-animated": animation_svg(shown), "fig4-lag": lag_svg(self.runs),
-        }  # fmt: skip
-        angles = {
-            f"angles-{LETTER[one]}": _angles([run for run in self.runs if run.demonstration == one])
-            for one in DEMONSTRATIONS
+    def pictures(self) -> dict[str, str]:
+        """Instants, an animation, and the lag against time."""
+        shown = [self._first(demonstration, joint) for demonstration, joint in SHOWN]
+        return {"fig4": instants_svg(shown), "fig4-animated": animation_svg(shown), "fig4-lag": lag_svg(self.runs)}
+
+    def tables(self) -> Mapping[str, Iterable[Sequence[object]]]:
+        """The angles of both rods against time."""
+        return {
+            f"angles-{letter}": _angles([run for run in self.runs if run.demonstration == demonstration])
+            for demonstration, letter in LETTER.items()
         }
-        write(folder, self.result(), self.summary(), COLUMNS, self.rows(), pictures, angles)
 
     def _first(self, demonstration: Demonstration, joint: str) -> Run:
-        return next(one for one in self.runs if (one.demonstration, one.joint) == (demonstration, joint))
+        return next(run for run in self.runs if (run.demonstration, run.joint) == (demonstration, joint))
 
 
 def _angles(runs: Sequence[Run]) -> list[Sequence[object]]:
-    """Every run at the times of the motions; statics where they have an equilibrium."""
+    """The angles of every run at the times of the motions; of statics those of its equilibria."""
     times = runs[0].times
     columns = [np.round(times, 9).tolist(), np.degrees(runs[0].prescribed).tolist()]
-    for one in runs:
-        at = dict(zip(np.round(one.times, 6).tolist(), np.degrees(one.angles).tolist(), strict=True))
+    for run in runs:
+        at = dict(zip(np.round(run.times, 6).tolist(), np.degrees(run.angles).tolist(), strict=True))
         columns.append([at.get(time, "") for time in np.round(times, 6).tolist()])
-    head = ["time [s]", "rod 1 [deg]", *(f"rod 2 [deg]: {one.name}" for one in runs)]
+    head = ["time [s]", "rod 1 [deg]", *(f"rod 2 [deg]: {run.name}" for run in runs)]
     return [head, *zip(*columns, strict=True)]
 
 
 def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
-    """Run all of it, over so many revolutions."""
+    """All runs, over so many revolutions (`turns`).
+
+    Parameters
+    ----------
+    progress : is called before each run.
+    turns : revolutions of rod 1 [-].
+    """
     until = turns * 2 * np.pi / RATE
     couplings: tuple[Coupling, ...] = (SharedDofs(), ImplicitPenalty(), ExplicitPenalty())
     cases: list[tuple[Joint, Coupling]] = [(Linker(), coupling) for coupling in couplings]
@@ -97,8 +122,189 @@ def make(progress: Progress, *, turns: float = 1.0) -> Fig4:
     for demonstration in DEMONSTRATIONS:
         for joint, coupling in (*cases, (Pin(), SharedDofs())):
             progress(f"{demonstration}, {joint.name}, {coupling.name}", "in time", 0.0)
-            runs.append(run(demonstration, joint, coupling, until=until))
+            runs.append(run_in_time(demonstration, joint, coupling, until=until))
         for joint, coupling in cases[:2]:
             progress(f"{demonstration}, {joint.name}, {coupling.name}", "statics", 0.0)
             runs.append(run_statics(demonstration, joint, coupling, until=until))
     return Fig4(tuple(runs))
+
+
+# Pictures
+
+
+def instants_svg(runs: Sequence[Run]) -> str:
+    """A row for each run: the rods at a few instants, side by side."""
+    width, down, rows = INSTANTS * PANEL + (INSTANTS + 1) * GAP, 0.0, list[str]()
+    for run in runs:
+        top, height = _extent(run)
+        rows.append(tag("g", *_title(run), transform=f"translate({number(GAP)} {number(down)})"))
+        last = min(np.pi / RATE, run.times[-1])
+        for across, time in enumerate(np.linspace(0, last, INSTANTS)):
+            k = int(np.abs(run.times - time).argmin())
+            turned = f"{np.degrees(run.prescribed[k]):.0f}\N{DEGREE SIGN}"
+            caption = f"t = {number(run.times[k], 3)} s, \N{GREEK SMALL LETTER OMEGA}t = {turned}"
+            panel = [
+                *_scene(run),
+                *(_polyline(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
+                *_directors(run, k),
+                *(_dots(_projected(run.nodes[k, rod]), colour) for rod, colour in enumerate(RODS)),
+                *(_names(run) if across == 0 else ()),
+                label(caption, PANEL / 2, top + height + 18, TEXT, fill=INK, text_anchor="middle"),
+            ]
+            at = f"translate({number(GAP + across * (PANEL + GAP))} {number(down + HEAD - top)})"
+            rows.append(tag("g", *panel, transform=at))
+        down += HEAD + height + FOOT
+    return document((0, 0, width, down), _paper(width, down), *rows)
+
+
+def animation_svg(runs: Sequence[Run]) -> str:
+    """The runs side by side, in an endless loop; a browser plays it."""
+    width, height = len(runs) * BIG * PANEL + (len(runs) + 1) * GAP, HEAD + BIG * PANEL
+    panels = []
+    for across, run in enumerate(runs):
+        frames = np.unique(np.linspace(0, len(run.times) - 1, FRAMES).round().astype(int))
+        seconds = f"{number(float(run.times[-1]), 3)}s"
+        lines = [([_projected(run.nodes[k, rod]) for k in frames], RODS[rod], 4.0) for rod in range(2)]
+        if run.demonstration == "twisting":
+            ticks = [[_tick(run, k, edge) for k in frames] for edge in range(run.twists.shape[1])]
+            lines += [(tick, RODS[0], 1.6) for tick in ticks]
+        moving = [_polyline(drawn[0], colour, _moves(drawn, seconds), width=wide) for drawn, colour, wide in lines]
+        left = GAP + across * (BIG * PANEL + GAP)
+        panels.append(tag("g", *_title(run), transform=f"translate({number(left)} 0)"))
+        at = f"translate({number(left)} {number(HEAD)}) scale({BIG})"
+        panels.append(tag("g", *_scene(run), *moving, transform=at))
+    return document((0, 0, width, height), _paper(width, height), *panels)
+
+
+def lag_svg(runs: Sequence[Run], *, until: float = 0.4) -> str:
+    """Lag of rod 2 in the first moments `until` [s], of the runs in time in which it follows.
+
+    Parameters
+    ----------
+    runs : all of them.
+    until : end of the time axis [s].
+    """
+    shown = [run for run in runs if run.step is not None and run.follows]
+    looks = dict(zip(dict.fromkeys(run.name for run in shown), LOOKS, strict=False))
+    lags = np.concatenate([np.degrees(run.lag[run.times <= until]) for run in shown])
+    low, high = float(lags.min()), 1.08 * float(lags.max())
+    demonstrations = list(dict.fromkeys(run.demonstration for run in shown))
+    width, height = CHART_EDGE + len(demonstrations) * (LAG_CHART[0] + CHART_EDGE), LAG_CHART[1] + HEAD + 66
+    parts = [_paper(width, height)]
+    for across, demonstration in enumerate(demonstrations):
+        same = [run for run in shown if run.demonstration == demonstration]
+        left = CHART_EDGE + across * (LAG_CHART[0] + CHART_EDGE)
+        chart = _chart(same, looks, until, low, high)
+        title = label(TITLES[demonstration], 0, 20 - HEAD, TEXT + 1, fill=INK)
+        parts.append(tag("g", title, *chart, transform=f"translate({number(left)} {number(HEAD)})"))
+    for k, (name, (colour, dash)) in enumerate(looks.items()):
+        x, y = CHART_EDGE + 190 * k, height - 12
+        line = np.array([[x, y - 4], [x + 26, y - 4]])
+        parts += [_polyline(line, colour, width=1.8, dash=dash), label(name, x + 32, y, TEXT, fill=INK)]
+    return document((0, 0, width, height), *parts)
+
+
+def _chart(runs: Sequence[Run], looks: dict[str, tuple[str, str]], until: float, low: float, high: float) -> list[str]:
+    """Lag [degrees] against time [s]; the chart's corner is at (0, 0)."""
+    wide, tall = LAG_CHART
+
+    def height_of(value: float) -> float:
+        return tall * (high - value) / (high - low)
+
+    parts = [label("lag of rod 2, degrees", 0, 37 - HEAD, TEXT, fill=SOFT)]
+    for tick in nice_ticks(low, high, 5):
+        y, shown = height_of(tick), number(tick, 3).replace("-", "\N{MINUS SIGN}")
+        parts.append(tag("line", x1=0, y1=y, x2=wide, y2=y, stroke=FAINT, stroke_width=0.8))
+        parts.append(label(shown, -6, y + 4, TEXT, fill=SOFT, text_anchor="end"))
+    for tick in nice_ticks(0, until, 4):
+        x = wide * tick / until
+        parts.append(label(number(tick, 3), x, tall + 18, TEXT, fill=SOFT, text_anchor="middle"))
+    parts.append(label("time, s", wide, tall + 34, TEXT, fill=SOFT, text_anchor="end"))
+    for run in runs:
+        early, (colour, dash) = run.times <= until, looks[run.name]
+        heights = [height_of(value) for value in np.degrees(run.lag[early])]
+        line = np.column_stack([wide * run.times[early] / until, heights])
+        parts.append(_polyline(line, colour, width=1.8, dash=dash))
+    return parts
+
+
+def _title(run: Run) -> list[str]:
+    text = f"{run.joint}, {run.coupling}: rod 2 {'follows' if run.follows else 'stays behind'}"
+    return [
+        label(TITLES[run.demonstration], 0, 20, TEXT, fill=INK),
+        label(text, 0, 37, TEXT, fill=SOFT),
+    ]
+
+
+def _projected(points: Floats) -> Floats:
+    """(n, 2) drawing coordinates, y down, of points (n, 3) [m]; the joint is at the middle of a panel."""
+    return np.asarray(0.5 * PANEL + SCALE * np.column_stack([points @ RIGHT, -points @ UP]))
+
+
+def _paper(width: float, height: float) -> str:
+    return tag("rect", x=0, y=0, width=width, height=height, fill=PAPER)
+
+
+def _extent(run: Run) -> tuple[float, float]:
+    """Top and height of all that is drawn of a run."""
+    circle = _projected(_circle(run))[:, 1]
+    drawn = np.append(circle, _projected(run.nodes.reshape(-1, 3))[:, 1])
+    return float(drawn.min()) - 8, float(np.ptp(drawn)) + 16
+
+
+def _circle(run: Run) -> Floats:
+    """(n, 3) path of rod 2's ends."""
+    angle = np.linspace(0, 2 * np.pi, 73)
+    cos, sin, zero = 0.5 * LENGTH * np.cos(angle), 0.5 * LENGTH * np.sin(angle), np.zeros_like(angle)
+    return np.column_stack([zero, cos, sin] if run.demonstration == "twisting" else [cos, sin, zero])
+
+
+def _scene(run: Run) -> list[str]:
+    """What does not move: the initial rods, and the circle of their ends."""
+    still = [_polyline(_projected(_circle(run)), FAINT, width=1.0)]
+    moving = (0, 1) if run.demonstration == "bending" else (1,)
+    return still + [_polyline(_projected(run.nodes[0, rod]), FAINT, width=3.0) for rod in moving]
+
+
+def _tick(run: Run, k: int, edge: int) -> Floats:
+    """(2, 2) the first director of an edge of rod 1, which lies along -x as long as it is only twisted."""
+    middle = run.nodes[k, 0, edge : edge + 2].mean(axis=0)
+    angle = run.twists[k, edge]
+    director = np.array([0.0, np.sin(angle), np.cos(angle)])
+    return _projected(np.array([middle, middle + 0.55 * EDGE * director]))
+
+
+def _directors(run: Run, k: int) -> list[str]:
+    if run.demonstration != "twisting":
+        return []
+    return [_polyline(_tick(run, k, edge), RODS[0], width=1.6) for edge in range(run.twists.shape[1])]
+
+
+def _names(run: Run) -> list[str]:
+    """Labels of the first nodes of both rods."""
+    parts = []
+    for rod, name in enumerate(("x\u2081\u2081", "x\u2082\u2081")):
+        first, second = _projected(run.nodes[0, rod, :2])
+        out = first + 12 * (first - second) / np.linalg.norm(first - second)
+        parts.append(label(name, out[0], out[1] + 4, TEXT, fill=RODS[rod], text_anchor="middle"))
+    return parts
+
+
+def _points(points: Floats) -> str:
+    return " ".join(f"{number(x)},{number(y)}" for x, y in points)
+
+
+def _polyline(points: Floats, colour: str, *children: str, width: float = 4.0, dash: str = "none") -> str:
+    return tag(
+        "polyline", *children, points=_points(points), fill="none", stroke=colour, stroke_width=width,
+        stroke_linecap="round", stroke_linejoin="round", stroke_dasharray=dash,
+    )  # fmt: skip
+
+
+def _dots(points: Floats, colour: str) -> str:
+    return "".join(tag("circle", cx=x, cy=y, r=3.6, fill=PAPER, stroke=colour, stroke_width=1.5) for x, y in points)
+
+
+def _moves(drawn: Sequence[Floats], seconds: str) -> str:
+    values = ";".join(_points(points) for points in drawn)
+    return tag("animate", attributeName="points", values=values, dur=seconds, repeatCount="indefinite")

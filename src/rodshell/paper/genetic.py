@@ -1,13 +1,12 @@
-"""The genetic algorithm beside the direct method: both shells popped up, what each cost, and how far their G0 differ.
+"""The genetic algorithm and the direct method: both shells popped up, their cost, and the distance of their G0.
 
-The paper holds its G0 against that of a genetic algorithm [HQK 3.2, ref 30]. Ours is in `genetic_design` (what is
-sought) and `genetic_search` (the run); the searches that came with the package are in its data, those of other seeds
-are made, or gone on with, here. It seeks the best popped-up shape, the direct method the net: so the two differ.
+The paper compares its G0 with that of a genetic algorithm [HQK 3.2, ref 30]. Ours is in `genetic_search`; the searches
+that come with the package are in its data, those of other seeds are run, or continued, here. It looks for the best
+popped-up shape, the direct method for the net: so the two differ.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -17,24 +16,16 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
-from rodshell.formfinding.progress import silent
-from rodshell.paper.charts import Chart, Series, charts_svg
-from rodshell.paper.drapes import ROD, Case, Progress
-from rodshell.paper.fig6 import CASES
-from rodshell.paper.fig8_pictures import COLOURS
-from rodshell.paper.genetic_design import Design
-from rodshell.paper.genetic_history import WINDOW, History, stored, stored_footprint
-from rodshell.paper.genetic_search import MOST, POPULATION, search
-from rodshell.paper.panels import INK
-from rodshell.paper.tables import aligned, result_of, write
-from rodshell.results.folder import ResultFolder
-
-__all__ = ["Comparison", "Genetic", "compare", "find", "make", "stored", "stored_footprint"]
-
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.paper.cases import CASES, ROD, Case
+from rodshell.paper.figure import Figure
+from rodshell.paper.genetic_records import WINDOW, History, stored
+from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
+from rodshell.paper.plotting import INK, TARGET_COLOURS, Chart, Series, charts_svg
 
 SEED = 1
-KEPT = Path("out") / "genetic-searches"
-AGAIN = 1e-3  # share by which the rms of a shell that is popped up again may be another
+SEARCHES = Path("out") / "genetic-searches"
+AGAIN = 1e-3  # relative difference allowed in the rms of a shell that is popped up again
 REPEATS = 3  # of the direct method; the least time counts
 COLUMNS = (
     "target", "G0 by", "values sought", "forward runs", "processor time [s]", "popped shape, rms [mm]", "max [mm]",
@@ -44,13 +35,15 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """One target by both.
+    """One target by both methods.
 
     Parameters
     ----------
-    direct : of the direct method, pinned; best : of the genetic algorithm's best, popped up again; None where it does
-        not stand.
-    apart : (2m,) how far the rod ends of the two G0 lie apart [m].
+    case : target and grid.
+    history : of the search.
+    direct : agreement of the direct method, pinned.
+    best : agreement of the genetic algorithm's best, popped up again; None if it is not stable.
+    apart : (2m,) distance between the rod ends of the two G0 [m].
     """
 
     case: Case
@@ -61,7 +54,7 @@ class Comparison:
 
     @property
     def status(self) -> str:
-        """ "converged", or what is wrong."""
+        """ "converged", or the problem."""
         name, history = self.case.target.name, self.history
         if self.best is None or abs(self.best.rms / history.best - 1) > AGAIN:
             return f"the {name}'s best footprint does not pop up again as it did"
@@ -74,16 +67,16 @@ class Comparison:
 
     @property
     def ended(self) -> str:
-        """In a few words."""
+        """How the search ended, in a few words."""
         history = self.history
         count = f"{len(history.generations)} generations of {history.population}"
-        said = "converged" if history.converged else "NOT CONVERGED"
+        outcome = "converged" if history.converged else "NOT CONVERGED"
         if len(history.generations) <= WINDOW:
-            return f"{said}: {count}"
-        return f"{said}: {_percent(history.last_gain)} gained in the last {WINDOW} of {count}"
+            return f"{outcome}: {count}"
+        return f"{outcome}: {_percent(history.last_gain)} gained in the last {WINDOW} of {count}"
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Two of the table."""
+        """Its two rows of the table."""
         name, history, apart = self.case.target.name, self.history, 1e3 * self.apart
         off = (f"{apart.max():.2f}", f"{np.sqrt(np.mean(apart**2)):.2f}")
         direct = (name, "direct method", "-", "1", f"{history.direct_seconds:.2g}", *_shape(self.direct), "-", "-", "-")
@@ -94,7 +87,7 @@ class Comparison:
         return [direct, found]
 
     def result(self) -> dict[str, Any]:
-        """Of result.json, SI."""
+        """Its part of result.json, SI."""
         history, best = self.history, self.best
         return {
             "target": self.case.target.parameters(), "seed": history.seed, "status": self.status,
@@ -108,45 +101,48 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Genetic:
+class Genetic(Figure):
     """All targets."""
 
     comparisons: tuple[Comparison, ...]
+    name = "genetic"
+    columns = COLUMNS
 
     @property
     def status(self) -> str:
-        """ "converged", or the first thing that is wrong."""
-        return next((one.status for one in self.comparisons if one.status != "converged"), "converged")
+        """ "converged", or the first problem."""
+        problems = (comparison.status for comparison in self.comparisons if comparison.status != "converged")
+        return next(problems, "converged")
 
     def rows(self) -> list[tuple[str, ...]]:
         """The table, two rows for each target."""
-        return [row for one in self.comparisons for row in one.rows()]
+        return [row for comparison in self.comparisons for row in comparison.rows()]
 
-    def summary(self) -> str:
-        """The table as text."""
-        head = "The genetic algorithm [HQK 3.2] beside the direct method: ends pinned, 15 mm edges, every run from flat"
+    def heading(self) -> str:
+        """What is compared."""
+        return "The genetic algorithm [HQK 3.2] and the direct method: ends pinned, 15 mm edges, every run from flat"
+
+    def footing(self) -> str:
+        """The gains."""
         gains = (
-            f"{one.case.target.name} {one.direct.rms / one.best.rms:.2f}, for {one.history.runs} times the runs"
-            for one in self.comparisons
-            if one.best is not None
+            f"{comparison.case.target.name} {comparison.direct.rms / comparison.best.rms:.2f}, "
+            f"for {comparison.history.runs} times the runs"
+            for comparison in self.comparisons
+            if comparison.best is not None
         )
-        foot = f"rms of the direct method over that of the genetic algorithm: {'; '.join(gains)}"
-        return "\n".join([head, "", aligned(COLUMNS, self.rows()), "", foot])
+        return f"rms of the direct method over that of the genetic algorithm: {'; '.join(gains)}"
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        return result_of("genetic", self.status, comparisons=[one.result() for one in self.comparisons])
+    def content(self) -> dict[str, Any]:
+        """The comparisons."""
+        return {"comparisons": [comparison.result() for comparison in self.comparisons]}
 
-    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
-        """Write the table, the convergence as a picture, and each history, to `folder`.
+    def pictures(self) -> dict[str, str]:
+        """The convergence."""
+        return {"genetic": convergence_svg(self.comparisons)}
 
-        Raises
-        ------
-        OutputError : it cannot be written, or holds other things than a result.
-        """
-        histories = {f"{one.case.target.name}.json": one.history.text() for one in self.comparisons}
-        picture = convergence_svg(self.comparisons)
-        write(folder, self.result(), self.summary(), COLUMNS, self.rows(), {"genetic": picture}, texts=histories)
+    def texts(self) -> dict[str, str]:
+        """Each history."""
+        return {f"{comparison.case.target.name}.json": comparison.history.json() for comparison in self.comparisons}
 
 
 def make(
@@ -157,23 +153,26 @@ def make(
     generations: int | None = None,
     target: str | None = None,
     cases: Sequence[Case] = CASES,
-    kept: Path = KEPT,
+    folder: Path = SEARCHES,
 ) -> Genetic:
-    """Compare both on all targets, by the searches that came with the package, or by new ones.
+    """Compare both methods, with the searches that come with the package, or with new ones.
 
     Parameters
     ----------
-    seed : of searches that are made now, or gone on with; jobs : processes, generations : the most of these.
-    target : the name of the only one.
-    kept : folder of the values of the searches that are made.
+    seed : of searches that are run, or continued, now; None: those of the package.
+    jobs : number of processes of new searches.
+    generations : largest number of generations of new searches.
+    target : name of the only target; None: all.
+    cases : targets and grids.
+    folder : of the values of new searches.
 
     Raises
     ------
     InputError : jobs or generations without a seed; an unknown target; pymoo is needed and not installed; a file of
-        values is broken or of another search.
+        values is broken or of a different search.
     """
     if seed is None and (jobs is not None or generations is not None):
-        raise InputError("jobs and generations are those of a new search: give its seed, too")
+        raise InputError("jobs and generations belong to a new search: give its seed, too")
     chosen = [case for case in cases if target in (None, case.target.name)]
     if not chosen:
         names = ", ".join(case.target.name for case in cases)
@@ -182,25 +181,32 @@ def make(
     for case in chosen:
         history = stored(case.target.name) if seed is None else None
         if history is None:
-            begun = SEED if seed is None else seed
-            history = find(case, kept, seed=begun, jobs=jobs or 1, most=generations or MOST, progress=progress)
+            new_seed = SEED if seed is None else seed
+            history = find(case, folder, seed=new_seed, jobs=jobs or 1, most=generations or MOST, progress=progress)
         progress(f"{case.target.name}, once more", "pop-up", 0.0)
         comparisons.append(compare(case, history))
     return Genetic(tuple(comparisons))
 
 
 def find(
-    case: Case, kept: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
+    case: Case, folder: Path, *, seed: int, jobs: int = 1, population: int = POPULATION, most: int = MOST,
     progress: Progress = silent,
 ) -> History:  # fmt: skip
-    """A whole search, see `search`; its values are kept in the folder `kept`."""
+    """A whole search (see `search`), whose values are written to `folder`.
+
+    Parameters
+    ----------
+    case : target and grid.
+    folder : of the values.
+    seed, jobs, population, most, progress : see `search`.
+    """
     times = []
     for _ in range(REPEATS):
         begun = process_time()
         direct = _direct(case)
         times.append(process_time() - begun)
     design, name = Design.of(direct), case.target.name
-    file = kept / f"{name}-seed{seed}.json"
+    file = folder / f"{name}-seed{seed}.json"
     found = search(design, file, seed=seed, jobs=jobs, population=population, most=most, progress=progress)
     rods = tuple(line.name for line in design.lines)
     footprint = design.footprint(found.variables).points
@@ -208,11 +214,16 @@ def find(
 
 
 def compare(case: Case, history: History) -> Comparison:
-    """The direct method's shell, and a history's best popped up again."""
+    """The shell of the direct method, and the best of a `history` popped up again.
+
+    Parameters
+    ----------
+    case : target and grid.
+    history : of a finished search.
+    """
     direct = _direct(case)
     popped = Design.of(direct).pop_up(history.variables)
-    stands = popped is not None and popped.report.stable
-    best = agreement(popped, case.target) if popped is not None and stands else None
+    best = agreement(popped, case.target) if popped is not None and popped.report.stable else None
     apart = np.linalg.norm(history.footprint - direct.footprint.points, axis=1)
     return Comparison(case, history, direct.agreement["pinned"], best, apart)
 
@@ -220,13 +231,15 @@ def compare(case: Case, history: History) -> Comparison:
 def convergence_svg(comparisons: Sequence[Comparison]) -> str:
     """The best of each search against its forward runs, and the direct method's error as a level."""
     series, legend = list[Series](), list[tuple[str, str]]()
-    for one in comparisons:
-        colour = COLOURS.get(one.case.target.name, INK)
-        made = one.history.generations
-        runs, ends = [g.runs for g in made], [made[0].runs, made[-1].runs]
-        series.append(Series(runs, [1e3 * g.best for g in made], colour, "", lined=True))
-        series.append(Series(ends, [1e3 * one.direct.rms] * 2, colour, "\N{WHITE DIAMOND}", lined=True))
-        legend.append((one.case.target.name, colour))
+    for comparison in comparisons:
+        colour = TARGET_COLOURS.get(comparison.case.target.name, INK)
+        generations = comparison.history.generations
+        runs = [generation.runs for generation in generations]
+        series.append(Series(runs, [1e3 * generation.best for generation in generations], colour, "", lined=True))
+        series.append(
+            Series([runs[0], runs[-1]], [1e3 * comparison.direct.rms] * 2, colour, "\N{WHITE DIAMOND}", lined=True)
+        )
+        legend.append((comparison.case.target.name, colour))
     chart = Chart(series, "forward runs", "best popped shape off the target, rms [mm]", legend)
     return charts_svg([chart], "\N{WHITE DIAMOND} the direct method, one run")
 

@@ -1,15 +1,15 @@
 """Two claims of the text, tested: that H, E, r and g do not matter [HQK 3.2], and that C1 and C2 suffice [HQK 2.2].
 
-The rods' parameters are changed one at a time over decades, and what G0 does is measured against the base case, the
-paper's own: by gravity statics, where the height H is nothing, and H by the paper's falls on a coarser grid. A rod's
-stretch stiffness EA and bending stiffness EI are also changed by themselves, which no E and no r can do. The penalties
-C1 and C2 are made stiffer and stiffer against joints that share their unknowns, at rest, on the coarser grid.
+The rods' parameters are changed one at a time over decades, and the change of G0 is measured against the base case,
+that of the paper: by gravity statics, which does not depend on the height H, and H by the paper's falls on a coarser
+grid. A rod's stretch stiffness EA and bending stiffness EI are also changed separately, which E and r cannot do. The
+penalties C1 and C2 are made stiffer and stiffer against joints that share their unknowns, at rest, on the coarser
+grid.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,13 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Draped, Fall, Gravity, drape, trim
+from rodshell.formfinding.progress import Progress
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
 from rodshell.nets import chebyshev_net
-from rodshell.paper.drapes import EDGE, HEIGHT, LENGTH, ROD, Progress
-from rodshell.paper.studies_pictures import studies_svg
-from rodshell.paper.tables import aligned, result_of, write
-from rodshell.results.folder import ResultFolder
+from rodshell.paper.cases import EDGE, HEIGHT, LENGTH, ROD
+from rodshell.paper.figure import Figure
+from rodshell.paper.plotting import Chart, Series, charts_svg
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere
@@ -32,13 +32,23 @@ TARGET = Hemisphere(0.2)
 FINE = GridLayout.orthogonal(rods=(17, 17), spacing=0.03, edge=EDGE, length=LENGTH)
 COARSE = GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)
 DRAG = 5.0  # [1/s]
-LONG = 30.0  # [s]: stopped at each step, grids creep the more slowly the shorter the steps
+LONG = 30.0  # [s]: grids whose nodes stop at each step creep; with shorter steps more slowly
 HEIGHTS = (0.01, 0.1, 1.0, 10.0, 100.0)  # times the paper's
 TITLE = "G0 of the paper's hemisphere when one thing is changed [HQK 3.2, 2.2]"
 COLUMNS = (
     "changed", "to", "times the base", "on", "G0 change, rms [mm]", "max [mm]", "G0 off the net, rms [mm]",
     "largest strain", "how it rests",
 )  # fmt: skip
+FULL, RING, BOX = "\N{BLACK CIRCLE}", "\N{LARGE CIRCLE}", "\N{WHITE SQUARE}"
+PARAMETERS = {
+    "E": ("#1f5f8b", FULL), "r": ("#a8552a", FULL), "g": ("#2f8f4e", FULL), "H": ("#8a3fa0", FULL),
+    "EA alone": ("#22282f", RING), "EI alone": ("#b8862a", BOX),
+}  # fmt: skip
+PENALTIES = {
+    "C1 explicit": ("#1f5f8b", FULL), "C1 implicit": ("#a8552a", BOX), "C2, 2 linkers": ("#2f8f4e", FULL),
+    "C2, 4 linkers": ("#8a3fa0", FULL),
+}  # fmt: skip
+LEAST = 1e-5  # [mm]: smaller changes are not drawn
 
 
 @dataclass(frozen=True)
@@ -47,10 +57,14 @@ class Line:
 
     Parameters
     ----------
-    changed : what; value : to what, with its unit; factor : value over that of the base case; on : grid and method.
-    change_rms, change_max : of G0's rod ends against the base case; off_net : rms distance from the exact net [m];
-        NaN where there is no G0.
-    strain : largest of the draped grid; rests : how it rests, in a word or two.
+    changed : the parameter.
+    value : its value, with its unit.
+    factor : its value over that of the base case.
+    on : grid and method.
+    change_rms, change_max : change of G0's rod ends against the base case [m]; NaN without a G0.
+    off_net : rms distance of G0's rod ends from those of the exact net [m]; NaN without a G0.
+    strain : largest axial strain of the draped grid [-].
+    rests : its state of rest, in a word or two.
     """
 
     changed: str
@@ -64,46 +78,54 @@ class Line:
     rests: str
 
     def row(self) -> tuple[str, ...]:
+        """Its row of the table."""
         errors = (self.change_rms, self.change_max, self.off_net)
         return (
             self.changed, self.value, f"{self.factor:g}", self.on,
-            *("-" if np.isnan(one) else f"{1e3 * one:.2g}" for one in errors),
+            *("-" if np.isnan(error) else f"{1e3 * error:.2g}" for error in errors),
             "-" if np.isnan(self.strain) else f"{self.strain:.1e}", self.rests,
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Studies:
+class Studies(Figure):
     """All runs. That a grid does not drape is a result, too."""
 
     lines: tuple[Line, ...]
+    name = "studies"
+    columns = COLUMNS
     status = "converged"
+
+    def heading(self) -> str:
+        """The title."""
+        return TITLE
 
     def rows(self) -> list[tuple[str, ...]]:
         """The table, a row for each run."""
-        return [one.row() for one in self.lines]
+        return [line.row() for line in self.lines]
 
-    def summary(self) -> str:
-        """The table as text."""
-        return f"{TITLE}\n\n{aligned(COLUMNS, self.rows())}"
+    def content(self) -> dict[str, Any]:
+        """The runs; what there is not is None."""
+        return {"lines": [{k: None if v != v else v for k, v in asdict(line).items()} for line in self.lines]}
 
-    def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        lines = [{k: None if v != v else v for k, v in asdict(one).items()} for one in self.lines]
-        return result_of("studies", self.status, lines=lines)
-
-    def save(self, folder: str | PathLike[str] | ResultFolder) -> None:
-        """Write picture and table to `folder`."""
-        write(folder, self.result(), self.summary(), COLUMNS, self.rows(), {"studies": studies_svg(self.lines)})
+    def pictures(self) -> dict[str, str]:
+        """Both charts."""
+        return {"studies": studies_svg(self.lines)}
 
 
 def make(progress: Progress) -> Studies:
-    """Run all of it."""
+    """All runs."""
     return Studies((*of_statics(progress), *of_height(progress), *of_penalties(progress)))
 
 
 def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Line]:
-    """E, r, g, EA and EI by gravity statics."""
+    """E, r, g, EA and EI by gravity statics.
+
+    Parameters
+    ----------
+    progress : is called before each drape.
+    layout : the grid.
+    """
     base = drape(layout, ROD, TARGET, method=Gravity())
     for changed, (powers, given) in _PARAMETERS.items():
         for factor in (10.0**power for power in powers):
@@ -114,7 +136,13 @@ def of_statics(progress: Progress, *, layout: GridLayout = FINE) -> Iterator[Lin
 
 
 def of_height(progress: Progress, *, factors: tuple[float, ...] = HEIGHTS) -> Iterator[Line]:
-    """H, by falls."""
+    """H, by falls.
+
+    Parameters
+    ----------
+    progress : is called before each fall.
+    factors : heights over the paper's [-].
+    """
     base = _fallen(Fall(drag=DRAG))
     for factor in factors:
         height = HEIGHT * factor
@@ -185,6 +213,36 @@ def _stiff(EA: float = 1.0, EI: float = 1.0) -> Rod:
         EA=EA * ROD.stretch_stiffness, EI1=bend, EI2=bend, GJ=EI * ROD.twist_stiffness, mass=ROD.mass_per_length
     )
     return Rod(section)
+
+
+def studies_svg(lines: Sequence[Line]) -> str:
+    """Both charts."""
+    across = ("(a)  times the base case", "(b)  C1 over 1e6 EI, C2 over GJ/l")
+    return charts_svg(
+        [
+            Chart(
+                _series(lines, looks),
+                title,
+                "change of G0, rms [mm]",
+                [(f"{sign} {name}", colour) for name, (colour, sign) in looks.items()],
+            )
+            for looks, title in zip((PARAMETERS, PENALTIES), across, strict=True)
+        ]
+    )
+
+
+def _series(lines: Sequence[Line], looks: dict[str, tuple[str, str]]) -> list[Series]:
+    """A line for each parameter, interrupted at the base case, where the change is zero."""
+    result = []
+    for changed, (colour, sign) in looks.items():
+        points = [(line.factor, 1e3 * line.change_rms) for line in lines if line.changed == changed]
+        base = next((k for k, (_, y) in enumerate(points) if y == 0.0), 0)
+        for part in (points[:base], points[base:]):
+            seen = [(x, y) for x, y in part if y > LEAST]
+            if seen:
+                x, y = zip(*seen, strict=True)
+                result.append(Series(x, y, colour, sign, lined=True))
+    return result
 
 
 _PARAMETERS: dict[str, tuple[range, Callable[[float], tuple[str, Rod, float]]]] = {

@@ -3,8 +3,8 @@
 Rods of 5 nodes and 4 edges, the paper's section and material. Rod 1 runs from (L/2, 0, 0) to (-L/2, 0, 0), so that
 its first node starts where Eq 7 puts it; rod 2 along y.
 
-    twisting (a)   theta_11 = w t. ERRATA: the paper leaves rod 1 free in space; it then turns about itself as it
-                   likes. Its first edge, x_11 and x_12, is held here: its frame stands still, theta_11 is an angle.
+    twisting (a)   theta_11 = w t. ERRATA E11: the paper leaves rod 1 free in space; its frame then moves, and theta_11
+                   counts from it. Its first edge, x_11 and x_12, is held here: its frame is fixed.
     bending (b)    x_11 = L/2 (cos w t, sin w t, 0), x_13 is held. theta_11 is held at 0 as well: nothing else keeps
                    the two rods from turning about rod 1, and a motion in the plane does not feel it.
 """
@@ -20,9 +20,8 @@ from rodshell.arrays import Floats
 from rodshell.geometry.vectors import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, Joint
 from rodshell.layout import mesh_grid, straight_rods
-from rodshell.model.shell import Shell
-from rodshell.rods.materials import Material
-from rodshell.rods.section import Circle, Rod
+from rodshell.model import Shell
+from rodshell.paper.cases import ROD
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.linear_stability import step_limit
 from rodshell.solve.problem import Supports
@@ -30,27 +29,28 @@ from rodshell.solve.simulate import simulate
 
 Demonstration = Literal["twisting", "bending"]
 
-ROD = Rod(Circle(1e-3), Material(1e6, 1e3))  # HQK section 3.2: r 1 mm, E 1 MPa, G = E/3, 1 g/cm3
 EDGE, LENGTH = 5e-3, 20e-3
 RATE = 10 * 2 * pi / 60  # 10 rpm
 STEP = 5e-3
 NODES = 5
 SAFE = 0.6  # of the step limit of explicit ties
-SLOW = 1e6  # times slower, and inertia is nothing: each step is an equilibrium
-STILL = 60  # steps of such a revolution
+SLOW = 1e6  # times slower: inertia is negligible, each step is an equilibrium
+STATIC_STEPS = 60  # of such a revolution
 
 
 @dataclass(frozen=True)
 class Run:
-    """A demonstration that was run.
+    """A demonstration.
 
     Parameters
     ----------
+    demonstration : which one.
     joint, coupling : their names.
     step : of the time stepping [s]; None for statics.
-    times : (k,) [s]; of statics the time at which the motion is there.
-    angles : (k,) how far rod 2 has turned about the axis of the motion [rad].
-    nodes : (k, 2, 5, 3) of rod 1 and rod 2 [m]; twists : (k, 4) twist angles of rod 1 [rad].
+    times : (k,) [s]; of statics those at which the motion reaches each equilibrium.
+    angles : (k,) by which rod 2 has turned about the axis of the motion [rad].
+    nodes : (k, 2, 5, 3) of rod 1 and rod 2 [m].
+    twists : (k, 4) twist angles of rod 1 [rad].
     """
 
     demonstration: Demonstration
@@ -64,6 +64,7 @@ class Run:
 
     @property
     def name(self) -> str:
+        """Joint and coupling, and whether it is statics."""
         return f"{self.joint}, {self.coupling}" + (", statics" if self.step is None else "")
 
     @property
@@ -73,7 +74,7 @@ class Run:
 
     @property
     def lag(self) -> Floats:
-        """(k,) how far rod 2 is behind [rad]."""
+        """(k,) angle by which rod 2 is behind [rad]."""
         return np.asarray(self.prescribed - self.angles)
 
     @property
@@ -98,7 +99,7 @@ class Run:
         return abs(self.rate_error) < 1e-3
 
 
-def run(
+def run_in_time(
     demonstration: Demonstration,
     joint: Joint,
     coupling: Coupling,
@@ -106,7 +107,14 @@ def run(
     until: float = 2 * pi / RATE,
     step: float = STEP,
 ) -> Run:
-    """The motion from rest. Explicit ties divide `step` [s] until they are stable; the record keeps its times."""
+    """The motion from rest.
+
+    Parameters
+    ----------
+    demonstration, joint, coupling : what is run.
+    until : end of the motion [s].
+    step : of the record [s]; with explicit ties the time step divides it until it is stable.
+    """
     shell = _shell(joint, coupling)
     motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE))
     start = shell.state(shell.mesh.flat)
@@ -118,10 +126,16 @@ def run(
 
 
 def run_statics(demonstration: Demonstration, joint: Joint, coupling: Coupling, *, until: float = 2 * pi / RATE) -> Run:
-    """The equilibria on the way: the same motion so slow that each step is one. The joint must leave no rod loose."""
+    """The equilibria along the motion, which is so slow that each step is one; the joint must hold both rods.
+
+    Parameters
+    ----------
+    demonstration, joint, coupling : what is run.
+    until : end of the motion [s].
+    """
     shell = _shell(joint, coupling)
     motion = Motion.of(shell, constraint=_support(shell, demonstration, RATE / SLOW))
-    step = SLOW * 2 * pi / RATE / STILL
+    step = SLOW * 2 * pi / RATE / STATIC_STEPS
     series = simulate(motion, shell.state(shell.mesh.flat), until=SLOW * until, step=step)
     return _record(shell, demonstration, joint, coupling, None, series.times / SLOW, series.states)
 

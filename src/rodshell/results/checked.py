@@ -212,7 +212,7 @@ class Verdict(Record):
         description='"good": it pops up, stands under its own weight and can be built; "check": something has to be '
         'checked first; "unbuildable": no end condition gives a shell that can be built'
     )
-    reasons: Rows[Text] = rows("sentences, the gravest first")
+    reasons: tuple[Text, ...] = Field(min_length=1, description="sentences, the gravest first")
 
     @property
     def headline(self) -> str:

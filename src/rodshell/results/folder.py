@@ -173,9 +173,9 @@ def open_folder(
             shutil.rmtree(stage, ignore_errors=True)
         if lock is not None:
             os.close(lock)
-        for one in reversed(made):
+        for new in reversed(made):
             with suppress(OSError):
-                one.rmdir()
+                new.rmdir()
 
 
 @contextmanager
@@ -183,7 +183,7 @@ def reading(folder: str | os.PathLike[str]) -> Iterator[Callable[[str], Path]]:
     """Where each file of a result is, by name: in its folder, or still in the stage of a commit that was killed."""
     path = Path(folder).expanduser()
     with _locked(path, shared=True):
-        stage = next((one for one in _stages(path) if (one / RECORD).exists()), None)
+        stage = next((stage for stage in _stages(path) if (stage / RECORD).exists()), None)
         record = _record(stage) if stage else {"files": (), "removes": ()}
 
         def where(name: str) -> Path:
@@ -211,7 +211,7 @@ def _standing(path: Path, patterns: Iterable[str]) -> list[str]:
     """What there is of the names that match; and a pattern itself, where no folder is but something else."""
     found = dict[str, None]()
     for pattern in patterns:
-        found |= {one.relative_to(path).as_posix(): None for one in path.glob(pattern)}
+        found |= {file.relative_to(path).as_posix(): None for file in path.glob(pattern)}
         if any((path / part).exists() and not (path / part).is_dir() for part in above(pattern)):
             found[pattern] = None
     return list(found)
@@ -221,25 +221,25 @@ def _make(path: Path) -> list[Path]:
     """Make `path` and the folders above it that are missing; returns those made, the outermost first."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"cannot write {path}: it is a file; choose a folder")
-    missing = [one for one in (path, *path.parents) if not one.exists()]
+    missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     there = missing[-1].parent if missing else path
     if not there.is_dir():
         raise OutputError(f"cannot write {path}: {there} is a file; choose another folder")
     made = list[Path]()
     try:
-        for one in reversed(missing):
-            one.mkdir()
-            made.append(one)
+        for folder in reversed(missing):
+            folder.mkdir()
+            made.append(folder)
     except OSError as error:
-        for one in reversed(made):
+        for folder in reversed(made):
             with suppress(OSError):
-                one.rmdir()
+                folder.rmdir()
         raise OutputError(f"cannot write {path}: {error.strerror} in {there}; choose another folder") from error
     return made
 
 
 def _stages(path: Path) -> list[Path]:
-    return [one for one in path.glob(f"{STAGE}*") if one.is_dir() and not one.is_symlink()]
+    return [stage for stage in path.glob(f"{STAGE}*") if stage.is_dir() and not stage.is_symlink()]
 
 
 def _recover(path: Path, but: Path | None = None) -> None:
@@ -312,7 +312,7 @@ def _lock(path: Path, *, shared: bool = False, wait: bool = True) -> int | None:
         return None
     try:
         descriptor = os.open(path, os.O_RDONLY)
-    except OSError:  # who may not list it will hear so from what needs it
+    except OSError:  # a folder that cannot be listed is reported where its files are needed
         return None
     try:
         fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB))
@@ -331,12 +331,14 @@ def _uninterrupted() -> Iterator[None]:
         yield
         return
     late = list[int]()
-    before = {one: signal.signal(one, lambda number, _: late.append(number)) for one in (signal.SIGINT, signal.SIGTERM)}
+    before = {
+        kind: signal.signal(kind, lambda number, _: late.append(number)) for kind in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield
     finally:
-        for one, handler in before.items():
-            signal.signal(one, signal.SIG_DFL if handler is None else handler)
+        for kind, handler in before.items():
+            signal.signal(kind, signal.SIG_DFL if handler is None else handler)
         for number in late:
             signal.raise_signal(number)
 

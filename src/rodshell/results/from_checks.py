@@ -44,7 +44,7 @@ PREFERRED: tuple[Ends, Ends] = ("clamped", "pinned")  # the final shape is the f
 
 def sharpest(checks: Checks) -> Floats | None:
     """(k,) sharpest bend [1/m] of each entry of `rod_nodes` in any shape; None: nothing was checked."""
-    known = [bent.curvature for bent in (*checks.bending.values(), *checks.on_the_way)]
+    known = [bent.curvature for bent in (*checks.bending.values(), *checks.deployment_bending)]
     return np.max(known, axis=0) if known else None
 
 
@@ -122,9 +122,9 @@ def checked_states(checks: Checks) -> dict[str, NDArray[Any]]:
     if checks.deployment is not None:
         states["history_share"] = checks.deployment.share
         states["history"] = checks.deployment.positions
-        states["history_curvature"] = _stacked([bent.curvature for bent in checks.on_the_way])
-        if all(bent.stress is not None for bent in checks.on_the_way):
-            states["history_stress"] = _stacked([bent.stress for bent in checks.on_the_way])
+        states["history_curvature"] = _stacked([bent.curvature for bent in checks.deployment_bending])
+        if all(bent.stress is not None for bent in checks.deployment_bending):
+            states["history_stress"] = _stacked([bent.stress for bent in checks.deployment_bending])
     return states
 
 
@@ -167,7 +167,7 @@ def _rods(
         if final is not None:
             here = mesh.rod_slice(k)
             bent = Bent(**_worst([checks.bending[final]], here, strength)).plain()
-            bent["pop_up"] = Bent(**_worst([*checks.bending.values(), *checks.on_the_way], here, strength))
+            bent["pop_up"] = Bent(**_worst([*checks.bending.values(), *checks.deployment_bending], here, strength))
         made = {
             "cut_length": float(fabricated.cut_length[k]),
             "mass": float(fabricated.mass[k]),
@@ -183,12 +183,12 @@ def _bending(checks: Checks, mesh: GridMesh, strength: float | None) -> Bending:
     for ends, bent in checks.bending.items():
         shapes[ends] = WorstBent(**_worst([bent], everywhere, strength), **_place(bent, mesh))
     if checks.deployment is not None:
-        stage = int(np.argmax([bent.curvature.max() for bent in checks.on_the_way]))
-        figures = _worst(checks.on_the_way, everywhere, strength)
+        stage = int(np.argmax([bent.curvature.max() for bent in checks.deployment_bending]))
+        figures = _worst(checks.deployment_bending, everywhere, strength)
         shapes["pop_up"] = WorstBent(**figures, share=float(checks.deployment.share[stage]))
-    if checks.before_the_end:
-        share, worst = max(checks.before_the_end, key=lambda stage: float(_stressed(stage[1]).max()))
-        figures = _worst([bent for _, bent in checks.before_the_end], everywhere, strength)
+    if checks.stages_below_final:
+        share, worst = max(checks.stages_below_final, key=lambda stage: float(_stressed(stage[1]).max()))
+        figures = _worst([bent for _, bent in checks.stages_below_final], everywhere, strength)
         shapes["deployment"] = WorstBent(**figures, share=share, **_place(worst, mesh))
     return Bending(strength=strength, **shapes)
 
@@ -207,9 +207,9 @@ def _place(bent: BendingCheck, mesh: GridMesh) -> dict[str, Any]:
 
 def _contact(checks: Checks) -> Contact:
     shapes: dict[str, Any] = {ends: Clearance(**_clearance(found)) for ends, found in checks.contact.items()}
-    if checks.nearest_on_the_way is None:
+    if checks.closest_stage is None:
         return Contact(**shapes)
-    share, found = checks.nearest_on_the_way
+    share, found = checks.closest_stage
     return Contact(**shapes, deployment=Clearance(**_clearance(found), share=share))
 
 
@@ -252,7 +252,7 @@ def _deployment(checks: Checks) -> Deployment:
     assert found is not None
     stages = tuple(
         Stage(share=float(share), height=float(np.ptp(positions[:, 2])), **_worst([bent], slice(None), None))
-        for share, positions, bent in zip(found.share, found.positions, checks.on_the_way, strict=True)
+        for share, positions, bent in zip(found.share, found.positions, checks.deployment_bending, strict=True)
     )
     return Deployment(
         ends="pinned",

@@ -1,6 +1,6 @@
 """From the stages of a job to what is kept of it: the records of result.json and the arrays of states.npz.
 
-This is the one file of the room that knows the forms: in one piece, in patches, and from a table of rods.
+This is the only file of the folder that knows the forms: in one piece, in patches, and from a table of rods.
 """
 
 from collections.abc import Iterable, Mapping

@@ -31,7 +31,7 @@ def read_inputs(case_toml: str, where: Callable[[str], Path] = Path) -> dict[str
 
 
 def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tuple[str, dict[str, bytes]]:
-    """The case as it is kept in a result folder, its paths relative to that, and the files to be written beside it."""
+    """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it."""
     copies, places = dict[str, bytes](), dict[str, str]()
     for name in dict.fromkeys(_names(case_toml)):
         if name in inputs:

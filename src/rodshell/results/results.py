@@ -281,6 +281,7 @@ _EXPECTED = {
     "int_from_float": "it must be a whole number",
     "bool_type": "it must be true or false",
     "string_type": "it must be a text",
+    "too_short": "it must not be empty",
     "tuple_type": "it must be a list",
     "dict_type": "it must be a table of keys",
     "model_type": "it must be a table of keys",

@@ -15,8 +15,8 @@ from rodshell.results.wording import (
     share_of_weight,
     shown_length,
     small,
-    stage,
     stress,
+    whole_percent,
 )
 
 RUBBER = {"youngs_modulus": 1e6, "density": 1e3, "poisson_ratio": 0.5}  # [HQK section 3.1]
@@ -161,7 +161,7 @@ def _bending(results: Results, length: Length) -> Iterator[str]:
             line += f" (torsion alone {stress(bent.torsion_stress)})"
         if bent.utilisation is not None:
             line += f", {percent(bent.utilisation)} of {strength}"
-        yield line + (f"; unknown below {stage(unknown)} of it" if shape in STAGES and unknown else "")
+        yield line + (f"; unknown below {whole_percent(unknown)} of it" if shape in STAGES and unknown else "")
 
 
 def _curved(bent: Bent, length: Length) -> str:
@@ -189,7 +189,7 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
 def _deployment(results: Results) -> Iterator[str]:
     """Whether the shell is reached from flat, and what other shapes it has."""
     if deployment := results.deployment:
-        snaps = ", ".join(stage(start) for start, _ in deployment.snaps)
+        snaps = ", ".join(whole_percent(start) for start, _ in deployment.snaps)
         words = {
             True: f"reached, snapping at {snaps}" if snaps else "reached",
             False: "ends in another shape",

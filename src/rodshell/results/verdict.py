@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from rodshell.results.checked import Clearance, Deployment, Level, Verdict, WorstBent
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Results
-from rodshell.results.wording import millimetres, percent, place, rounded, rounding_of, stage
+from rodshell.results.wording import millimetres, percent, place, rounded, rounding_of, whole_percent
 
 ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
 
@@ -19,7 +19,7 @@ THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii o
 RESERVED = 0.5  # share of a preset's strength, characteristic and short-term, that a shell may use permanently
 FLAT = "the target is flat, nothing pops up"
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
-LARGE = 1.0  # m; a wider shell is built by people who have to know whether the rods hold
+LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
 NEGLIGIBLE = 1e-3  # unless that gap is below this share of the target's size already
 CONVERGED = "converged"
@@ -42,8 +42,8 @@ def verdict(results: Results) -> Verdict:
     deployment = [*_fibre_faults(results, "deployment"), *_contact_faults(results, "deployment")]
     grave = [sentence for found in faults.values() for sentence in found] + deployment
     if results.target and results.target.flat:
-        said = [word for word in results.warnings if word.startswith(FLAT)]
-        return _verdict("unbuildable", said or [FLAT])
+        warned = [word for word in results.warnings if word.startswith(FLAT)]
+        return _verdict("unbuildable", warned or [FLAT])
     if not shells:
         why = "there is no pop-up in this result"
         return _verdict(
@@ -66,7 +66,7 @@ def unknown_below(results: Results) -> float:
     deployment = results.deployment
     if deployment and deployment.lost_at is None:
         return 0.0
-    return min((one.share for one in (deployment.stages if deployment else ()) if one.share > 0), default=1.0)
+    return min((stage.share for stage in (deployment.stages if deployment else ()) if stage.share > 0), default=1.0)
 
 
 def utilisation(results: Results) -> float | None:
@@ -142,11 +142,15 @@ def _shape(shape: str, found: WorstBent | Clearance) -> str:
     """The shape that a sentence is about."""
     if shape in ENDS:
         return f"with {shape} ends"
-    return "during deployment" if found.share is None else f"during deployment (at {stage(found.share)} of the way)"
+    return (
+        "during deployment"
+        if found.share is None
+        else f"during deployment (at {whole_percent(found.share)} of the way)"
+    )
 
 
 def _best(results: Results, usable: list[Ends]) -> tuple[Ends, Agreement] | None:
-    """Of the shells that can be used the one that is nearest to the target, and its gap; None without a target."""
+    """Of the shells that can be used the nearest to the target, and its gap; None without a target."""
     known = {ends: gap for ends, gap in results.agreement.items() if ends in usable and gap.max_relative is not None}
     return min(known.items(), key=lambda pair: pair[1].max_relative or 0.0, default=None)
 
@@ -328,9 +332,11 @@ def _known(deployment: Deployment | None, unknown: float) -> str:
     if unknown >= 1:
         return "in the final shape; nothing is known of the deployment, which could not be followed."
     if unknown:
-        return f"in the final shape and above {stage(unknown)} of the deployment; below, nothing is known of it."
+        return (
+            f"in the final shape and above {whole_percent(unknown)} of the deployment; below, nothing is known of it."
+        )
     if deployment.guided:
-        low, high = (stage(share) for share in deployment.guided)
+        low, high = (whole_percent(share) for share in deployment.guided)
         return (
             f"in the final shape and the stages of the deployment; the stress while the shell is guided from {low} to "
             f"{high} is not known."

@@ -138,7 +138,7 @@ def share_of_weight(found: SelfWeight) -> str:
     return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
 
 
-def stage(share: float) -> str:
+def whole_percent(share: float) -> str:
     """A share of the deployment in whole percents, as warnings and drawings name stages."""
     return f"{100 * share:.0f} %"
 

@@ -108,12 +108,22 @@ class BendTwist:
         )
 
     def relaxed(self, state: Floats) -> Self:
-        """The same elements with `state` (N, 3) as their stress-free state, as linkers have the flat grid."""
+        """The same elements with `state` (N, 3) as their stress-free state, as linkers have the flat grid.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         strains = self.strains(state)
         return replace(self, natural_curvature=strains[:, :2].copy(), natural_twist=strains[:, 2].copy())
 
     def strains(self, state: Floats) -> Floats:
-        """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3)."""
+        """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3).
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         moved = self.refreshed(state)
         theta, m1 = state[self.blocks[:, 1:4:2], 0], moved.material_directors(state)
         te, tf = moved.source_tangents[:, 0], moved.source_tangents[:, 1]
@@ -123,7 +133,12 @@ class BendTwist:
         return np.column_stack([k1, k2, theta[:, 1] - theta[:, 0] + moved.source_twist])
 
     def material_directors(self, state: Floats) -> Floats:
-        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`."""
+        """(b, 2, 3) directors m1 of e and f; `state` is that of the source frames, see `refreshed`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         theta = state[self.blocks[:, 1:4:2], 0, None]
         d1 = self.source_directors
         return np.asarray(np.cos(theta) * d1 + np.sin(theta) * cross(self.source_tangents, d1))

@@ -43,7 +43,12 @@ class IsotropicBend:
     __repr__ = brief
 
     def curvatures(self, state: Floats) -> Floats:
-        """(b,) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-]."""
+        """(b,) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-].
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
         x = state[self.blocks]
         before, after = unit(x[:, 1] - x[:, 0]), unit(x[:, 2] - x[:, 1])
         # unit vectors at an angle phi differ by 2 sin(phi/2) and add up to 2 cos(phi/2)

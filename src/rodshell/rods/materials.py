@@ -217,6 +217,11 @@ def preset_named(name: str) -> Preset:
 def preset_values(name: str, changed: dict[str, Any]) -> dict[str, Any]:
     """Keyword arguments of `Material` for the preset `name` with some values `changed`.
 
+    Parameters
+    ----------
+    name : of the preset.
+    changed : values that replace the preset's, by their names.
+
     Raises
     ------
     InputError : there is no such preset.

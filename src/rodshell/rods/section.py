@@ -377,7 +377,13 @@ class Rod:
 
 
 def scaled(section: Section, factor: float) -> Section:
-    """The same shape of section with all its lengths times `factor` [-]."""
+    """The same shape of section with all its lengths times `factor` [-].
+
+    Parameters
+    ----------
+    section : the shape.
+    factor : of all its lengths [-].
+    """
     return type(section)(**{key: factor * value for key, value in vars(section).items()})
 
 

@@ -29,6 +29,10 @@ def fibre_distance(rod: Rod) -> float | None:
 
     Where the section is not round it is that of its farthest point: the stress is then an upper bound. None for a
     given section without fibre distances.
+
+    Parameters
+    ----------
+    rod : section and material.
     """
     section = rod.section
     if isinstance(section, GivenSection):
@@ -129,7 +133,13 @@ def fibre_modulus(rod: Rod) -> float:
 
 
 def stress_is_known(rod: Rod, *, twisted: bool) -> bool:
-    """Whether the stress of a rod is known, with that of torsion if it is `twisted`."""
+    """Whether the stress of a rod is known, with that of torsion if it is `twisted`.
+
+    Parameters
+    ----------
+    rod : section and material.
+    twisted : the rods can be twisted.
+    """
     return not _missing(rod, twisted)
 
 

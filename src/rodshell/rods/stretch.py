@@ -43,7 +43,13 @@ class Stretch:
         return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
 
     def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
-        """The same edges with other axial `forces` (e,) [N] and, if given, other `multipliers` (e,) [N]."""
+        """The same edges with other axial `forces` (e,) [N] and, if given, other `multipliers` (e,) [N].
+
+        Parameters
+        ----------
+        forces : (e,) axial forces of the geometric stiffness [N]; None: those of the strains.
+        multipliers : (e,) N0 [N]; None: unchanged.
+        """
         return replace(self, forces=forces, multipliers=self.multipliers if multipliers is None else multipliers)
 
     def strains(self, state: Floats) -> Floats:
@@ -51,11 +57,24 @@ class Stretch:
         return np.asarray(_strains(state, self.blocks, self.rest_lengths))
 
     def elongation(self, state: Floats, motion: Floats) -> Floats:
-        """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`."""
+        """(e,) change of the strains [-] to first order for displacements `motion` (N, 3) [m] from `state`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        motion : (N, 3) displacements [m].
+        """
         return np.asarray(_elongation(state, motion, self.blocks, self.rest_lengths))
 
     def add_axial(self, state: Floats, forces: Floats, gradient: Floats) -> None:
-        """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N]."""
+        """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N].
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        forces : (e,) axial forces [N].
+        gradient : (N, 3), to which theirs is added [N].
+        """
         _add_axial(state, self.blocks, forces, gradient)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:

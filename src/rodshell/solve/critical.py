@@ -21,7 +21,7 @@ from rodshell.arrays import Floats
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, TangentAssembly, subspace_iteration
+from rodshell.solve.tangent import Tangent, TangentAssembly, orthonormal, subspace_iteration
 
 Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
 
@@ -300,11 +300,11 @@ class _Path:
         scale, size = self._scale, tangent.freedom.size
         if start is None:  # no symmetry of the shell is one of this start
             start = np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(MODES, size))[:, None]) * scale
-        inverse, basis = subspace_iteration(
+        inverse, rows = subspace_iteration(
             lambda row: tangent.factors.solve(row / scale) / scale,
-            (start / scale).T, settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS,
+            start / scale, settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS,
         )  # fmt: skip
-        return 1.0 / inverse, np.linalg.qr(basis)[0].T * scale
+        return 1.0 / inverse, orthonormal(rows) * scale
 
     def _reach(self, motion: Floats) -> float:
         """Largest displacement of a node [m]."""
@@ -321,5 +321,10 @@ def _refreshed(elements: Sequence[Elements], state: Floats) -> tuple[Elements, .
 
 def _between(modes: Floats, upper: csc_matrix) -> Floats:
     """(k, k) x' A y between modes (k, dofs), of a symmetric matrix given by its upper triangle."""
-    half = modes @ np.array([upper @ mode for mode in modes]).T
-    return np.asarray(half + half.T - (modes * upper.diagonal()) @ modes.T)
+    half = _products(modes, np.array([upper @ mode for mode in modes]))
+    return half + half.T - _products(modes, upper.diagonal() * modes)
+
+
+def _products(a: Floats, b: Floats) -> Floats:
+    """(k, k) inner products of rows."""
+    return np.asarray(np.einsum("ik,jk->ij", a, b))

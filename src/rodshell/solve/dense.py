@@ -1,7 +1,7 @@
 """The dense work on a front: elimination of its pivots, the update of what is left, and the two substitutions.
 
-A front is stored row after row, its rows padded to a multiple of `PAD` numbers. Memory comes from `room`: kernels read
-up to a register past the end of what they need, and begin where a register would.
+A front of `width` pivots is stored row after row, its rows padded to a multiple of `PAD` numbers. Memory comes from
+`room`: kernels read up to a register past the end of what they need, and begin where a register would.
 """
 
 import numba as nb
@@ -13,11 +13,11 @@ from rodshell.solve.simd_kernels import BYTES, LANES, REGISTERS, ROWS, adding, e
 PAD = 8  # numbers in the largest register
 BLOCK = 32  # pivots after which all rows below are updated
 DEPTH = 128  # pivots whose rows are multiplied at a time: so many stay in the nearest cache
-TALL = 48  # rows of a product from which on they are laid side by side first
+TALL = 48  # rows of a product from which on they are packed first
 
 _WIDE = LANES * REGISTERS
 _FACTORS = ROWS * LANES  # where they lie in the workspace, behind the rows they are found from
-_PACKED = 2 * _FACTORS  # where rows are laid side by side
+_PACKED = 2 * _FACTORS  # where packed rows begin
 
 _subtract_43, _subtract_42, _subtract_41 = (subtracting(ROWS, k) for k in (3, 2, 1))
 _subtract_13, _subtract_12, _subtract_11 = (subtracting(1, k) for k in (3, 2, 1))
@@ -53,11 +53,11 @@ def _place(matrix, row, column):  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, error_model="numpy")
 def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
-    """Eliminate the pivots of a front: D L^T in `rows` (own, stride), which holds the front's upper triangle before;
-    L^T in `panel` (own, stride), D in `pivots` (own,). False where a pivot vanishes or is not finite."""
-    own = len(rows)
-    for begin in range(0, own, BLOCK):
-        end = min(begin + BLOCK, own)
+    """Eliminate the pivots of a front: D L^T in `rows` (width, stride), which holds the front's upper triangle before;
+    L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite."""
+    width = len(rows)
+    for begin in range(0, width, BLOCK):
+        end = min(begin + BLOCK, width)
         k = begin
         while k < end:
             count = ROWS if k + ROWS <= end else 1
@@ -65,7 +65,7 @@ def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
                 return False
             _eliminate_rows(rows, panel, begin, k, count, work)
             k += count
-        if end < own:
+        if end < width:
             subtract_product(panel, rows, begin, end, end, 1, rows[end:, end:], work)
     return True
 
@@ -126,7 +126,7 @@ def subtract_product(panel, rows, begin, end, first, keep, target, work):  # typ
 
     Parameters
     ----------
-    panel, rows : (own, stride).
+    panel, rows : (width, stride).
     keep : 0 or 1.
     target : (n, m), for as many columns from `first` on.
     work : `workspace`.
@@ -149,7 +149,7 @@ def subtract_product(panel, rows, begin, end, first, keep, target, work):  # typ
 
 @nb.njit(cache=True)
 def _pack(panel, start, depth, first, n, work):  # type: ignore[no-untyped-def]
-    """`n` columns of the panel into the workspace, `ROWS` at a time side by side."""
+    """`n` columns of the panel into the workspace, packed `ROWS` at a time."""
     at = _PACKED
     for i in range(first, first + n, ROWS):
         wide = min(ROWS, first + n - i)
@@ -197,39 +197,39 @@ def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, error_model="numpy")
 def forward(panel, values, aside):  # type: ignore[no-untyped-def]
     """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
-    what that takes. `aside` (own,) is scratch."""
-    own, stride = panel.shape
-    for k in range(own):
+    what that takes. `aside` (width,) is scratch."""
+    width, stride = panel.shape
+    for k in range(width):
         value, row = values[k], panel[k]
-        for i in range(k + 1, own):
+        for i in range(k + 1, width):
             values[i] -= row[i] * value
-    aside[:own] = values[:own]
-    begin = own // LANES * LANES
+    aside[:width] = values[:width]
+    begin = width // LANES * LANES
     for j in range(begin, stride, _WIDE):
         _subtract(
             1, min(REGISTERS, (stride - j) // LANES), values.ctypes.data + j * BYTES, stride, aside.ctypes.data, 1,
-            _place(panel, 0, j), stride, own, 1,
+            _place(panel, 0, j), stride, width, 1,
         )  # fmt: skip
-    values[begin:own] = aside[begin:own]
+    values[begin:width] = aside[begin:width]
 
 
 @nb.njit(cache=True, error_model="numpy")
 def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
     """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the padding
-    of the panel itself is 0. `aside` (2 own,) is scratch."""
-    own, stride = panel.shape
-    begin = own // LANES * LANES
-    for k in range(own):
+    of the panel itself is 0. `aside` (2 width,) is scratch."""
+    width, stride = panel.shape
+    begin = width // LANES * LANES
+    for k in range(width):
         aside[k] = values[k] / pivots[k]
-    values[begin:own] = 0.0
+    values[begin:width] = 0.0
     x, count = values.ctypes.data + begin * BYTES, stride - begin
-    whole = own // ROWS * ROWS
+    whole = width // ROWS * ROWS
     for k in range(0, whole, ROWS):
-        _multiply_4(aside.ctypes.data + (own + k) * BYTES, _place(panel, k, begin), stride, x, count)
-    for k in range(whole, own):
-        _multiply_1(aside.ctypes.data + (own + k) * BYTES, _place(panel, k, begin), stride, x, count)
-    for k in range(own - 1, -1, -1):
-        value, row = aside[k] - aside[own + k], panel[k]
-        for i in range(k + 1, own):
+        _multiply_4(aside.ctypes.data + (width + k) * BYTES, _place(panel, k, begin), stride, x, count)
+    for k in range(whole, width):
+        _multiply_1(aside.ctypes.data + (width + k) * BYTES, _place(panel, k, begin), stride, x, count)
+    for k in range(width - 1, -1, -1):
+        value, row = aside[k] - aside[width + k], panel[k]
+        for i in range(k + 1, width):
             value -= row[i] * values[i]
         values[k] = value

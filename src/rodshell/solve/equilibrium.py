@@ -19,7 +19,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.rods.elements import Elements
-from rodshell.solve.newton_step import HopelessError, NewtonStep
+from rodshell.solve.newton_step import NewtonStep, TooManyModesError
 from rodshell.solve.problem import Problem
 from rodshell.solve.report import SolveReport, Status
 from rodshell.solve.sparse_ldl import SingularError
@@ -28,7 +28,7 @@ from rodshell.solve.tangent import Tangent, TangentAssembly
 Progress = Callable[[int, float], None]
 
 STRAIN_TOLERANCE = 2e-6
-CIRCLES, ALIKE = 12, 1e-3  # steps; and how near to each other
+REPEATED, ALIKE = 12, 1e-3  # steps; and how near to each other
 MOST_ITERATIONS = 60
 LONGEST_SLIDE = 120  # iterations off a saddle
 NUDGE = 0.01  # of the length, along the mode of an unstable equilibrium
@@ -89,25 +89,31 @@ def find_equilibrium(
     most_iterations: int = MOST_ITERATIONS,
     progress: Progress | None = None,
 ) -> Equilibrium:
-    """Equilibrium near `state` (n, 3) [m] with axial forces near `forces` (e,) [N].
+    """Equilibrium near a state.
 
     Never raises for a solve that does not converge: the report's status says so, and the last state comes with it.
 
     Parameters
     ----------
+    problem : the source frames of its elements being at, or near, the state.
+    state : (n, 3) first guess [m, at twist angles rad].
+    forces : (e,) first guess of the axial forces [N].
     descend : shift every indefinite Hessian, so as to slide off saddles, not only those far from equilibrium.
     limit_steps : for a start from afar: take only a part of steps that were too long. Not on a path, whose own steps
         are shortened instead.
     most_modes : where the start has more negative modes, it is given up at once (BUCKLED); None: never.
+    most_iterations : chord steps in a row count as one.
+    progress : called with the number and the length of each step, over the characteristic length; an OutOfTimeError
+        that it raises ends the solve with that status.
     """
     begin = time.perf_counter()
     step = NewtonStep(problem, state, limit_steps=limit_steps, most_modes=most_modes)
     status, steps, reason = Status.STALLED, list[float](), ""
     while step.iterations + step.counts <= most_iterations:
-        new = step.counts
+        counted = step.counts
         try:
             moved, state_next, forces_next, mismatch = step.take(state, forces, descend)
-        except HopelessError:
+        except TooManyModesError:
             status = Status.BUCKLED
             break
         except SingularError:
@@ -117,7 +123,7 @@ def find_equilibrium(
             status = Status.DIVERGED
             break
         state, forces = state_next, forces_next
-        if progress is not None and new:
+        if progress is not None and counted:
             try:
                 progress(step.iterations, moved / problem.length)
             except OutOfTimeError as late:
@@ -129,7 +135,7 @@ def find_equilibrium(
             status = Status.OUT_OF_TIME
             break
         steps.append(moved)
-        if _in_circles(steps):
+        if _repeats(steps):
             break
         step.refresh(state)
     gradient = step.gradient(state, forces)
@@ -151,10 +157,10 @@ def find_equilibrium(
     return Equilibrium(solved, state, forces, gradient, report, mode)
 
 
-def _in_circles(steps: list[float]) -> bool:
-    """Whether the last `CIRCLES` steps are as long as those two before: to and fro between two states, for ever."""
-    last = np.array(steps[-CIRCLES - 2 :])
-    return len(last) == CIRCLES + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
+def _repeats(steps: list[float]) -> bool:
+    """Whether the last `REPEATED` steps are as long as those two before: back and forth between two states."""
+    last = np.array(steps[-REPEATED - 2 :])
+    return len(last) == REPEATED + 2 and bool(np.all(np.abs(last[2:] - last[:-2]) <= ALIKE * last[2:]))
 
 
 def find_stable(
@@ -169,8 +175,12 @@ def find_stable(
 ) -> Equilibrium:
     """As `find_equilibrium`; where that ends on a saddle, slide off along its mode, to either side in turn.
 
-    Returns the saddle, with its negative modes counted, where neither side leads to a stable equilibrium.
-    The report counts the work of all solves.
+    Parameters are those of `find_equilibrium`.
+
+    Returns
+    -------
+    The stable equilibrium; the saddle, with its negative modes counted, where neither side leads to one. The report
+    counts the work of all solves.
     """
     first = find_equilibrium(
         problem,
@@ -199,4 +209,4 @@ def find_stable(
                 break
     last = tries[-1].report
     best = tries[-1] if last.stable or last.status is Status.OUT_OF_TIME else first
-    return replace(best, report=best.report.after(*(one.report for one in tries if one is not best)))
+    return replace(best, report=best.report.after(*(tried.report for tried in tries if tried is not best)))

@@ -1,6 +1,6 @@
 """External forces of a motion: held over a step, or taken at its end where their gradient is known [HQK Eq 4].
 
-A force is asked once a step for the part that stays (`held`), and may add an implicit part, whose gradient
+Each step asks a force once for the part that is held over it (`held`); a force may add an implicit part, whose gradient
 enters Newton's matrix. Forces on a twist angle are moments [N m] in the first component of its block.
 """
 
@@ -20,7 +20,18 @@ class Force(Protocol):
     """What every external force offers: the part that is held over a step."""
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats | None:
-        """(N, 3) forces [N], or None: at the step's end `time` [s], by the state and velocity at its start."""
+        """The part of the force that is held over a step.
+
+        Parameters
+        ----------
+        time : of the step's end [s].
+        state, velocity : (N, 3) at its start [m, m/s].
+        mass : (N, 3) lumped mass of each component [kg, kg m2].
+
+        Returns
+        -------
+        (N, 3) forces [N, on twist angles N m], or None.
+        """
         ...
 
 
@@ -85,7 +96,7 @@ class Damping:
         return None
 
     def drag(self, mass: Floats) -> Floats:
-        """(N, 3) force by velocity [N s/m]."""
+        """(N, 3) force over velocity [N s/m], by the lumped `mass` (N, 3)."""
         return self.rate * mass + finite("the damping coefficients", self.coefficients, *mass.shape)
 
 
@@ -124,7 +135,18 @@ class ImplicitForce:
         _check_blocks(self.blocks, len(mass))
 
     def at(self, time: float, state: Floats, velocity: Floats, step: float) -> tuple[Floats, Floats]:
-        """(N, 3) forces, and (m, 3k, 3k) minus the symmetric part of their derivative by the step's end state."""
+        """The force at the end of a step.
+
+        Parameters
+        ----------
+        time : of the end [s].
+        state, velocity : (N, 3) at the end [m, m/s].
+        step : length of the step [s].
+
+        Returns
+        -------
+        (N, 3) forces [N], and (m, 3k, 3k) minus the symmetric part of their derivative by the state at the end.
+        """
         force, by_state, by_velocity = self.force(time, state, velocity)
         force = _checked(force, state.shape, self.force, time)
         width = 3 * self.blocks.shape[1]

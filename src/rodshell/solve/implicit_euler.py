@@ -93,11 +93,15 @@ class Motion:
     ) -> Self:
         """The motion of a rod or a shell; without a constraint it is free.
 
-        A constraint that never moves may be given as a `Freedom`.
+        Parameters
+        ----------
+        body : its source frames being at the state to start from.
+        constraint : as of `Motion`; one that never moves may be given as a `Freedom`.
+        forces : external forces.
         """
         given = body.freedom() if constraint is None else constraint
         supports = Supports(given) if isinstance(given, Freedom) else given
-        implicit = [one for one in body.elements if all(one is not other for other in body.explicit)]
+        implicit = [element for element in body.elements if all(element is not other for other in body.explicit)]
         return cls((*implicit, body.stretch), body.mass, supports, forces, body.explicit)
 
     def constraint_at(self, time: float) -> Constraint:
@@ -118,7 +122,12 @@ class Motion:
         return type(self)(elements, self.mass, self.constraint, self.forces, explicit)
 
     def in_parts(self, most: int = PART) -> Self:
-        """The same motion with its element sets cut into sets of at most `most` elements."""
+        """The same motion with its element sets divided, so that their Hessians stay in the cache.
+
+        Parameters
+        ----------
+        most : elements of a set.
+        """
         return replace(self, elements=tuple(part for element in self.elements for part in _parts(element, most)))
 
 
@@ -149,7 +158,19 @@ class ImplicitEuler:
         self._planned: tuple[object, ...] = ()
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
-        """The step from `time` on, `step` long [s]. The elements' source frames belong to `state`."""
+        """One step.
+
+        Parameters
+        ----------
+        motion : its source frames being at the state.
+        state : (N, 3) at the start [m, at twist angles rad]; velocity : (N, 3) [m/s, rad/s].
+        time : of the start [s].
+        step : its length [s].
+
+        Raises
+        ------
+        InputError : an external force is not finite.
+        """
         end = time + step
         constraint = motion.constraint_at(end)
         free = constraint.freedom(state)
@@ -196,10 +217,22 @@ P = TypeVar("P", bound=Planes)
 class ContactLaw(Protocol[P]):
     """What `contact.modified_mass.ModifiedMass` offers."""
 
-    def touching(self, supports: Constraint, state: Floats) -> P: ...
-    def below(self, state: Floats, touching: P) -> P | None: ...
-    def released(self, touching: P, reactions: Floats) -> tuple[P, Floats] | None: ...
-    def landed(self, velocity: Floats, touching: P) -> Floats: ...
+    def touching(self, supports: Constraint, state: Floats) -> P:
+        """The constraint that a step from `state` (N, 3) begins with."""
+        ...
+
+    def below(self, state: Floats, touching: P) -> P | None:
+        """With the nodes that `state` (N, 3) has below the target, too; None where there are no new ones."""
+        ...
+
+    def released(self, touching: P, reactions: Floats) -> tuple[P, Floats] | None:
+        """With the nodes free to slip that stick by more than friction can hold, by the `reactions` (N, 3) [N], and
+        the friction (N, 3) on them [N]; None where there are none."""
+        ...
+
+    def landed(self, velocity: Floats, touching: P) -> Floats:
+        """(N, 3) `velocity` at the end of a step, without what the contact takes of it [m/s]."""
+        ...
 
 
 class ContactEuler:
@@ -208,6 +241,11 @@ class ContactEuler:
     Attributes
     ----------
     last : the constraint that the last step ended with.
+
+    Parameters
+    ----------
+    law : what holds nodes that touch.
+    matrix : makes the matrix of the Newton iterations.
     """
 
     def __init__(self, law: ContactLaw[P], matrix: MakeMatrix = narrow_or_sparse) -> None:
@@ -215,6 +253,7 @@ class ContactEuler:
         self.last: P | None = None
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
+        """One step; parameters as of `ImplicitEuler.take`."""
         law = self._law
         touching = law.touching(motion.constraint_at(time + step), state)
         rubbing = np.zeros_like(state)
@@ -320,16 +359,16 @@ class _Newton:
         total -= self.held
         if hessian:
             matrix.clear()
-        for which, element in enumerate(self.motion.elements):
+        for number, element in enumerate(self.motion.elements):
             hessians = buffers[3 * element.blocks.shape[1]][: len(element.blocks)] if hessian else NO_HESSIANS
             element.evaluate(state, total, hessians)
             if hessian:
-                matrix.add(which, hessians, element.blocks, free)
-        for which, force in enumerate(self.implicit, start=len(self.motion.elements)):
+                matrix.add(number, hessians, element.blocks, free)
+        for number, force in enumerate(self.implicit, start=len(self.motion.elements)):
             given, hessians = force.at(self.end, state, moved / self.step, self.step)
             total -= given
             if hessian:
-                matrix.add(which, hessians, force.blocks, free)
+                matrix.add(number, hessians, force.blocks, free)
         if hessian:
             curvature = self.constraint.curvature(state, total)
             matrix.add_blocks(self.inertia, curvature if len(curvature) else NO_CURVATURE, free)

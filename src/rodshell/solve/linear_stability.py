@@ -12,7 +12,7 @@ the same argument holds. The limit is hence exact: the longest h at which
 
     (4 M4 + 2 M2) / h^2 + K_i - K_e
 
-has no negative eigenvalue, which is told by the signs of its pivots; what touches loses the direction along its
+has no negative eigenvalue, which the signs of its pivots show; what touches loses the direction along its
 normal. There is no limit where the implicit springs are stiffer than the explicit ones; damping only raises it. With
 the rods' stiffness left out it gives the bounds sqrt(2m/C1) of two masses m tied by C1, and sqrt(2I/C2) of two rotary
 inertias I tied by C2.
@@ -37,11 +37,12 @@ GROWTH = 10.0  # of the shift, until nothing is below it
 
 
 class ExplicitTies:
-    """Tells at one state after another which steps explicit ties bear; the matrix is planned once.
+    """Finds at one state after another which time steps are stable with explicit ties; the matrix is analysed once.
 
     Parameters
     ----------
-    motion : with the elements that it has at every state; free : free directions, whose counts stay.
+    motion : with the elements that it has at every state.
+    free : the free directions; their counts stay.
     """
 
     def __init__(self, motion: Motion, free: Freedom) -> None:
@@ -51,7 +52,15 @@ class ExplicitTies:
         self._factors: Factors | None = None
 
     def look(self, motion: Motion, state: Floats, free: Freedom, stopped: Ints = NO_NODES) -> None:
-        """Look at a state (N, 3) whose blocks `stopped` (k,) lose all their velocity at each step."""
+        """Assemble the matrix at a state.
+
+        Parameters
+        ----------
+        motion : its source frames being at the state.
+        state : (N, 3) [m, at twist angles rad].
+        free : the free directions there.
+        stopped : (k,) blocks that lose all their velocity at each step.
+        """
         implicit, explicit = (_hessians(elements, state) for elements in (motion.elements, motion.explicit))
         self._data = self._assembly.assemble([*implicit, *(-hessians for hessians in explicit)], self._blocks, free)
         weight = np.full((len(state), 1), 4.0)
@@ -59,7 +68,12 @@ class ExplicitTies:
         self._mass, self._blocked = free.reduce_diagonal(weight * motion.mass), free.blocked
 
     def grows(self, step: float) -> bool:
-        """Whether some motion about the state grows at this step [s]."""
+        """Whether some motion about the state grows.
+
+        Parameters
+        ----------
+        step : time step [s].
+        """
         data, diagonal = self._data.copy(), self._assembly.diagonal
         data[diagonal] += self._mass / step**2
         data[diagonal[self._blocked]] = 1.0
@@ -94,8 +108,13 @@ class ExplicitTies:
 
 
 def step_limit(motion: Motion, state: Floats, time: float = 0.0, *, stopped: Ints = NO_NODES) -> float:
-    """Longest stable step [s] at a state (N, 3); infinite where nothing is explicit.
+    """Longest stable time step [s] at a state; infinite where nothing is explicit.
 
+    Parameters
+    ----------
+    motion : its source frames being at the state.
+    state : (N, 3) [m, at twist angles rad].
+    time : at which the constraint is taken [s].
     stopped : (k,) blocks that lose all their velocity at each step.
 
     Raises
@@ -111,7 +130,17 @@ def step_limit(motion: Motion, state: Floats, time: float = 0.0, *, stopped: Int
 
 
 def refuse_unstable(motion: Motion, state: Floats, step: float) -> None:
-    """Raise StabilityError if `step` [s] is beyond the limit at `state`."""
+    """Refuse a time step that explicit ties make unstable.
+
+    Parameters
+    ----------
+    motion, state : as of `step_limit`.
+    step : time step [s].
+
+    Raises
+    ------
+    StabilityError : the step is beyond the limit.
+    """
     limit = step_limit(motion, state)
     if step > limit:
         raise StabilityError(
@@ -125,8 +154,7 @@ REMEDY = "use a smaller step, softer ties, or coupling=SharedDofs()"
 def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Floats, count: int) -> Floats:
     """The slowest modes K x = s M x of a body about an equilibrium: (count,) lowest s [1/s2], ascending.
 
-    A negative one grows as exp(sqrt(-s) t), others swing at sqrt(s)
-    rad/s.
+    Motions along a negative one grow as exp(sqrt(-s) t); others oscillate at sqrt(s) rad/s.
 
     Parameters
     ----------
@@ -151,7 +179,14 @@ def slowest_modes(motion: Motion, state: Floats, free: Freedom, curvature: Float
 
 
 def tangent_stiffness(elements: tuple[Elements, ...], state: Floats, free: Freedom) -> csc_matrix:
-    """Hessian in the free directions, whole."""
+    """Hessian in the free directions, both triangles: (dofs, dofs).
+
+    Parameters
+    ----------
+    elements : with their source frames at, or near, the state.
+    state : (N, 3) [m, at twist angles rad].
+    free : the free directions.
+    """
     blocks = [element.blocks for element in elements]
     assembly = Assembly.of(blocks, free)
     data = assembly.assemble(_hessians(elements, state), blocks, free)

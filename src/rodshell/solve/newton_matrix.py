@@ -30,12 +30,27 @@ class SummedMatrix(Protocol):
         """Set it to zero."""
         ...
 
-    def add(self, which: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add the Hessians (m, 3k, 3k) of the elements, or of a part, `blocks` (m, k) of the set number `which`."""
+    def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
+        """Add the Hessians of a set of elements, or of a part of it.
+
+        Parameters
+        ----------
+        number : of the set, among those that the matrix was made for.
+        hessians : (m, 3k, 3k) of each element.
+        blocks : (m, k) of each element.
+        free : the free directions.
+        """
         ...
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
-        """Add to each block itself: diagonal (N, 3), and a matrix, full (N, 3, 3) or empty; one where blocked."""
+        """Add to each block itself; a blocked direction gets a one.
+
+        Parameters
+        ----------
+        diagonal : (N, 3) diagonal of each block.
+        full : (N, 3, 3) a matrix for each block, or empty.
+        free : the free directions.
+        """
         ...
 
     def factor(self) -> int:
@@ -85,8 +100,8 @@ class Banded:
     def clear(self) -> None:
         self.values[:] = 0.0
 
-    def add(self, which: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add element Hessians (m, 3k, 3k); of `which` set they are does not matter."""
+    def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
+        """Add element Hessians (m, 3k, 3k); the number of their set does not matter."""
         self._look_at(free)
         _add(hessians, blocks, self._first, self._count, self._axes, self._plain, self.values)
 
@@ -140,8 +155,8 @@ class SparseSum:
     def clear(self) -> None:
         self._data[:] = 0.0
 
-    def add(self, which: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        self._assembly.add(which, hessians, blocks, free, self._data)
+    def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
+        self._assembly.add(number, hessians, blocks, free, self._data)
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:
         blocks = diagonal[:, :, None] * np.eye(3)
@@ -158,7 +173,13 @@ class SparseSum:
 
 
 def narrow_or_sparse(element_blocks: Sequence[Ints], free: Freedom) -> SummedMatrix:
-    """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell."""
+    """`Banded` where the band is narrow, as of one rod; `SparseSum` else, as of a shell.
+
+    Parameters
+    ----------
+    element_blocks : (m, k) blocks of each element, for each set of elements.
+    free : the free directions.
+    """
     banded = Banded(element_blocks, free, widest=WIDEST)
     return banded if banded.half_bandwidth <= WIDEST else SparseSum(element_blocks, free)
 
@@ -166,6 +187,8 @@ def narrow_or_sparse(element_blocks: Sequence[Ints], free: Freedom) -> SummedMat
 def narrow_or_dissected(coordinates: Floats) -> Callable[[Sequence[Ints], Freedom], SummedMatrix]:
     """`Banded` where the band is narrow; else by the multifrontal solver.
 
+    Parameters
+    ----------
     coordinates : (N, d) where the blocks lie [m], by which they are ordered.
     """
 
@@ -202,7 +225,7 @@ def _reach(blocks: Ints, first: Ints, count: Ints) -> int:
 def _add(hessians, blocks, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' H T of every element; T holds the free directions of its blocks as columns, or leaves plain ones alone.
 
-    Places are unsigned, which spares the look for negative indices: half of the time.
+    Indices are unsigned, which spares the check for negative ones: half of the time.
     """
     k = blocks.shape[1]
     place, component = np.empty(3 * k, dtype=np.uint64), np.empty(3 * k, dtype=np.uint64)

@@ -1,11 +1,11 @@
 """One step of Newton's method with the axial forces as unknowns, and how far to go.
 
-Near the end a factorisation serves for the steps after it, too, which then cost a gradient and a solve (chord steps).
+Near the end a factorisation also serves the next steps, which then cost one gradient and one solve (chord steps).
 
-A step along which rods turn by a leaves them strained by a^2/2, with forces that may buckle them. The next
-factorisation tells: where it counts several negative modes more than the one that the step was made with, the step was
-too long, and a part of it is taken instead. It is a trust region, with the modes as its measure: the energy would not
-do, for it jumps with those strains.
+A step along which rods turn by an angle a leaves them strained by a^2/2, with forces that may buckle them. The next
+factorisation shows it: where it counts several more negative modes than the last, the step was too long, and only a
+part of it is taken. This is a trust region whose measure are the modes; the energy does not serve, since it jumps with
+those strains.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ TINY = 1e-300  # no step is shorter, but for none at all
 
 
 @dataclass(frozen=True)
-class _Stride:
+class _LastStep:
     """The last step, so that less of it can be taken: from where, at how many negative modes; the whole motion (n, 3),
     `reach` [m] long, with the change (e,) of the forces; and the share taken of both."""
 
@@ -49,7 +49,7 @@ class _Stride:
     share: float
 
 
-class HopelessError(Exception):
+class TooManyModesError(Exception):
     """The start of an iteration has too many negative modes for an equilibrium to be near."""
 
 
@@ -75,7 +75,7 @@ class NewtonStep:
         self._longest = LONGEST_STEP
         self._nearest = np.inf  # the last step that was near
         self._shifted = False  # the last step was one of the shifted Hessian
-        self._stride: _Stride | None = None
+        self._last_step: _LastStep | None = None
         self._factored = state, np.empty(0)  # where the matrix is from
         self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
         self._chord = self._was_chord = self.settled = False
@@ -86,10 +86,17 @@ class NewtonStep:
         return not (self._chord and self._was_chord)
 
     def refresh(self, state: Floats) -> None:
+        """Carry the source frames of the elements to `state` (n, 3)."""
         self.elements = tuple(element.refreshed(state) for element in self.elements)
 
     def gradient(self, state: Floats, forces: Floats) -> Floats:
-        """Gradient (n, 3) of energy and load with the given axial forces [N]."""
+        """Gradient of energy and load.
+
+        Parameters
+        ----------
+        state : (n, 3) [m, rad].
+        forces : (e,) axial forces that the edges carry [N].
+        """
         gradient = np.zeros_like(state) if self._problem.load is None else -self._problem.load
         for element in self.elements:
             element.evaluate(state, gradient)
@@ -97,7 +104,23 @@ class NewtonStep:
         return gradient
 
     def take(self, state: Floats, forces: Floats, descend: bool) -> tuple[float, Floats, Floats, float]:
-        """Length of the step, the next state and forces, and how far these are from matching the strains."""
+        """One step.
+
+        Parameters
+        ----------
+        state : (n, 3) [m, rad].
+        forces : (e,) axial forces [N].
+        descend : shift the Hessian wherever it is indefinite.
+
+        Returns
+        -------
+        Length of the step [m], the next state and forces, and how far these are from matching the strains [-].
+
+        Raises
+        ------
+        SingularError : a pivot vanishes, and not by a mode without stiffness.
+        TooManyModesError : the start has more negative modes than are allowed.
+        """
         problem = self._problem
         if not self._chord:
             self._factored = state, forces
@@ -122,7 +145,7 @@ class NewtonStep:
             gradient += self._times(prescribed)
         direction = self._direction(-free.reduce(gradient), descend)
         if direction is None:
-            return self._retreat()
+            return self._shorten()
         motion = free.expand(direction)
         if prescribed is not None:
             motion += prescribed
@@ -133,27 +156,27 @@ class NewtonStep:
         share = min(1.0, self._longest * problem.length / reach) if reach > 0 else 1.0
         strains += stretch.elongation(at, motion)
         change = base + stretch.stiffness * strains - forces
-        stride = _Stride(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
-        state_next, forces_next = self._stridden(stride)
+        last = _LastStep(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
+        state_next, forces_next = self._after(last)
         left = problem.stretch.strains(state_next)
         if not problem.inextensible:
             left = left - forces_next / problem.stretch.stiffness
         self._judge(reach / problem.length, forces, forces_next)
         return reach, state_next, forces_next, float(np.abs(left).max())
 
-    def _stridden(self, stride: _Stride) -> tuple[Floats, Floats]:
+    def _after(self, last: _LastStep) -> tuple[Floats, Floats]:
         """State and forces after a step."""
-        self._stride = stride
-        state = self._problem.constraint.retract(stride.state + stride.share * stride.motion)
-        return state, stride.forces + stride.share * stride.change
+        self._last_step = last
+        state = self._problem.constraint.retract(last.state + last.share * last.motion)
+        return state, last.forces + last.share * last.change
 
-    def _retreat(self) -> tuple[float, Floats, Floats, float]:
+    def _shorten(self) -> tuple[float, Floats, Floats, float]:
         """As `take`, for a part of the last step in its place: no iteration of its own."""
-        assert self._stride is not None
-        stride = replace(self._stride, share=PART * self._stride.share)
-        moved, self.elements = stride.share * stride.reach, stride.elements
+        assert self._last_step is not None
+        last = replace(self._last_step, share=PART * self._last_step.share)
+        moved, self.elements = last.share * last.reach, last.elements
         self._longest = moved / self._problem.length
-        return moved, *self._stridden(stride), np.inf
+        return moved, *self._after(last), np.inf
 
     def _near(self, moved: float) -> bool:
         """Whether a step of Newton's so long leads to the equilibrium at hand, be it a saddle."""
@@ -166,7 +189,7 @@ class NewtonStep:
     def _too_far(self) -> bool:
         """Whether the last step was not short and led to more negative modes than it began with: by several, which are
         rods that buckle; one more is a saddle on the way."""
-        last = self._stride
+        last = self._last_step
         if last is None or not self._limit_steps or self.negative_modes <= last.negative_modes + 1:
             return False
         return last.share * last.reach > NEAR * self._problem.length
@@ -198,7 +221,7 @@ class NewtonStep:
         """(n, 3) eigenvector of the most negative eigenvalue of the Hessian last evaluated."""
         self._shift_until_definite()
         mode = self._free.expand(self._inverse_iteration(12)[0])
-        return mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max())
+        return np.asarray(mode / np.sqrt(np.einsum("ij,ij->i", mode, mode).max()))
 
     def _direction(self, right: Floats, descend: bool) -> Floats | None:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
@@ -208,7 +231,7 @@ class NewtonStep:
         self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
         regular = self._count_negative_modes()
         if self.factorizations == 1 and self._most_modes is not None and self.negative_modes > self._most_modes:
-            raise HopelessError
+            raise TooManyModesError
         if self.negative_modes and regular and not descend:
             step = self._solve(right)
             if self._near(float(np.abs(step).max()) / self._problem.length):

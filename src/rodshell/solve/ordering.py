@@ -1,4 +1,4 @@
-"""Elimination orders: nested dissection by place, which knows that a gridshell's mesh lies in a plane."""
+"""Elimination orders: nested dissection by coordinates, since a gridshell's mesh lies in a plane."""
 
 import numba as nb
 import numpy as np
@@ -9,27 +9,27 @@ LEAF = 12  # blocks that are not divided further
 UNBALANCED = 0.3  # the smaller part of a cut holds at least this share
 
 
-def dissect(places: Floats, start: Longs, neighbours: Longs) -> Longs:
+def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     """Order blocks so that separators come last: first both parts of a cut, each dissected, then what joins them.
 
     Parameters
     ----------
-    places : (n, d) where each block lies; any coordinates in which neighbours are near will do.
+    coordinates : (n, d) where each block lies; any coordinates in which neighbours are near will do.
     start, neighbours : the blocks coupled to block i are neighbours[start[i] : start[i + 1]].
 
     Returns
     -------
     (n,) blocks in the order of their elimination.
     """
-    along = np.argsort(places, axis=0, kind="stable").T.astype(np.int64)
-    return np.asarray(_dissect(np.ascontiguousarray(places, dtype=np.float64), along, start, neighbours))
+    along = np.argsort(coordinates, axis=0, kind="stable").T.astype(np.int64)
+    return np.asarray(_dissect(np.ascontiguousarray(coordinates, dtype=np.float64), along, start, neighbours))
 
 
 @nb.njit(cache=True)
-def _dissect(places, along, start, neighbours):  # type: ignore[no-untyped-def]
+def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-def]
     """Segments of the rows of `along` (d, n), blocks sorted by each coordinate, are divided in place until they are
     small, and stay sorted; `segment` tells which one a block is in."""
-    n = len(places)
+    n = len(coordinates)
     segment = np.zeros(n, dtype=np.int64)
     rank, crossing, part = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int8)
     kept, size = np.empty((3, n), dtype=np.int64), np.zeros(3, dtype=np.int64)
@@ -40,7 +40,7 @@ def _dissect(places, along, start, neighbours):  # type: ignore[no-untyped-def]
         if end - begin <= LEAF:
             continue
         here = segment[along[0, begin]]
-        blocks = along[_longest(places, along, begin, end), begin:end].copy()
+        blocks = along[_longest(coordinates, along, begin, end), begin:end].copy()
         for k in range(len(blocks)):
             rank[blocks[k]] = k
         best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing)
@@ -68,11 +68,11 @@ def _dissect(places, along, start, neighbours):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True)
-def _longest(places, along, begin, end):  # type: ignore[no-untyped-def]
+def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
     """The coordinate in which a segment is longest."""
     axis, longest = 0, -1.0
     for d in range(len(along)):
-        extent = places[along[d, end - 1], d] - places[along[d, begin], d]
+        extent = coordinates[along[d, end - 1], d] - coordinates[along[d, begin], d]
         if extent > longest:
             axis, longest = d, extent
     return axis

@@ -72,10 +72,10 @@ def follow(
             step = 0.4 * min(step, there - t)
         if found.report.status is Status.OUT_OF_TIME:
             break
-        if t < 1.0 and (step < SMALLEST_STEP or sum(one.iterations for one in reports) > MOST_OF_ALL):
+        if t < 1.0 and (step < SMALLEST_STEP or sum(report.iterations for report in reports) > MOST_OF_ALL):
             break
     ended = last or found
-    report = ended.report.after(*(one for one in reports if one is not ended.report))
+    report = ended.report.after(*(report for report in reports if report is not ended.report))
     if t >= 1.0:
         return replace(ended, report=report)
     late = found.report.status is Status.OUT_OF_TIME
@@ -154,19 +154,27 @@ def trace(
 
 
 def going_on(problem: Problem, last: Equilibrium) -> Problem:
-    """The problem with the source frames and the pattern of an equilibrium of the same structure."""
+    """The problem with the source frames and the pattern of an equilibrium of the same structure.
+
+    Parameters
+    ----------
+    problem : the next one on a path.
+    last : the equilibrium that the next solve starts from.
+    """
     return replace(problem, elements=last.elements, pattern=last.problem.pattern)
 
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule."""
+    by the trapezoidal rule; parameters as for `surplus`."""
     return abs(surplus(here, there)) > UNACCOUNTED
 
 
 def surplus(here: Equilibrium, there: Equilibrium) -> float:
     """Energy gained beyond the work done on the prescribed blocks, over the larger energy; negative where it fell.
 
+    Parameters
+    ----------
     here, there : equilibria of one structure under one load, the second with prescribed `Supports`.
     """
     supports = there.problem.constraint

@@ -19,19 +19,48 @@ class Constraint(Protocol):
     """A manifold on which the state moves. The count of free directions of each block never changes."""
 
     def freedom(self, state: Floats) -> Freedom:
-        """Free directions at `state` (n, 3)."""
+        """The free directions.
+
+        Parameters
+        ----------
+        state : (n, 3) on the manifold [m, at twist angles rad].
+        """
         ...
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        """(n, 3, 3) contribution -lambda phi'' of the constraint forces to the Hessian, or an empty array."""
+        """Contribution of the constraint forces to the Hessian.
+
+        Parameters
+        ----------
+        state : (n, 3) on the manifold [m, rad].
+        gradient : (n, 3) of energy and load there [N, N m].
+
+        Returns
+        -------
+        (n, 3, 3) -lambda phi'' of each block [N/m], or an empty array.
+        """
         ...
 
     def remaining(self, state: Floats) -> Floats | None:
-        """(n, 3) prescribed displacement still to go, across the free directions [m]; None where nothing moves."""
+        """Prescribed displacement that is still to go.
+
+        Parameters
+        ----------
+        state : (n, 3) the state now [m, rad].
+
+        Returns
+        -------
+        (n, 3) across the free directions [m, rad]; None where nothing moves.
+        """
         ...
 
     def retract(self, state: Floats) -> Floats:
-        """The state moved back onto the manifold after a step along the free directions."""
+        """The state moved back onto the manifold after a step along the free directions.
+
+        Parameters
+        ----------
+        state : (n, 3) next to the manifold [m, rad].
+        """
         ...
 
 
@@ -85,7 +114,13 @@ class Pattern:
     solver: LinearSolver
 
     def serves(self, blocks: tuple[Ints, ...], count: Ints) -> bool:
-        """Whether another problem has this pattern."""
+        """Whether another problem has this pattern.
+
+        Parameters
+        ----------
+        blocks : (m, k) of each of its sets of energies.
+        count : (n,) free directions of each of its blocks.
+        """
         here, there = (*self.blocks, self.count), (*blocks, count)
         return len(here) == len(there) and all(map(np.array_equal, here, there))
 
@@ -159,6 +194,8 @@ class Problem:
     def pattern_at(self, state: Floats) -> Pattern:
         """The pattern of this problem: the one that comes with it where it serves, or a new one.
 
+        Parameters
+        ----------
         state : (n, 3) any state of the problem.
         """
         blocks, free = self.blocks(len(state)), self.constraint.freedom(state)
@@ -185,7 +222,8 @@ def linear_solver(indptr: Longs, indices: Longs, free: Freedom, flat_coordinates
     Parameters
     ----------
     indptr, indices : the pattern, upper triangle in compressed columns.
-    flat_coordinates : (n, 2) of the blocks [m], or None.
+    free : the free directions of the blocks.
+    flat_coordinates : (n, 2) of the blocks [m]; None: ordered by approximate minimum degree.
     """
     if flat_coordinates is None:
         return Qdldl(indptr, indices)

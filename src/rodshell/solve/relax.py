@@ -28,9 +28,17 @@ MOST_STEPS = 400
 
 
 def relax(problem: Problem, state: Floats, *, progress: Callable[[int, float], None] | None = None) -> Equilibrium:
-    """The equilibrium below `state` (N, 3), whose edges are elastic; the last steps are those of `find_stable`.
+    """The stable equilibrium that lies below a state; the last steps are those of `find_stable`.
 
-    The report counts the descent's work too.
+    Parameters
+    ----------
+    problem : with elastic edges.
+    state : (N, 3) to begin with [m, at twist angles rad].
+    progress : called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.
+
+    Returns
+    -------
+    Its report counts the descent's work too.
     """
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)

@@ -71,10 +71,15 @@ class SolveReport:
         return self.converged and self.negative_modes == 0
 
     def after(self, *earlier: "SolveReport") -> "SolveReport":
-        """This report with the work of earlier solves added."""
+        """This report with the work of earlier solves added.
+
+        Parameters
+        ----------
+        earlier : reports of the solves that led to this one.
+        """
         return replace(
             self,
-            iterations=self.iterations + sum(one.iterations for one in earlier),
-            factorizations=self.factorizations + sum(one.factorizations for one in earlier),
-            seconds=self.seconds + sum(one.seconds for one in earlier),
+            iterations=self.iterations + sum(report.iterations for report in earlier),
+            factorizations=self.factorizations + sum(report.factorizations for report in earlier),
+            seconds=self.seconds + sum(report.seconds for report in earlier),
         )

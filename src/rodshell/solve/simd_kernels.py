@@ -78,14 +78,14 @@ def eliminating(rows: int, registers: int) -> Kernel:
         into, scaled = code.places(c, stride, rows, registers), code.places(d, stride, rows, registers)
         done = list[list[ir.Value]]()
         for r in range(rows):
-            row = [code.builder.fsub(code.load(place), one) for place, one in zip(into[r], sums[r], strict=True)]
+            row = [code.builder.fsub(code.load(place), value) for place, value in zip(into[r], sums[r], strict=True)]
             for above in done:
                 factor, factors = code.spread(factors), code.past(factors, 1)
-                row = [code.add_product(factor, other, one) for other, one in zip(above, row, strict=True)]
+                row = [code.add_product(factor, other, value) for other, value in zip(above, row, strict=True)]
             inverse, factors = code.spread(factors), code.past(factors, 1)
-            for v, one in enumerate(row):
-                code.store(one, into[r][v])
-                code.store(code.builder.fmul(inverse, one), scaled[r][v])
+            for v, value in enumerate(row):
+                code.store(value, into[r][v])
+                code.store(code.builder.fmul(inverse, value), scaled[r][v])
             done.append(row)
 
     def twin(c: int, d: int, a: int, b: int, stride: int, depth: int, factors: int) -> None:
@@ -107,7 +107,7 @@ def multiplying(rows: int) -> Kernel:
         def onward(k: ir.Value, sums: Sequence[ir.Value]) -> list[ir.Value]:
             right = code.load(code.past(x, k))
             left = (code.load(place) for (place,) in code.places(code.past(a, k), stride, rows, 1))
-            return [code.add_product(one, right, total) for one, total in zip(left, sums, strict=True)]
+            return [code.add_product(value, right, total) for value, total in zip(left, sums, strict=True)]
 
         for r, total in enumerate(code.loop(count, LANES, [code.zero] * rows, onward)):
             code.store(code.sum_of_lanes(total), code.past(y, r))
@@ -184,8 +184,8 @@ class _Code:
     def spread(self, address: ir.Value) -> ir.Value:
         """The number at an address, in all lanes."""
         number = self.builder.load(self.builder.inttoptr(address, _NUMBER.as_pointer()))
-        one = self.builder.insert_element(self.zero, number, ir.Constant(_INDEX, 0))
-        return self._shuffled(one, [0] * LANES)
+        vector = self.builder.insert_element(self.zero, number, ir.Constant(_INDEX, 0))
+        return self._shuffled(vector, [0] * LANES)
 
     def sum_of_lanes(self, value: ir.Value) -> ir.Value:
         half = LANES // 2
@@ -240,7 +240,7 @@ class _Code:
             for r in range(rows):
                 left = self.spread(self.past(at_a, r))
                 mine = sums[r * registers : (r + 1) * registers]
-                new += [self.add_product(left, one, total) for one, total in zip(right, mine, strict=True)]
+                new += [self.add_product(left, value, total) for value, total in zip(right, mine, strict=True)]
             return [self.past(at_a, stride_a), self.past(at_b, stride_b), *new]
 
         _, _, *sums = self.loop(depth, 1, [a, b, *[self.zero] * (rows * registers)], onward)
@@ -259,10 +259,11 @@ def _kernel(count: int, emit: Callable[..., None], twin: Callable[..., None]) ->
         emit(_Code(builder), *arguments)
         return context.get_dummy_value()
 
-    return intrinsic(_TYPED[count](types.void(*[types.int64] * count), generate))
+    kernel: Kernel = intrinsic(_TYPED[count](types.void(*[types.int64] * count), generate))
+    return kernel
 
 
-_TYPED = {  # an intrinsic shows its arguments by name
+_TYPED: dict[int, Callable[..., object]] = {  # an intrinsic shows its arguments by name
     3: lambda signature, generate: lambda typing, a, b, c: (signature, generate),
     5: lambda signature, generate: lambda typing, a, b, c, d, e: (signature, generate),
     7: lambda signature, generate: lambda typing, a, b, c, d, e, f, g: (signature, generate),

@@ -15,9 +15,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, OutputError
-from rodshell.solve.implicit_euler import ImplicitEuler, MakeMatrix, Motion, Refused, Step
+from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused, Step
 from rodshell.solve.linear_stability import refuse_unstable
-from rodshell.solve.newton_matrix import narrow_or_sparse
 
 EASY = 5  # Newton iterations after which a step that was halved may grow back
 HALVINGS = 20
@@ -178,7 +177,6 @@ def simulate(
     halvings: int = HALVINGS,
     stream: str | Path | None = None,
     progress: Callable[[Sample], None] | None = None,
-    matrix: MakeMatrix = narrow_or_sparse,
     stepper: Stepper | None = None,
     stop: Callable[[Sample], bool] | None = None,
     interruptible: bool = False,
@@ -190,6 +188,7 @@ def simulate(
 
     Parameters
     ----------
+    until, start : times at which the motion ends and starts [s].
     step : longest step [s]; the longest that divides the time evenly and is not longer is taken. A step that
         fails is taken in halves, these again in halves, and so on; steps grow back where that goes easily, and
         always meet the even grid again.
@@ -197,7 +196,7 @@ def simulate(
     halvings : how often a step may be halved.
     stream : folder for the record, instead of memory; read it with `TimeSeries.load`. No file is replaced there.
     progress : called with every sample that is recorded.
-    stepper : takes the steps; `ImplicitEuler` with `matrix` without.
+    stepper : takes the steps; None: `ImplicitEuler()`.
     stop : called with the sample at every time of the grid; the motion ends where it returns True.
     interruptible : whether a KeyboardInterrupt ends the motion and what was finished is returned, `report.end` saying
         so; else it is raised, as everywhere.
@@ -213,66 +212,88 @@ def simulate(
     _check(motion, state, velocity, until - start, step, every, halvings)
     count = max(1, ceil((until - start) / step - 1e-9))
     refuse_unstable(motion, state, (until - start) / count)
-    begun = clock.perf_counter()
-    grid = _Grid(start, (until - start) / count)
-    stepper = stepper or ImplicitEuler(matrix)
+    begun, end = clock.perf_counter(), End.FINISHED
+    grid, first = _Grid(start, (until - start) / count), Sample(start, state.copy(), velocity.copy(), motion.in_parts())
+    march = _March(stepper or ImplicitEuler(), grid, first, halvings)
     recorder = Recorder(1 + count // every, state.shape, stream)
-    sample = Sample(start, state.copy(), velocity.copy(), motion.in_parts())
-    tally = _Tally()
-    end = End.FINISHED
 
     def record() -> None:
-        recorder.add(sample)
+        recorder.add(march.sample)
         if progress is not None:
-            progress(sample)
+            progress(march.sample)
 
     try:
         record()
-        while grid.number < count:
-            taken = stepper.take(
-                sample.motion, sample.state, sample.velocity, time=sample.time, step=grid.step
-            )  # fmt: skip
-            tally.factorizations += taken.factorizations
-            if isinstance(taken, Refused):
-                tally.refused += 1
-                tally.reason = taken.reason
-                if grid.level == halvings:
-                    end = End.STALLED
-                    break
-                grid = grid.halved()
-                continue
-            tally.steps += 1
-            tally.iterations += taken.iterations
-            tally.smallest = min(tally.smallest, grid.step)
-            ahead = grid.next(grow=taken.iterations <= EASY)
-            sample = Sample(ahead.time, taken.state, taken.velocity, sample.motion.refreshed(taken.state))
-            even, grid = ahead.number > grid.number, ahead
-            if even and grid.number % every == 0:
+        while march.grid.number < count:
+            on_grid = march.advance()
+            if on_grid and march.grid.number % every == 0:
                 record()
-            if even and stop is not None and stop(sample):
+            if on_grid and stop is not None and stop(march.sample):
                 end = End.STOPPED
                 break
+    except _StalledError:
+        end = End.STALLED
     except KeyboardInterrupt:
         if not interruptible:
             raise
         end = End.INTERRUPTED
-    report = MotionReport(
-        end, tally.steps, tally.refused, tally.iterations, tally.factorizations, tally.smallest,
-        clock.perf_counter() - begun, tally.reason,
-    )  # fmt: skip
-    series = recorder.series(sample, report)
+    series = recorder.series(march.sample, march.report(end, clock.perf_counter() - begun))
     if end is End.STALLED:
         raise ConvergenceError(
-            f"the motion {end.sentence}: stopped at t = {sample.time:.6g} s with a step of {grid.step:.3g} s "
-            f"({tally.reason})",
+            f"the motion {end.sentence}: stopped at t = {march.sample.time:.6g} s with a step of "
+            f"{march.grid.step:.3g} s ({march.reason})",
             series,
         )
     return series
 
 
+class _StalledError(Exception):
+    """A step failed that may not be halved any more."""
+
+
+@dataclass
+class _March:
+    """A motion on its way: where it is, and what it took."""
+
+    stepper: Stepper
+    grid: "_Grid"
+    sample: Sample
+    halvings: int
+    steps: int = 0
+    refused: int = 0
+    iterations: int = 0
+    factorizations: int = 0
+    smallest: float = float("inf")
+    reason: str = ""
+
+    def advance(self) -> bool:
+        """Take the next step, or halve it; whether that has led to a time of the even grid."""
+        here, grid = self.sample, self.grid
+        taken = self.stepper.take(here.motion, here.state, here.velocity, time=here.time, step=grid.step)
+        self.factorizations += taken.factorizations
+        if isinstance(taken, Refused):
+            self.refused += 1
+            self.reason = taken.reason
+            if grid.level == self.halvings:
+                raise _StalledError
+            self.grid = grid.halved()
+            return False
+        self.steps += 1
+        self.iterations += taken.iterations
+        self.smallest = min(self.smallest, grid.step)
+        self.grid = grid.next(grow=taken.iterations <= EASY)
+        self.sample = Sample(self.grid.time, taken.state, taken.velocity, here.motion.refreshed(taken.state))
+        return self.grid.number > grid.number
+
+    def report(self, end: End, seconds: float) -> MotionReport:
+        return MotionReport(
+            end, self.steps, self.refused, self.iterations, self.factorizations, self.smallest, seconds, self.reason
+        )
+
+
 @dataclass(frozen=True)
 class _Grid:
-    """A place among the times start + number * length, and between them in parts of 2^-level."""
+    """One of the times start + number * length, or between them in parts of 2^-level."""
 
     start: float
     length: float
@@ -282,33 +303,23 @@ class _Grid:
 
     @property
     def step(self) -> float:
-        return self.length / 2**self.level
+        return self.length / float(2**self.level)
 
     @property
     def time(self) -> float:
-        return self.start + (self.number + self.part / 2**self.level) * self.length
+        return self.start + (self.number + self.part / float(2**self.level)) * self.length
 
     def halved(self) -> "_Grid":
         return _Grid(self.start, self.length, self.number, self.level + 1, 2 * self.part)
 
     def next(self, *, grow: bool) -> "_Grid":
-        """The end of this step; from there steps are twice as long, if they may be and the place allows it."""
+        """The end of this step; from there steps are twice as long, if they may be and the time allows it."""
         number, part, level = self.number, self.part + 1, self.level
         if part == 2**level:
             number, part = number + 1, 0
         if grow and level > 0 and part % 2 == 0:
             part, level = part // 2, level - 1
         return _Grid(self.start, self.length, number, level, part)
-
-
-@dataclass
-class _Tally:
-    steps: int = 0
-    refused: int = 0
-    iterations: int = 0
-    factorizations: int = 0
-    smallest: float = float("inf")
-    reason: str = ""
 
 
 def _check(

@@ -111,7 +111,7 @@ class QdldlFactors:
         assert self._solver is not None, GIVEN_AWAY
         x = np.asarray(self._solver.solve(right))
         residual = right - self._matrix @ x - self._matrix.T @ x + self._matrix.diagonal() * x
-        return x + np.asarray(self._solver.solve(residual))
+        return np.asarray(x + self._solver.solve(residual))
 
 
 GIVEN_AWAY = "the memory of these factors was given to another factorisation"
@@ -255,27 +255,27 @@ def _numeric(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Eliminate the supernodes of a `part`, front by front; False where a pivot vanishes or is not finite.
 
-    A front of `size` rows and `own` pivots is kept as its pivots' rows (own, padded), in `unscaled` while it is
+    A front of `size` rows and `width` pivots is kept as its pivots' rows (width, padded), in `unscaled` while it is
     eliminated, then divided by the pivots in `panels`; and as its update matrix, upper triangle, in `stacks`.
     """
     for s in part:
-        size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         stride = padded(size)
-        rows = unscaled[: own * stride].reshape(own, stride)
+        rows = unscaled[: width * stride].reshape(width, stride)
         rows[:] = 0.0
         for e in range(entry_start[s], entry_start[s + 1]):
             unscaled[entry_place[e]] += data[entry_source[e]]
         for e in range(child_start[s], child_start[s + 1]):
             child = _update(children[e], first, row_start, update_start, stacks)
-            add_rows(rows, child, runs[run_start[e] : run_start[e + 1]], 0, own)
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(own, stride)
+            add_rows(rows, child, runs[run_start[e] : run_start[e + 1]], 0, width)
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, stride)
         if not eliminate(rows, panel, pivots[first[s] : first[s + 1]], work):
             return False
         update = _update(s, first, row_start, update_start, stacks)
-        subtract_product(panel, rows, 0, own, own, 0, update, work)
+        subtract_product(panel, rows, 0, width, width, 0, update, work)
         for e in range(child_start[s], child_start[s + 1]):
             child = _update(children[e], first, row_start, update_start, stacks)
-            add_rows(update, child, runs[run_start[e] : run_start[e + 1]], own, size)
+            add_rows(update, child, runs[run_start[e] : run_start[e + 1]], width, size)
     return True
 
 
@@ -309,19 +309,19 @@ def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside)
     """Forward and backward substitution in place, supernode by supernode."""
     supers = len(first) - 1
     for s in range(supers):
-        size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(own, padded(size))
+        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
-        values[:own], values[own:] = x[first[s] : first[s + 1]], 0.0
+        values[:width], values[width:] = x[first[s] : first[s + 1]], 0.0
         forward(panel, values, aside)
-        x[first[s] : first[s + 1]] = values[:own]
-        for i in range(own, size):
+        x[first[s] : first[s + 1]] = values[:width]
+        for i in range(width, size):
             x[rows[row_start[s] + i]] += values[i]
     for s in range(supers - 1, -1, -1):
-        size, own = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
-        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(own, padded(size))
+        size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
+        panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
         for i in range(size):
             values[i] = x[rows[row_start[s] + i]]
         backward(panel, pivots[first[s] : first[s + 1]], values, aside)
-        x[first[s] : first[s + 1]] = values[:own]
+        x[first[s] : first[s + 1]] = values[:width]

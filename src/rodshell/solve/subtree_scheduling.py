@@ -10,12 +10,12 @@ WORTHWHILE = 1e8  # multiplications from which on work is shared
 
 
 @nb.njit(cache=True)
-def parts_of(up, own, below):  # type: ignore[no-untyped-def]
+def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them."""
     supers = len(up)
     lowest, work = np.arange(supers), np.empty(supers)
     for s in range(supers):
-        work[s] = own[s] * float(own[s] + below[s]) ** 2
+        work[s] = width[s] * float(width[s] + below[s]) ** 2
     total = work.sum()
     for s in range(supers):  # children come before their parents, and a subtree is a run that ends with its root
         if up[s] >= 0:

@@ -1,7 +1,7 @@
 """The symbolic phase of a multifrontal factorisation: from a pattern and an order to the maps of the numeric one.
 
-All of it but the last maps is done on *blocks*, unknowns that lie at one place and are coupled alike: a node's
-directions of motion. Tree, supernodes and fronts are found from a graph some ten times smaller than the matrix.
+All but the last maps is done on *blocks*, unknowns that lie at one point and are coupled alike: a node's directions
+of motion. Tree, supernodes and fronts are found from a graph some ten times smaller than the matrix.
 """
 
 from typing import NamedTuple
@@ -23,8 +23,10 @@ class Plan(NamedTuple):
     rows: Longs  # permuted row indices of each front, its own columns first
     child_start: Longs  # (n_s + 1,)
     children: Longs
-    run_start: Longs  # beside `children`
-    runs: Longs  # (r, 2) rows of a child's update matrix that stay side by side in the front: the first, and its place
+    run_start: Longs  # (c + 1,) where the runs of each of the `children` begin
+    runs: (
+        Longs  # (r, 2) rows of a child's update matrix that stay contiguous in the front: the first, and its row there
+    )
     entry_start: Longs  # (n_s + 1,)
     entry_source: Longs  # which value of the matrix
     entry_place: Longs  # where it goes in the rows of the front's pivots
@@ -188,14 +190,14 @@ def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
         begin, rows, wide, empty = first[s], size[s], width[s], zeros[s]
         while kept > 0 and parent[begin - 1] == begin:
             narrow = width[kept - 1]
-            taller, own = narrow + rows, narrow + wide
+            taller, wider = narrow + rows, narrow + wide
             more = empty + zeros[kept - 1] + narrow * (taller - size[kept - 1])
-            total = own * taller - own * (own - 1) // 2
-            share = 0.6 if own <= 8 else (0.35 if own <= 24 else (0.12 if own <= 64 else 0.04))
+            total = wider * taller - wider * (wider - 1) // 2
+            share = 0.6 if wider <= 8 else (0.35 if wider <= 24 else (0.12 if wider <= 64 else 0.04))
             if more > share * total:
                 break
             kept -= 1
-            begin, rows, wide, empty = first[kept], taller, own, more
+            begin, rows, wide, empty = first[kept], taller, wider, more
         first[kept], size[kept], width[kept], zeros[kept] = begin, rows, wide, empty
         kept += 1
     first[kept] = n
@@ -294,11 +296,11 @@ def _maps(  # type: ignore[no-untyped-def]
                 all_rows[used] = column[k] + d
                 used += 1
         all_start[s + 1] = used
-        size, own = used - all_start[s], column[first[s + 1]] - column[first[s]]
-        below[s] = size - own
+        size, width = used - all_start[s], column[first[s + 1]] - column[first[s]]
+        below[s] = size - width
         stride = padded(size)
-        panel_start[s + 1] = panel_start[s] + own * stride
-        largest, widest = max(largest, size), max(widest, own * stride)
+        panel_start[s + 1] = panel_start[s] + width * stride
+        largest, widest = max(largest, size), max(widest, width * stride)
         for e in range(child_start[s], child_start[s + 1]):
             c, count, at, past = children[e], run_start[e], 0, -1
             for k in rows[row_start[c] + first[c + 1] - first[c] : row_start[c + 1]]:

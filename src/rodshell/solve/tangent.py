@@ -122,9 +122,9 @@ class Tangent:
         def inverse(vector: Floats) -> Floats:
             return root * factors.solve(root * vector)
 
-        start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root)))))
-        values, basis = subspace_iteration(inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps)
-        shapes = np.array([factors.solve(root * column) for column in basis.T[:count]]).reshape(count, size)
+        start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root))))).T
+        values, rows = subspace_iteration(inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps)
+        shapes = np.array([factors.solve(root * row) for row in rows[:count]]).reshape(count, size)
         shapes /= np.sqrt(np.einsum("ki,i,ki->k", shapes, weight, shapes))[:, None]
         expanded = np.array([self.freedom.expand(shape) for shape in shapes]).reshape(count, *self.state.shape)
         return Modes(1.0 / values[:count] - shift, expanded)
@@ -158,7 +158,7 @@ class Tangent:
         else:
             raise SingularError("the state is not stable along a motion without mass: give mass to all that moves")
         root = np.sqrt(weight)
-        start = np.random.default_rng(0).standard_normal((len(weight), 1))
+        start = np.random.default_rng(0).standard_normal((1, len(weight)))
         value, _ = subspace_iteration(
             lambda x: root * factors.solve(root * x), start, settled=1, tolerance=1e-2, most_sweeps=MOST_SWEEPS
         )
@@ -241,23 +241,36 @@ def subspace_iteration(
     Parameters
     ----------
     apply : the operator, on vectors (n,).
-    start : (n, m) vectors to begin with.
+    start : (m, n) vectors to begin with.
     settled : so many of the largest eigenvalues must have settled.
     tolerance : relative change of these in the last sweep.
     most_sweeps : it ends after so many in any case.
 
     Returns
     -------
-    Values (m,) descending, and directions (n, m), orthogonal but not of unit length.
+    Values (m,) descending, and directions (m, n), orthogonal but not of unit length.
     """
-    basis, before = start, np.full(start.shape[1], np.inf)
+    rows, before = start, np.full(len(start), np.inf)
     values = before
     for _ in range(most_sweeps):
-        basis = np.linalg.qr(basis)[0]
-        images = np.column_stack([apply(column) for column in basis.T])
-        values, turn = np.linalg.eigh(basis.T @ images)
-        values, basis = values[::-1], images @ turn[:, ::-1]
+        rows = orthonormal(rows)
+        images = np.array([apply(row) for row in rows])
+        values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
+        values, rows = values[::-1], np.einsum("ji,jk->ik", turn[:, ::-1], images)
         if (np.abs(before - values)[:settled] <= tolerance * values[:settled]).all():
             break
         before = values
-    return values, basis
+    return values, rows
+
+
+def orthonormal(rows: Floats) -> Floats:
+    """The rows (m, n), orthogonal to each other and of unit length, by Gram and Schmidt, twice, the first row first.
+
+    Vectors are few and long here: threads of a BLAS would cost more than they save.
+    """
+    result = rows.copy()
+    for k, row in enumerate(result):
+        for _ in range(2):
+            row -= np.einsum("i,ik->k", np.einsum("ik,k->i", result[:k], row), result[:k])
+            row /= np.sqrt(np.einsum("k,k->", row, row))
+    return result

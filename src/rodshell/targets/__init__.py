@@ -1,32 +1,14 @@
-"""What the user wants: surfaces with signed gap, normal, curvature and an end."""
+"""Target surfaces with signed distance, normal, curvature and an end: formulas, meshes, NURBS, heights."""
 
-from rodshell.targets.domain import Disc, Domain, EllipseDomain, Rectangle
-from rodshell.targets.formula import Formula, parse_formula
+from rodshell.targets.domain import Disc, Rectangle
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.from_file import Placement, heights_from, surface_from
 from rodshell.targets.heightfield import HeightField
-from rodshell.targets.jet import Jet
+from rodshell.targets.patch import Patch, Seam
 from rodshell.targets.quadric import Cap, Ellipsoid, Hemisphere, Paraboloid
 from rodshell.targets.target import Gap, Implicit, Target
 
 __all__ = [
-    "Cap",
-    "Disc",
-    "Domain",
-    "Ellipsoid",
-    "EllipseDomain",
-    "Formula",
-    "Freeform",
-    "Gap",
-    "HeightField",
-    "Hemisphere",
-    "Implicit",
-    "Jet",
-    "Paraboloid",
-    "Placement",
-    "Rectangle",
-    "Target",
-    "heights_from",
-    "parse_formula",
-    "surface_from",
-]
+    "Cap", "Disc", "Ellipsoid", "Freeform", "Gap", "HeightField", "Hemisphere", "Implicit", "Paraboloid", "Patch",
+    "Placement", "Rectangle", "Seam", "Target", "heights_from", "surface_from",
+]  # fmt: skip

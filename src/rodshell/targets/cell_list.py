@@ -111,10 +111,10 @@ def _sorted(points, low, shape, cell):  # type: ignore[no-untyped-def]
         start[cells[n] + 1] += 1
     for k in range(1, len(start)):
         start[k] += start[k - 1]
-    place, order = start[:-1].copy(), np.empty(len(points), dtype=np.intp)
+    filled, order = start[:-1].copy(), np.empty(len(points), dtype=np.intp)
     for n in range(len(points)):
-        order[place[cells[n]]] = n
-        place[cells[n]] += 1
+        order[filled[cells[n]]] = n
+        filled[cells[n]] += 1
     return start, order
 
 

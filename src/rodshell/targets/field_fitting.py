@@ -34,7 +34,7 @@ RIDGE = 1e-7  # of the sum of weights: keeps the least squares regular where poi
 
 # past an open rim
 EASE = 1.5  # [rad] curvature fades as 1 / (1 + turned / EASE), so that the surface does not roll up
-DIRECTIONS = 12  # in which a cubic past the rim looks for places of the next
+DIRECTIONS = 12  # in which a cubic past the rim looks for sites of the next
 MEANS = 10  # cubics of which a new one is the mean
 
 
@@ -106,9 +106,9 @@ def _thinned(points: Floats, normals: Floats, areas: Floats, apart: float) -> Sa
     points, normals, areas = points[sound], normals[sound], areas[sound]
     cell = np.floor((points - points.min(axis=0)) / apart).astype(np.int64)
     facing = (normals @ [0.577, 0.578, 0.579] > 0).astype(np.int64)  # two sheets in one cell stay two
-    first, place = unique_rows(np.column_stack([cell, facing]))
+    first, cell_of = unique_rows(np.column_stack([cell, facing]))
     order = np.argsort(first)
-    weight = np.bincount(place, areas)
+    weight = np.bincount(cell_of, areas)
     return Samples(points[first][order], unit(normals[first][order]), np.maximum(weight, 1e-3 * weight.mean())[order])
 
 
@@ -202,7 +202,7 @@ def _enclosed(points: Floats, loop: Floats) -> Bools:
     return inside
 
 
-def patch_spacing(area: float, count: int) -> float:
+def cubic_spacing(area: float, count: int) -> float:
     """Distance between cubics [m] for a surface of `area` [m2] that is known at `count` points."""
     return sqrt(area / min(max(count / POINTS_EACH, FEWEST), MOST))
 
@@ -213,7 +213,7 @@ def fit_field(samples: Samples, spacing: float, *, past: float, reach: float) ->
     Parameters
     ----------
     samples : of the surface.
-    spacing : distance between cubics [m], see `patch_spacing`.
+    spacing : distance between cubics [m], see `cubic_spacing`.
     past : how far the field is continued past an open rim [m].
     reach : distance from the cubics up to which the field is defined [m].
 
@@ -282,10 +282,10 @@ def _continued(field: SmoothField, points: CellList, rings: int) -> SmoothField:
     """
     front = np.arange(len(field.centres))
     for _ in range(rings):
-        places = _proposals(field, front, points)
-        if len(places) == 0:
+        sites = _proposals(field, front, points)
+        if len(sites) == 0:
             break
-        added = _ring(field, places)
+        added = _ring(field, sites)
         first = len(field.centres)
         field = SmoothField(
             np.vstack([field.centres, added.centres]), np.vstack([field.frames, added.frames]),
@@ -302,20 +302,20 @@ def _proposals(field: SmoothField, front: Ints, points: CellList) -> Floats:
     terms = np.stack([np.ones(DIRECTIONS), a, b, a * a, a * b, b * b, a**3, a * a * b, a * b * b, b**3])
     lift = field.coefficients[front] @ terms
     around = np.stack(np.broadcast_arrays(s * a, s * b, lift), axis=2) @ field.frames[front]
-    places = (field.centres[front][:, None] + around).reshape(-1, 3)
-    places = places[field.buckets.nearest(places, limit=0.8 * s)[0][:, 0] > 0.8 * s]
-    places = places[points.nearest(places, limit=0.6 * s)[0][:, 0] > 0.6 * s]
-    return places[CellList.of(places, s).spread(0.8 * s)] if len(places) else places
+    sites = (field.centres[front][:, None] + around).reshape(-1, 3)
+    sites = sites[field.cells.nearest(sites, limit=0.8 * s)[0][:, 0] > 0.8 * s]
+    sites = sites[points.nearest(sites, limit=0.6 * s)[0][:, 0] > 0.6 * s]
+    return sites[CellList.of(sites, s).spread(0.8 * s)] if len(sites) else sites
 
 
-def _ring(field: SmoothField, places: Floats) -> SmoothField:
-    """New cubics at about the points `places` (n, 3): means of position, normal and curvature of cubics nearby."""
-    distance, index = field.buckets.nearest(places, min(MEANS, len(field.centres)))
-    centres, normals = np.empty_like(places), np.empty_like(places)
-    patches = field.centres, field.frames, field.coefficients, field.spacing
-    _means(places, distance, index, *patches, centres, normals)
-    frames, coefficients = _frames(unit(normals)), np.zeros((len(places), TERMS))
-    _curvatures(places, distance, index, *patches, frames, coefficients)
+def _ring(field: SmoothField, sites: Floats) -> SmoothField:
+    """New cubics at about the points `sites` (n, 3): means of position, normal and curvature of cubics nearby."""
+    distance, index = field.cells.nearest(sites, min(MEANS, len(field.centres)))
+    centres, normals = np.empty_like(sites), np.empty_like(sites)
+    cubics = field.centres, field.frames, field.coefficients, field.spacing
+    _means(sites, distance, index, *cubics, centres, normals)
+    frames, coefficients = _frames(unit(normals)), np.zeros((len(sites), TERMS))
+    _curvatures(sites, distance, index, *cubics, frames, coefficients)
     return replace(field, centres=centres, frames=frames, coefficients=coefficients)
 
 
@@ -331,21 +331,21 @@ def _weight(distance, index, frames, spacing):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _local(place, centre, e, spacing):  # type: ignore[no-untyped-def]
+def _local(site, centre, e, spacing):  # type: ignore[no-untyped-def]
     """Coordinates of a point over the plane of a cubic, those in the plane in spacings."""
-    d = place - centre
+    d = site - centre
     return _along(e[0], d) / spacing, _along(e[1], d) / spacing, _along(e[2], d)
 
 
 @njit(cache=True, error_model="numpy")
-def _means(places, distance, index, centres, frames, coefficients, spacing, mean, normals):  # type: ignore[no-untyped-def]
-    """Weighted means (n, 3) of the points above `places` (n, 3) on the cubics nearby, and of their normals."""
-    for n in range(len(places)):
+def _means(sites, distance, index, centres, frames, coefficients, spacing, mean, normals):  # type: ignore[no-untyped-def]
+    """Weighted means (n, 3) of the points above `sites` (n, 3) on the cubics nearby, and of their normals."""
+    for n in range(len(sites)):
         weight = _weight(distance[n], index[n], frames, spacing)
-        mean[n], normals[n] = places[n], 0.0
+        mean[n], normals[n] = sites[n], 0.0
         for k in range(len(weight)):
             e, c = frames[index[n, k]], coefficients[index[n, k]]
-            a, b, h = _local(places[n], centres[index[n, k]], e, spacing)
+            a, b, h = _local(sites[n], centres[index[n, k]], e, spacing)
             height = c[0] + a * (c[1] + a * (c[3] + a * c[6])) + b * (c[2] + b * (c[5] + b * c[9]))
             height += a * b * (c[4] + a * c[7] + b * c[8])
             slope_a = c[1] + a * (2 * c[3] + 3 * a * c[6]) + b * (c[4] + 2 * a * c[7] + b * c[8])
@@ -358,20 +358,20 @@ def _means(places, distance, index, centres, frames, coefficients, spacing, mean
 
 @njit(cache=True, error_model="numpy")
 def _curvatures(  # type: ignore[no-untyped-def]
-    places, distance, index, centres, frames, coefficients, spacing, turned, quadrics
+    sites, distance, index, centres, frames, coefficients, spacing, turned, quadrics
 ):
     """Quadrics (n, 10) over `turned` frames (n, 3, 3), with the weighted mean of the curvature of the cubics nearby.
 
     Each cubic is rotated into the new tangent plane by the smallest angle. The mean is reduced by `EASE`, so that the
     surface does not roll up: over one spacing it turns by its largest principal value.
     """
-    for n in range(len(places)):
+    for n in range(len(sites)):
         weight = _weight(distance[n], index[n], frames, spacing)
         x, y, z = turned[n]
         aa = ab = bb = 0.0
         for k in range(len(weight)):
             e, c = frames[index[n, k]], coefficients[index[n, k]]
-            a, b, _ = _local(places[n], centres[index[n, k]], e, spacing)
+            a, b, _ = _local(sites[n], centres[index[n, k]], e, spacing)
             bend_a, bend_b = 2 * c[3] + 6 * a * c[6] + 2 * b * c[7], 2 * c[5] + 6 * b * c[9] + 2 * a * c[8]
             twist = c[4] + 2 * a * c[7] + 2 * b * c[8]
             # v turns by v - (v.z) (e2 + z) / (1 + e2.z) for v across e2

@@ -123,9 +123,9 @@ class _Compiler:
             self._step(operator.pos, result)
         constants = dict.fromkeys(a for step in self.steps for a in step[1:] if isinstance(a, float))
         operands: list[_Operand] = ["x", "y", *constants, *self.steps.values()]
-        place: dict[_Operand | None, Slot | None] = {None: None}
-        place |= {operand: slot for slot, operand in enumerate(operands)}
-        steps = tuple((function, place[a] or 0, place[b]) for function, a, b in self.steps)
+        slot_of: dict[_Operand | None, Slot | None] = {None: None}
+        slot_of |= {operand: slot for slot, operand in enumerate(operands)}
+        steps = tuple((function, slot_of[a] or 0, slot_of[b]) for function, a, b in self.steps)
         return Formula(self.text, tuple(constants), steps)
 
     def _parse(self) -> ast.expr:

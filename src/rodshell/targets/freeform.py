@@ -10,7 +10,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.vectors import cross, dot, unit
-from rodshell.targets.field_fitting import fill_openings, fit_field, mesh_samples, patch_spacing
+from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_field, mesh_samples
 from rodshell.targets.rim import Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Gap, Implicit, Target
@@ -126,7 +126,7 @@ class Freeform(Target):
 
     @cached_property
     def _fitted(self) -> tuple[SmoothField, int]:
-        spacing = patch_spacing(float(self.surface.areas.sum()), len(self.surface.vertices))
+        spacing = cubic_spacing(float(self.surface.areas.sum()), len(self.surface.vertices))
         samples = fill_openings(self.surface, mesh_samples(self.surface, spacing), spacing)
         return fit_field(samples, spacing, past=PAST * self._extent, reach=self._extent)
 

@@ -15,7 +15,7 @@ TABLES = (".csv", ".txt")
 GRID_FILES = (*TABLES, ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff")
 FEWEST = 4  # heights each way
 POINT = 3  # numbers in a row of points x, y, z; heights need more each way
-EVEN = 0.02  # of a step: coordinates go in equal steps, but for their rounding
+EVEN = 0.02  # of a step: coordinates go in equal steps, except for rounding
 LEAP = 4.0  # times the change to the next row: a row of coordinates differs by more, a surface hardly ever
 SQUARE = 0.01  # relative: by how much the proportion of points may differ from that of the size
 

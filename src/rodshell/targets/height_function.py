@@ -297,8 +297,8 @@ def _refuse(at: Floats, domain: Region, name: str) -> None:
 
 
 def _nearest_centre(at: Floats, domain: Region) -> tuple[float, float]:
-    place = at[:2, int(np.argmin(relative_radius(domain, at[0], at[1])))]
-    x, y = np.where(np.abs(place) < 1e-9 * max(domain.half_extent), 0.0, place)
+    nearest = at[:2, int(np.argmin(relative_radius(domain, at[0], at[1])))]
+    x, y = np.where(np.abs(nearest) < 1e-9 * max(domain.half_extent), 0.0, nearest)
     return float(x), float(y)
 
 

@@ -53,7 +53,7 @@ class Seam:
         return Seam(plan)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Seam) and np.array_equal(self.points, other.points)
+        return np.array_equal(self.points, other.points) if isinstance(other, Seam) else NotImplemented
 
     def __hash__(self) -> int:
         return hash(tuple(map(tuple, self.points.tolist())))
@@ -108,7 +108,7 @@ class Seam:
         return k, share[row, k], off[row, k]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Patch(Target):
     """A part of a target: the points on given sides of its seams.
 

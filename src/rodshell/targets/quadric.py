@@ -16,7 +16,7 @@ from rodshell.targets.wall_below_rim import WalledTarget
 from rodshell.validation import number, positive
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Quadric(WalledTarget):
     """F = scale (sum_k w_k x_k^2 + slope z - 1), centred on the origin, cut at the base plane."""
 

@@ -45,7 +45,7 @@ class SmoothField:
     reach: float
 
     @cached_property
-    def buckets(self) -> CellList:
+    def cells(self) -> CellList:
         """The centres, sorted for searches of the nearest."""
         return CellList.of(self.centres, self.spacing)
 
@@ -68,7 +68,7 @@ class SmoothField:
 
     def nearest(self, x: Floats) -> tuple[Floats, Ints]:
         """Distance (n,) [m] of the points `x` (n, 3) to the nearest centre, and its index (n,)."""
-        distance, index = self.buckets.nearest(x)
+        distance, index = self.cells.nearest(x)
         return distance[:, 0], index[:, 0]
 
     def implicit(self, x: Floats, *, second: bool = True) -> Implicit:
@@ -99,7 +99,7 @@ _ALL = 25 * LANES
 def _blend(  # type: ignore[no-untyped-def]
     x, distance, nearest, radius, start, near, away, packed, width2, second, value, gradient, hessian
 ):
-    """F, its gradient and, if `second`, its Hessian, for up to four points at a time that share a list of patches.
+    """F, its gradient and, if `second`, its Hessian, for up to four points at a time that share a list of cubics.
 
     The weights' common factor cancels, so that log w_j = t_j . x + const with t_j = 2 (c_j - c_i) / width^2:
     F = N / D, N = sum w Q, D = sum w, grad N = sum w (grad Q + Q t), grad D = sum w t = A,
@@ -132,8 +132,8 @@ def _blend(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-untyped-def]
-    """Begin the sums of the point `first` and of those after it that its list serves: their number, and how far from
-    its patch the furthest lies that counts for one of them, by the triangle's inequality."""
+    """Start the sums of the point `first` and of those after it that can use its list. Returns their number, and the
+    distance from its nearest centre up to which centres contribute to any of them, by the triangle inequality."""
     work[:] = 0.0
     count, furthest = 0, 0.0
     for m in range(LANES):
@@ -143,7 +143,7 @@ def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-
         reach = np.sqrt(least) + np.sqrt(most)
         if m == count and first + m < len(x) and (m == 0 or reach <= radius):
             count, furthest = m + 1, max(furthest, reach)
-        else:  # a lane to spare
+        else:  # an unused lane
             n = first
         work[_X + m], work[_Y + m], work[_Z + m] = x[n, 0], x[n, 1], x[n, 2]
         work[_LEAST + m], work[_MOST + m] = least, (most - least) / width2
@@ -152,7 +152,7 @@ def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
-    """One patch's part of the sums of four points; see `SmoothField._packed` for its numbers."""
+    """Add one cubic to the sums of four points; see `SmoothField._packed` for its numbers."""
     x, y, z = p[0], p[1], p[2]
     tx, ty, tz = (x - centre[0]) * 2 / width2, (y - centre[1]) * 2 / width2, (z - centre[2]) * 2 / width2
     e0, e1, e2, e3, e4, e5, n0, n1, n2 = p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11]

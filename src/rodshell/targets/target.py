@@ -43,7 +43,7 @@ class Gap(NamedTuple):
     hessian: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Target(ABC):
     """A surface F(x) = 0 that ends at a base plane, a rim or the edge of its plan.
 

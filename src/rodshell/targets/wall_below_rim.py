@@ -26,7 +26,7 @@ UPRIGHT = 0.2  # upward part of a normal: where the edge is not level, a steeper
 CORNER = 0.9  # cosine between edges of the rim: its points are close, and smooth curves turn by far less
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WalledTarget(Target):
     """A target that ends at a base plane or at the edge of its plan.
 
@@ -51,8 +51,8 @@ class WalledTarget(Target):
 
     def outside(self, x: Floats) -> Bools:
         """(n,) whether signs alone show that the points `x` (n, 3) [m] are outside the body."""
-        over, beside = self.level(x)[0] > 0, ~self.plan.holds(x[:, :2])
-        return over | beside if self.base is None else np.where(x[:, 2] < self.base, beside, over)
+        over, past_rim = self.level(x)[0] > 0, ~self.plan.holds(x[:, :2])
+        return over | past_rim if self.base is None else np.where(x[:, 2] < self.base, past_rim, over)
 
     def contact(self, x: Floats) -> Gap:
         """Signed distance of the points `x` (n, 3) [m] to the body: the surface, and the wall below its rim."""

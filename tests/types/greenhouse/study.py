@@ -1,4 +1,4 @@
-"""A greenhouse of laths: formed by calls and as a job, compared, changed, saved and read."""
+"""A greenhouse of wires: formed by calls and as a job, compared, changed, saved and read."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import rodshell as rs
 HEADINGS = ("0 deg", "45 deg")  # of the layout
 
 
-def laths() -> rs.Rod:
-    return rs.Rod(section=rs.RectangularSection(width=1e-3, height=4e-3), material=rs.Material.preset("larch"))
+def wires() -> rs.Rod:
+    return rs.Rod(section=rs.Circle(radius=5e-4), material=rs.Material.preset("petg"))
 
 
 def targets() -> Sequence[rs.Target]:
@@ -51,13 +51,13 @@ def by_call(folder: Path) -> rs.Form:
     """The short way: everything in one call."""
     layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.02)
     form = rs.find_form(
-        rs.Paraboloid(radius=0.2, height=0.1), layout, laths(), method=rs.Bound(), ends=("pinned", "clamped"),
-        joint=rs.Pin(),
+        rs.Paraboloid(radius=0.2, height=0.1), layout, wires(), method=rs.Bound(), ends=("pinned", "clamped"),
+        joint=rs.Ball(mass=1e-4),
     )  # fmt: skip
     assert_type(form, rs.Form)
     worst = max(form.agreement[ends].max_relative for ends in form.popped)
     level: str = form.verdict.level
-    print(level, worst, form.status, form.warnings[:1])
+    print(repr(form), level, worst, form.status, form.warnings[:1])
     saved: Path = form.save(folder)
     print(form.summary(), saved)
     return form

@@ -79,11 +79,11 @@ def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, Compose]:
 
 
 def _strips(plan: FlatPlan, paper: tuple[float, float]) -> list[Sheet]:
-    """The strips at the largest scale at which the longest rod fits, as many to a sheet as find room."""
+    """The strips at the largest scale at which the longest rod fits, as many to a sheet as there is room for."""
     low, high = room(paper)
     width, height = high - low
     longest = max((1e3 * rod.cut_length for rod in plan.rods), default=1.0)
-    scale = next((one for one in SCALES if (longest + 12 * one * TEXT) / one <= width), SCALES[-1])
+    scale = next((scale for scale in SCALES if (longest + 12 * scale * TEXT) / scale <= width), SCALES[-1])
     count = per_sheet(height, TEXT)
     groups = [plan.rods[k : k + count] for k in range(0, len(plan.rods), count)]
     sheets = []

@@ -146,7 +146,7 @@ def _rods(pencil: Pencil, plan: FlatPlan, text: float) -> None:
 
 
 def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: Floats) -> None:
-    """A mark at each joint, and its id in a corner of the mesh beside it, nearer to it than to the next joint.
+    """A mark at each joint, and its id in a corner of the mesh next to it, nearer to it than to the next joint.
 
     It is clear of all `lines` (m, 2, 2), and of those `across` (d, 2, 2) if it can be.
     An id that finds no room, or only in letters too small to read, is left to the mark's note and the schedule.
@@ -173,7 +173,7 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
 
 
 def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
-    """Each rod's at its ends, on its own line; in an opening, around it."""
+    """Each rod's label at its ends, on its line; in an opening, around it."""
     names, outlines = [rod.id for rod in plan.rods], outlines_of(plan.rods)
     inside = [loop for loop in outlines if opens(plan.lines.reshape(-1, 2)[loop])]
     outside = np.ones(2 * len(names), dtype=bool)
@@ -227,7 +227,7 @@ def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     first, second = np.array(pairs).T
     graph = coo_array((np.ones(len(pairs)), (first, second)), shape=(len(plan.rods),) * 2)
     patch = connected_components(graph, directed=False)[1][first]
-    return [[pair for pair, own in zip(pairs, patch, strict=True) if own == one] for one in dict.fromkeys(patch)]
+    return [[pair for pair, k in zip(pairs, patch, strict=True) if k == name] for name in dict.fromkeys(patch)]
 
 
 def _largest_full(met: Bools, x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
@@ -264,7 +264,7 @@ def _dimension(pencil: Pencil, plan: FlatPlan, a: Floats, b: Floats, text: float
 
 def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
     """A frame with millimetre ticks along its lower and left side, and a scale bar of one tick."""
-    corners = np.concatenate([plan.cuts.reshape(-1, 2), *(one.box() for one in pencil.texts), np.zeros((1, 2))])
+    corners = np.concatenate([plan.cuts.reshape(-1, 2), *(label.box() for label in pencil.texts), np.zeros((1, 2))])
     low, high = corners.min(axis=0) - text, corners.max(axis=0) + text
     frame = [low, (high[0], low[1]), high, (low[0], high[1])]
     pencil.line(frame, "DIM", closed=True)
@@ -333,8 +333,8 @@ def _stop(
     if name:
         pencil.write(name, (x + shift, y - 1.6 * text), text, "LABEL", anchor="end", angle=np.pi / 2)
     if kind == "joint":
-        mine, other = rod.record.layer, layer.get(name)
-        below = mine is not None and other is not None and other > mine
+        here, other = rod.record.layer, layer.get(name)
+        below = here is not None and other is not None and other > here
         pencil.mark((at, y), 0.35 * text, "MARK", pen=Pen("#b3372c", 0.07 * text, fill="#b3372c" if below else PAPER))
     elif kind == "splice":
         pencil.line([(at, y - 0.5 * text), (at, y + 0.5 * text)], "MARK", pen=Pen(INK, 0.2 * text))

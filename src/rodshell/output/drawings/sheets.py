@@ -26,7 +26,7 @@ from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, 
 NOTE = "Design aid, not code compliance"
 NOT_GIVEN = "not given"
 COLUMNS = 4  # of entries, side by side
-TRUE_SIZE = ", 1:1"  # after the title of a drawing that is its own file
+TRUE_SIZE = ", 1:1"  # after the title of a drawing in a separate file
 Compose = Callable[[float], Drawing]  # a drawing for the text size [mm at 1:1]
 
 SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200, 250, 300, 400, 500, 1000, 2000, 5000)
@@ -52,8 +52,8 @@ class TitleBlock:
     summary: str
 
     def notes(self, drawing: Drawing) -> list[str]:
-        """What stands below the entries of a drawing; what it leaves out is said last."""
-        left_out = f"Left out for want of room: {'; '.join(drawing.left_out)}." if drawing.left_out else ""
+        """The lines below the entries of a drawing; the last names what it leaves out."""
+        left_out = f"Left out for lack of room: {'; '.join(drawing.left_out)}." if drawing.left_out else ""
         return [f"{self.summary}. {NOTE}.", *filter(None, [left_out])]
 
 
@@ -129,7 +129,7 @@ def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
 
 
 def on_a_page(drawing: Drawing) -> Drawing:
-    """A drawing with its title as a page shows it, which has it in any size: no scale but its bar is true there."""
+    """A drawing for a page, which shows it in any size: its title claims no scale, only its bar is right there."""
     return replace(
         drawing,
         texts=tuple(
@@ -190,7 +190,7 @@ def fitted(compose: Compose, paper: tuple[float, float]) -> Sheet:
     """A drawing on one sheet, in the middle, at the largest standard scale at which it fits."""
     low, high = room(paper)
     bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
-    for scale in (one for one in SCALES if np.all(bare / one <= high - low)):
+    for scale in (scale for scale in SCALES if np.all(bare / scale <= high - low)):
         drawing = compose(TEXT * scale)
         bottom, top = drawing.box()
         if np.all((top - bottom) / scale <= high - low):
@@ -206,7 +206,7 @@ def parts(compose: Compose, paper: tuple[float, float], whole: Sheet, *, true_si
     true_size : at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """
     bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
-    possible = [one for one in SCALES if one < whole.scale and _tiles(bare / one, paper).prod() <= MOST_TILES]
+    possible = [scale for scale in SCALES if scale < whole.scale and _tiles(bare / scale, paper).prod() <= MOST_TILES]
     best = list(tiled(compose, paper)) if true_size and 1 in possible else []
     if best or not whole.content.left_out:
         yield from best
@@ -249,20 +249,22 @@ def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Ite
 def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
     """A table over as many sheets as it takes, in as many columns side by side as fit."""
     (columns, rows), (low, high) = content, room(paper)
+    if not columns:
+        return
     cells = [max((len(row[k]) for row in rows), default=0) for k in range(len(columns))]
     heads = [_wrapped(*head(column), width) for column, width in zip(columns, cells, strict=True)]
     widths = [max(width, *map(len, words)) for width, words in zip(cells, heads, strict=True)]
     steps = FINE * (LETTER * np.array(widths) + 1.2)
     width = float(steps.sum()) + 2 * FINE
-    beside = max(int((high[0] - low[0] + 2 * FINE) // width), 1)
+    abreast = max(int((high[0] - low[0] + 2 * FINE) // width), 1)
     tall = int((high[1] - low[1]) // LEADING) - max(map(len, heads)) - 1
-    per_sheet = tall * beside
+    per_sheet = tall * abreast
     pages = max(ceil(len(rows) / per_sheet), 1)
     for page in range(pages):
         pencil = Pencil()
-        mine = rows[page * per_sheet : (page + 1) * per_sheet]
-        for block in range(ceil(len(mine) / tall) or 1):
-            _block(pencil, heads, mine[block * tall : (block + 1) * tall], low[0] + block * width, high[1], steps)
+        rows_here = rows[page * per_sheet : (page + 1) * per_sheet]
+        for block in range(ceil(len(rows_here) / tall) or 1):
+            _block(pencil, heads, rows_here[block * tall : (block + 1) * tall], low[0] + block * width, high[1], steps)
         many = f", {page + 1} of {pages}" if pages > 1 else ""
         yield Sheet(title + many, pencil.done("table", title, TEXT), 0)
 
@@ -329,7 +331,7 @@ def _frame(block: TitleBlock, sheet: Sheet, number: int, count: int, paper: tupl
 
 
 def _match_lines(low: Floats, high: Floats, here: tuple[int, int], count: Ints, texts: Sequence[Text]) -> Drawing:
-    """Lines along which a sheet meets its neighbours, and which these are, clear of the `texts` there."""
+    """Lines along which a sheet meets its neighbours, with their names, clear of the `texts` there."""
     pencil, (row, column), free = Pencil(), here, Room(20.0)
     for text in texts:
         free.take(text.box())

@@ -107,7 +107,7 @@ def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
 def _span(
     pencil: Pencil, a: tuple[float, float], b: tuple[float, float], length: float, text: float, rounding: Rounding
 ) -> None:
-    """A dimension line with its length [mm] beside it."""
+    """A dimension line with its length [mm] next to it."""
     start, end = np.array(a), np.array(b)
     along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
     across = 0.4 * text * np.array([-along[1], along[0]])
@@ -173,8 +173,8 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
     axes(pencil, text)
     low, _ = pencil.done("", "", text).box()
     for k, line in enumerate(SUPPORTS_LEGEND, start=1):
-        said = line.format(seams="" if alone.all() else ", and seams")
-        pencil.write(said, low - (0.0, 1.5 * k * text), text, "DIM")
+        written = line.format(seams="" if alone.all() else ", and seams")
+        pencil.write(written, low - (0.0, 1.5 * k * text), text, "DIM")
     return pencil.done("supports", "Support plan", text)
 
 
@@ -205,7 +205,7 @@ def _runs(loop: Ints, alone: Bools) -> list[Ints]:
 
 
 def _sewn(archive: Archive) -> set[str]:
-    """The rod ends on seams, which have the number of their meeting instead."""
+    """The rod ends on seams; these have the number of their meeting instead of a name."""
     return {end for seam in archive.results.seams for meeting in seam.meetings for end in meeting.ends}
 
 
@@ -263,9 +263,9 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
 def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list[Text]:
     """The numbers that find room along the diagonals (n, 2, 2) of cells with the `other` diagonals (n, 2, 2)."""
     (a, b), (c, d) = ends.transpose(1, 0, 2), other.transpose(1, 0, 2)
-    angle = np.array([upright(float(one)) for one in np.arctan2(*(b - a).T[::-1])])
-    along, above = (np.column_stack(one) for one in ((np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))))
-    middle, wide = 0.5 * (a + b), LETTER * np.array([len(one) for one in words], dtype=float)
+    angle = np.array([upright(float(direction)) for direction in np.arctan2(*(b - a).T[::-1])])
+    along, above = (np.column_stack(pair) for pair in ((np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))))
+    middle, wide = 0.5 * (a + b), LETTER * np.array([len(word) for word in words], dtype=float)
     lines = np.stack([[a, c], [c, b], [b, d], [d, a], [a, b], [c, d]]).transpose(2, 0, 1, 3) - middle[:, None, None]
     seen = np.einsum("nkpi,jni->nkpj", lines, np.stack([along, above]))  # along and across the diagonal
     room, found = Room(3 * text), dict[int, Text]()

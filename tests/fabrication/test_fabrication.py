@@ -92,7 +92,7 @@ def test_splices_are_the_fewest_and_then_the_least_bent(at: list[int], stock: in
     joints, length = sorted(float(one) for one in at), 32.0
     places = np.linspace(0, length, 33)
     curvature = np.array([random.random() for _ in places])  # type: ignore[attr-defined]
-    made = splices(length, joints, float(stock), places=places, curvature=curvature)
+    made = splices(length, joints, float(stock), stations=places, curvature=curvature)
     ways = choices(length, joints, float(stock))
     if not ways:
         assert made is None
@@ -118,7 +118,7 @@ def test_of_the_fewest_pieces_the_fewest_are_short_and_then_the_bend_counts(
         pieces = np.diff([0.0, *way, length])
         return len(way), int((pieces < short).sum()), max(np.interp(way, places, curvature), default=0.0)
 
-    made = splices(length, joints, float(stock), places=places, curvature=curvature, short=short)
+    made = splices(length, joints, float(stock), stations=places, curvature=curvature, short=short)
     ways = choices(length, joints, float(stock))
     assert (made is None) == (not ways)
     if made is not None:
@@ -147,7 +147,7 @@ def test_short_pieces_are_avoided_where_that_takes_no_more_bars(rods: int, piece
 
 
 def test_a_rod_within_its_stock_is_not_spliced() -> None:
-    assert splices(1.0, [0.2, 0.4], 1.0, places=[0.0, 1.0], curvature=[0.0, 0.0]) == []
+    assert splices(1.0, [0.2, 0.4], 1.0, stations=[0.0, 1.0], curvature=[0.0, 0.0]) == []
 
 
 @pytest.mark.parametrize("turned", [False, True])

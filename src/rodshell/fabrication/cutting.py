@@ -1,0 +1,109 @@
+"""Cutting rods from stock: where to splice a rod that is longer than a bar, and the pieces of each bar."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rodshell.arrays import Floats
+
+TINY = 1e-9  # of a bar: round-off
+Route = tuple[int, int, float, int]  # to a stop: pieces so far, short ones of them, worst bend, the stop before
+
+
+def splices(
+    length: float, joints: ArrayLike, stock: float, *, stations: ArrayLike, curvature: ArrayLike, short: float = 0.0
+) -> list[float] | None:
+    """Distances of the splices from the rod's start [m]; None where stock of this length cannot do.
+
+    A splice lies halfway between two neighbouring joints. The choice has the fewest pieces; among such choices the
+    fewest `short` pieces; among those the least bend at its most bent splice.
+
+    Parameters
+    ----------
+    length : of the rod as cut [m], over which all distances are measured.
+    joints : distances of the joints from the start [m].
+    stock : longest piece [m].
+    short : pieces under this length are avoided [m].
+    stations, curvature : the rod's bend [1/m] at some ascending distances from the start [m].
+    """
+    if length <= stock:
+        return []
+    at = np.unique(np.asarray(joints, dtype=float))
+    middles = 0.5 * (at[:-1] + at[1:])
+    bend = np.interp(middles, np.asarray(stations, dtype=float), np.asarray(curvature, dtype=float))
+    stops = np.concatenate([[0.0], middles, [length]])
+    return _fewest(stops, np.concatenate([[0.0], bend, [0.0]]), stock, short)
+
+
+def _fewest(stops: Floats, bend: Floats, stock: float, short: float) -> list[float] | None:
+    """The way from the first stop to the last in the fewest steps of at most `stock`, then in the fewest under `short`,
+    then of the least worst bend.
+    """
+    best: list[Route | None] = [(0, 0, 0.0, -1)]
+    for k in range(1, len(stops)):
+        ways = [
+            (way[0] + 1, way[1] + (stops[k] - stops[j] < short), max(way[2], float(bend[k])), j)
+            for j, way in enumerate(best)
+            if way is not None and stops[k] - stops[j] <= stock
+        ]
+        best.append(min(ways) if ways else None)
+    return _back(stops, best)
+
+
+def _back(stops: Floats, best: Sequence[Route | None]) -> list[float] | None:
+    found = list[float]()
+    way = best[-1]
+    if way is None:
+        return None
+    while way is not None and way[3] > 0:
+        found.append(float(stops[way[3]]))
+        way = best[way[3]]
+    return found[::-1]
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One bar: the indices of the pieces that are cut from it, longest first, and what is left of it [m]."""
+
+    pieces: tuple[int, ...]
+    left: float
+
+
+@dataclass(frozen=True)
+class Nesting:
+    """All bars.
+
+    Parameters
+    ----------
+    waste : share of the stock that is not in a piece, saw cuts included.
+    fewest : no cutting plan needs fewer bars than this (the pieces' total length over the stock's); a bound, which
+        there need be no plan to reach.
+    """
+
+    bars: tuple[Bar, ...]
+    waste: float
+    fewest: int
+
+
+def nest(lengths: Sequence[float], stock: float, *, kerf: float = 0.0) -> Nesting:
+    """Cut pieces of these `lengths` [m] from bars of the length `stock` [m], first fit decreasing.
+
+    It takes at most 11/9 of the fewest bars that could do, and two thirds of one more [Dosa 2007]. Every piece but
+    one that uses a bar to its end costs one `kerf` [m]. No piece may be longer than a bar.
+    """
+    content, left = list[list[int]](), list[float]()
+    for piece in sorted(range(len(lengths)), key=lambda k: (-lengths[k], k)):
+        need = lengths[piece]
+        bar = next((k for k, rest in enumerate(left) if rest >= need - TINY * stock), len(left))
+        if bar == len(left):
+            content.append([])
+            left.append(stock)
+        content[bar].append(piece)
+        left[bar] = max(left[bar] - need - kerf, 0.0)
+    used = sum(lengths)
+    bars = tuple(Bar(tuple(pieces), rest) for pieces, rest in zip(content, left, strict=True))
+    whole = stock * len(bars)
+    return Nesting(bars, 1.0 - used / whole if bars else 0.0, ceil(used / stock - TINY))
