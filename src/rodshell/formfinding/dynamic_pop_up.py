@@ -112,7 +112,7 @@ def dynamic_pop_up(
     mesh = footprint.mesh
     shell = Shell.of(mesh, rod, joint=joint, coupling=settings.coupling)
     ends = mesh.ends.ravel()
-    flat = laid_below(mesh, boundary.points, float(boundary.points[:, 2].mean()))
+    flat = laid_below(mesh, boundary.points, float(boundary.points.mean(axis=0)[2]))
     state = shell.state(arched(footprint, flat, flat[ends], boundary))
 
     def supports(time: float) -> Supports:

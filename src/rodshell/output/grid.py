@@ -101,7 +101,12 @@ def rods_of(archive: Archive) -> list[GridRod]:
 
 
 def joints_of(rods: list[GridRod]) -> list[GridJoint]:
-    """Every joint once, in the order of the rods; the rod that comes first is named first."""
+    """Every joint once, in the order of the rods; the rod that comes first is named first.
+
+    Parameters
+    ----------
+    rods : all of an archive.
+    """
     index = {rod.id: k for k, rod in enumerate(rods)}
     back = {(rod.id, other): at for rod in rods for other, at in rod.joints}
     return [
@@ -113,12 +118,22 @@ def joints_of(rods: list[GridRod]) -> list[GridJoint]:
 
 
 def joint_places(archive: Archive, positions: Floats) -> dict[str, Floats]:
-    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods."""
+    """Place (3,) [m] in a shape (n, 3) of each joint that has nodes there, by its id: between its two rods.
+
+    Parameters
+    ----------
+    positions : (n, 3) nodes of a shape [m].
+    """
     return {name: positions[nodes].mean(axis=0) for name, nodes in _joint_nodes(archive).items()}
 
 
 def outlines_of(rods: list[GridRod]) -> list[Ints]:
-    """Rod ends along each outline of the flat grid, see `outlines`."""
+    """Rod ends along each outline of the flat grid, see `outlines`.
+
+    Parameters
+    ----------
+    rods : those that are drawn; the ends of rod k are 2 k and 2 k + 1.
+    """
     return _outlines(np.array([rod.flat for rod in rods], dtype=float).tobytes())
 
 

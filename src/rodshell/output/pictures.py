@@ -60,7 +60,12 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 
 
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
-    """The same as a drawing in units of about a pixel, y up, on a ground of paper."""
+    """The same as a drawing in units of about a pixel, y up, on a ground of paper.
+
+    Parameters
+    ----------
+    state, colour : as of `picture_svg`.
+    """
     shape, rods = shape_of(archive, state), rods_of(archive)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
