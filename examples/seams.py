@@ -30,8 +30,8 @@ def check(form: rs.Form) -> None:
     assert form.status == "converged"
     for ends in form.popped:
         place = {
-            (name, rod.name, side): found.popped[ends].positions[found.footprint.mesh.ends[k, side]]
-            for name, found in form.found.items()
+            (found.name, rod.name, side): found.popped[ends].positions[found.footprint.mesh.ends[k, side]]
+            for found in form.patches
             for k, rod in enumerate(found.footprint.rods)
             for side in (0, 1)
         }

@@ -241,7 +241,7 @@ class Form:
         Parameters
         ----------
         options : as of `archive`.
-        kinds : of files besides the archive, such as "dxf", "csv"; default: all that every installation can.
+        kinds : of files in addition to the archive, such as "dxf", "csv"; default: all that every installation can.
         force : also replace files that rodshell did not write, or that were changed since, where it has to write.
 
         Raises

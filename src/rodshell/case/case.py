@@ -253,7 +253,7 @@ def _value(value: object) -> str:
         return f"{{ {inside} }}" if inside else "{}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
-    if isinstance(value, str):  # JSON's escapes are TOML's, but for the character DEL
+    if isinstance(value, str):  # JSON's escapes are TOML's, except for the character DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     assert isinstance(value, int | float)  # the schema has no other values
     return repr(value)

@@ -197,9 +197,7 @@ class SeamsTable(Table):
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
     stages: Whole = Field(default=8, description="equilibria of the deployment from flat; 0: it is not followed")
-    shear_strength: Stress | None = Field(
-        default=None, description="in shear along the fibres; default: as von Mises has it"
-    )
+    shear_strength: Stress | None = Field(default=None, description="in shear along the fibres; default: by von Mises")
 
 
 class FabricationTable(Table):

@@ -12,7 +12,7 @@ PATIENCE = 3  # signals after which the process ends without cleaning up
 
 
 def end_at_once() -> None:
-    """Let signals end the process silently but for one line, as long as there is nothing to clean up."""
+    """Let signals end the process silently except for one line, as long as there is nothing to clean up."""
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell's background jobs ignore Ctrl-C
             signal.signal(number, _end)

@@ -46,7 +46,7 @@ def warm_up(progress: Progress) -> int:
     from numba.core import event
 
     class Heard(event.Listener):  # type: ignore[misc, unused-ignore]
-        """Counts compilations, and tells of each as it begins; what a kernel calls is compiled within it."""
+        """Counts compilations, and reports each as it begins; what a kernel calls is compiled within it."""
 
         depth = count = 0
         stage = ""
