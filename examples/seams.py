@@ -38,7 +38,7 @@ def check(form: rs.Form) -> None:
         for meeting in form.meetings:
             first, second = ((end.patch, end.rod, end.side) for end in meeting.ends)
             assert np.array_equal(place[first], place[second])
-        assert form.popped[ends][1].stable
+        assert form.popped[ends].report.stable
 
 
 def roof() -> rs.Form:

@@ -238,6 +238,6 @@ def test_laths_that_buckle_everywhere_are_given_up_at_once_with_the_cause():
 
 @pytest.mark.slow
 def test_popup_of_a_result_in_two_layers_is_refused(tmp_path):
-    folder = form("ellipsoid").archive().save(tmp_path / "oval", kinds=())
+    folder = form("ellipsoid").save(tmp_path / "oval", kinds=())
     with pytest.raises(rs.InputError, match="two layers 4 mm apart, and popup joins its rods at one point"):
         read_result(folder)

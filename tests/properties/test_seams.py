@@ -209,7 +209,8 @@ def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> 
     for ends, weighed in archive.results.plain()["self_weight"].items():
         popped = [patch.popped[ends] for patch in form.patches]
         own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
-        assert weighed["load_factor"] == min(one.load_factor for one in own)
+        # checks settle each pop-up once more: 2e-12 apart
+        assert weighed["load_factor"] == pytest.approx(min(patch.load_factor for patch in own), rel=1e-9)
     assert archive.summary().count("(weakest patch, its seam held)") == 2
 
 
