@@ -35,8 +35,8 @@ COMPARED = {  # what the paper shows in this place
     "50,000 forward simulations, where its direct method needs one. It shows the algorithm's G0 for the paraboloid and "
     "the ellipsoid, from reference 30, as a line in its figure, without numbers. Which shapes are still stable depends "
     "on the last digits of the solver, and so does a search: that for the ellipsoid, repeated after those digits had "
-    "changed, stalled at 6.2 mm. The values here are those of the earlier search, whose best shape was popped up again with the "
-    "present solver.",
+    "changed, stalled at 6.2 mm. The values here are those of the earlier search, whose best shape was popped up "
+    "again with the present solver.",
     "studies": 'The paper: H, E, r and g "do not significantly influence the actuated shape" of soft, inextensible '
     'rods; C1 = C2 = 1e6 EI "after a convergent study".',
 }
