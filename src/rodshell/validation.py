@@ -1,9 +1,10 @@
-"""Checks of arguments: kind, sign, shape and spelling.
+"""Checks of arguments: kind, sign, shape and spelling; and how values are shown, in messages and as frozen records.
 
-Every function raises InputError with one sentence, in which the argument is called by its `name`.
+Every check raises InputError with one sentence, in which the argument is called by its `name`.
 """
 
 from collections.abc import Sequence
+from dataclasses import MISSING, fields
 from difflib import get_close_matches
 from math import inf, isfinite
 from numbers import Real
@@ -213,3 +214,18 @@ def described(value: object) -> str:
         return shown(value)
     name = type(value).__name__
     return "None" if value is None else f"a{'n' * (name[0] in 'AEIOUaeiou')} {name}"
+
+
+def brief(record: Any) -> str:
+    """A dataclass in one line, as its `__repr__`: arrays by their shape, and without what is at its default.
+
+    `Pin(eccentricity=0.02)`, `Stretch(blocks=(240, 2), rest_lengths=(240,), ...)`.
+    """
+    shown = []
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if hasattr(value, "dtype") and hasattr(value, "shape"):  # NumPy is not imported: cases show records without it
+            shown.append(f"{field.name}={value.shape}")
+        elif field.default is MISSING or type(value) is not type(field.default) or value != field.default:
+            shown.append(f"{field.name}={value!r}")
+    return f"{type(record).__name__}({', '.join(shown)})"

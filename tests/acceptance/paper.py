@@ -14,9 +14,8 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.errors import StabilityError
-from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.dynamic_pop_up import DynamicPopUpSettings, dynamic_pop_up
-from rodshell.formfinding.methods import Fall
+from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.progress import silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.nets import sphere_net_end

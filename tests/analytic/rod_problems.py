@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipeinc, ellipkinc
 
 import rodshell as rs
-from rodshell.geometry.frames import directors_along, parallel_transport, signed_angle
-from rodshell.geometry.vectors import unit
+from rodshell.geometry.frames import directors_along, parallel_transport, signed_angle, unit
 from rodshell.solve.sparse_ldl import Qdldl
 
 THIN = rs.Rod(rs.Circle(1e-4), rs.Material(1e9, 1e3, 0.5))

@@ -31,6 +31,7 @@ STEPS = np.array([200, 400, 800, 1600])
 every_kind = pytest.mark.parametrize("kind", KINDS)
 
 
+@pytest.mark.slow
 @every_kind
 @pytest.mark.parametrize("errors", [static_errors, step_errors], ids=["at rest", "in one step"])
 def test_implicit_ties_tend_to_shared_dofs_as_one_over_their_stiffness(kind, errors):

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from rodshell.errors import InputError
 from rodshell.targets import Cap, Disc, HeightField, Paraboloid, Rectangle
-from rodshell.targets.domain import EllipseDomain
-from rodshell.targets.formula import parse_formula
 from rodshell.targets.height_function import Heights
+from rodshell.targets.heightfield import parse_formula
 from rodshell.targets.jet import Jet, differences
+from rodshell.targets.rim import EllipseDomain
 
 Floats = NDArray[np.float64]
 DISC = Disc(0.2)
@@ -403,7 +403,7 @@ def test_reading_neither_runs_code_nor_warns():
     """In a process of its own: the parser must survive whatever it is fed."""
     script = (
         "import builtins, warnings; warnings.simplefilter('error')\n"
-        "from rodshell.targets.formula import parse_formula\n"
+        "from rodshell.targets.heightfield import parse_formula\n"
         "from rodshell.errors import InputError\n"
         "def forbidden(*_): raise SystemExit('code was run')\n"
         "builtins.eval = builtins.exec = forbidden\n"

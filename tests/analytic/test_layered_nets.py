@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.geometry.vectors import unit
+from rodshell.geometry.frames import unit
 from rodshell.nets import sphere_net_end
 
 R = 0.2

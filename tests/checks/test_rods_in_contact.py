@@ -21,7 +21,7 @@ from rodshell.checks.contact import (
     worst_contact,
 )
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
-from rodshell.layout.side_by_side import side_by_side as side_by_side_meshes
+from rodshell.layout.mesh import side_by_side as side_by_side_meshes
 
 MATERIAL = rs.Material(youngs_modulus=1e9, density=1e3)
 

@@ -17,7 +17,7 @@ SHORT = """
 import sys
 import numpy as np
 from rodshell.cli import main, warmup
-from rodshell.targets.domain import EllipseDomain
+from rodshell.targets.rim import EllipseDomain
 warmup.JOBS = {"an oval": lambda: EllipseDomain(0.2, 0.1).distance(np.array([[0.1, 0.1]]))}
 sys.exit(main(["warmup"]))
 """

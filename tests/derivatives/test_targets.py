@@ -15,7 +15,7 @@ from rodshell.targets import (
     Rectangle,
     Target,
 )
-from rodshell.targets.domain import EllipseDomain
+from rodshell.targets.rim import EllipseDomain
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.stretch import Stretch
 from rodshell.solve.newton_matrix import SparseSum
-from rodshell.targets.domain import Domain, EllipseDomain
+from rodshell.targets.rim import Domain, EllipseDomain
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, RADIUS, STEP, TARGETS, G, Particles, slope
 
 ROUND_OFF = 1e-12  # of numbers of order 1

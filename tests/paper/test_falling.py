@@ -12,8 +12,7 @@ import rodshell as rs
 from rodshell.case import load_case
 from rodshell.cli import main
 from rodshell.errors import InputError, OutputError, StabilityError
-from rodshell.formfinding.draped import Draped
-from rodshell.formfinding.methods import Fall
+from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.results.folder import read_manifest

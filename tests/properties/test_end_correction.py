@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import rodshell as rs
-from rodshell.formfinding.end_correction import corrected_ends
+from rodshell.formfinding.bound_drape import corrected_ends
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid
 
 BEND = 0.01  # so small that beams are cubic splines

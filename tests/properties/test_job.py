@@ -263,6 +263,7 @@ def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
     assert np.ptp(other.popped["pinned"].positions[:, 2]) < np.ptp(first.popped["pinned"].positions[:, 2]) - 0.01
 
 
+@pytest.mark.slow
 def test_what_the_time_limit_cut_short_is_run_again(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter(np.arange(0.0, 1e6))
     monkeypatch.setattr("rodshell.formfinding.progress.monotonic", lambda: next(clock))
@@ -296,6 +297,7 @@ def test_a_search_is_not_repeated_and_decides_the_same() -> None:
     assert again.reused == ALL[:4]
 
 
+@pytest.mark.slow
 def test_patches_are_taken_over_too() -> None:
     job = dome(seams__lines="-1,-1; 1,1", checks__stages=0)
     first = job.run()

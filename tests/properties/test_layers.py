@@ -11,8 +11,8 @@ from rodshell.case.rod_ends import read_result
 from rodshell.checks.bending import bending_of
 from rodshell.formfinding.section_limits import strong_bending
 from rodshell.formfinding.trim import end_tangents
-from rodshell.geometry.vectors import unit
-from rodshell.nets.sphere import crossing_angle
+from rodshell.geometry.frames import unit
+from rodshell.nets.chebyshev import crossing_angle
 from rodshell.output.grid import joint_places
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports

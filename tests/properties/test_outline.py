@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rodshell.layout import FlatGrid, FlatRod
-from rodshell.layout.outline import opens, outlines
+from rodshell.output.grid import opens, outlines
 
 Floats = NDArray[np.float64]
 

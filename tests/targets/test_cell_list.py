@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rodshell.targets.cell_list import CellList
+from rodshell.targets.smooth_field import CellList
 from tests.targets.meshes import Floats
 
 

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import rodshell as rs
-from rodshell.targets.height_files import read_heights, read_image, read_table, smoothed
+from rodshell.targets.from_file import read_heights, read_image, read_table, smoothed
 
 SIZE = (12.0, 8.0)
 X, Y = np.meshgrid(np.linspace(-6, 6, 13), np.linspace(4, -4, 9))

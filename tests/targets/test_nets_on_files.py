@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.nets.cuts import _region
+from rodshell.nets.net_ends import _region
 from rodshell.targets import Freeform
 from tests.targets.meshes import PARTS, Mesh, lattice, sheet
 

@@ -24,8 +24,7 @@ from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
-from rodshell.geometry.frames import adapted
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import adapted, cross, dot, unit
 from rodshell.layout import FlatGrid, GridMesh
 from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell

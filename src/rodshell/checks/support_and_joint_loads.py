@@ -15,7 +15,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.layers import joint_normals, joint_tangents
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.crossings import RodNodes
 from rodshell.joints.linkers import LinkerBend
 from rodshell.model import Shell

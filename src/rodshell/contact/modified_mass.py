@@ -21,11 +21,10 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.model import Freedom
-from rodshell.records import brief
 from rodshell.targets import Target
-from rodshell.validation import choice, instance, not_negative
+from rodshell.validation import brief, choice, instance, not_negative
 
 ROUND_OFF = 1e-10  # of the target's size: a node is below the surface only from this depth on
 SUPPORTED = 1e-6  # cosine between normal and free directions below which a node's supports hold it along the normal

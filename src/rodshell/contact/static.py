@@ -8,11 +8,11 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.model import Freedom
-from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.targets import Gap, Target
+from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,7 @@
 """How a form is made: layers, cut lengths, splices, stock, bracing."""
 
-from rodshell.fabrication.bracing import Diagonal, diagonals
 from rodshell.fabrication.cutting import Bar, Nesting, nest, splices
-from rodshell.fabrication.fabricate import Fabricated, Fabrication, fabricate
+from rodshell.fabrication.fabricate import Diagonal, Fabricated, Fabrication, diagonals, fabricate
 
 __all__ = [
     "Bar",

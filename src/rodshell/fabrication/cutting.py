@@ -93,6 +93,12 @@ def nest(lengths: Sequence[float], stock: float, *, kerf: float = 0.0) -> Nestin
 
     It takes at most 11/9 of the fewest bars that could do, and two thirds of one more [Dosa 2007]. Every piece but
     one that uses a bar to its end costs one `kerf` [m]. No piece may be longer than a bar.
+
+    Parameters
+    ----------
+    lengths : of the pieces [m].
+    stock : length of a bar [m].
+    kerf : lost at each saw cut [m].
     """
     content, left = list[list[int]](), list[float]()
     for piece in sorted(range(len(lengths)), key=lambda k: (-lengths[k], k)):

@@ -1,10 +1,8 @@
 """Form finding: drape, trim, map back, pop up, agreement."""
 
-from rodshell.formfinding.agreement import Agreement, agreement
 from rodshell.formfinding.drape import drape
-from rodshell.formfinding.draped import Draped, DrapeFigures
-from rodshell.formfinding.methods import Bound, Fall, Gravity, Method
-from rodshell.formfinding.pipeline import PatchForm, find_stages, pop_up_stages
+from rodshell.formfinding.methods import Bound, Draped, DrapeFigures, Fall, Gravity, Method
+from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement, find_stages, pop_up_stages
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, map_back, trim
 

@@ -2,31 +2,31 @@
 
 Every node slides on the target without friction, rods do not stretch, and bending alone decides what the net
 leaves open: the shape of each span between its joints. No load and no stretch stiffness enter, so that the
-result does not depend on scale or material. The axes and the anchor are held, as the net holds them.
+result does not depend on scale or material. The axes and the anchor are held, as the net holds them. The solve starts
+from the net's lines with their ends corrected, near to where the rods will lie.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from math import degrees
 
+import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.contact.static import BoundToTarget
-from rodshell.formfinding.draped import Draped, DrapeFigures
-from rodshell.formfinding.end_correction import corrected_ends
 from rodshell.formfinding.layers import thickness_warnings
-from rodshell.formfinding.methods import Bound
+from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.section_limits import strong_bending
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import whole_rods
 from rodshell.layout.mesh import nodes_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.nets.apron import with_apron
+from rodshell.nets.net_ends import with_apron
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.rods.stretch import Stretch
 from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
@@ -39,6 +39,7 @@ CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
 WARN_ANGLE = 25.0  # degrees
 MOST_SOLVES = 3  # of a drape in layers; the second leaves strains of 1e-8
 PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces settle by 0.05 a step at 200 rods
+STEEP = 0.5  # rad that a line turns in its last span: from there beam theory does not hold, the rod stays on its line
 
 
 def bound_drape(
@@ -67,7 +68,7 @@ def bound_drape(
     eccentricity = joint.eccentricity if joint else 0.0
     near = warm_start.net if warm_start else None
     net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity)
-    grid = with_apron(net, CLEARANCE * layout.edge)
+    grid = with_apron(net.rods, net.net, net.lines, CLEARANCE * layout.edge)
     cuts = [list[FlatRod]() for _ in grid.rods]
     for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
         cuts[whole].append(piece)
@@ -262,3 +263,107 @@ def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
         "min_angle_deg": degrees(net.min_angle),
         "min_angle_at": list(net.min_angle_at),
     }
+
+
+def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
+    """(n, 3) the nodes, moved sideways on the target to where rods would lie, to first order [m].
+
+    A line of the net is curved up to its end, while a rod's bending moment vanishes there (the natural boundary
+    condition). The joints hardly move for it: so between them each rod differs from its line by a cubic spline that
+    vanishes at the joints, and whose end moments cancel the line's geodesic curvature. By beam theory, to first order;
+    the correction decays by the factor 2 - sqrt(3) = 0.27 from joint to joint, as cubic splines do (docs/theory.md, The
+    bound drape). The axes stay: they are geodesics, and the drape holds them on their lines.
+
+    Parameters
+    ----------
+    target : the surface.
+    mesh : of the net's lines.
+    points : (n, 3) its nodes on the net's lines [m].
+    """
+    joint = np.zeros(mesh.node_count, dtype=bool)
+    joint[mesh.joint_nodes] = True
+    normal = target.on_surface(points).normal
+    result = points.copy()
+    rods = np.flatnonzero([rod.offset != 0.0 for rod in mesh.grid.rods])
+    _correct(points, normal, mesh.rod_nodes, mesh.rod_start[rods], mesh.rod_stop[rods], mesh.stations, joint, result)
+    return target.retract(result)
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _correct(points, normal, rod_nodes, rod_start, rod_stop, stations, joint, result):  # type: ignore[no-untyped-def]
+    for rod in range(len(rod_start)):
+        nodes, s = rod_nodes[rod_start[rod] : rod_stop[rod]], stations[rod_start[rod] : rod_stop[rod]]
+        at = np.flatnonzero(joint[nodes])
+        if len(at) < 2 or len(nodes) < 5:
+            continue
+        side = _sideways(points, normal, nodes)
+        curvature = _curvature(points, nodes, s, side)
+        first, last = curvature[at[0]], curvature[at[-1]]
+        if max(abs(first) * (s[at[1]] - s[at[0]]), abs(last) * (s[at[-1]] - s[at[-2]])) > STEEP:
+            continue
+        moments = _moments(s[at], -first, -last)
+        for span in range(len(at) - 1):
+            a, b = at[span], at[span + 1]
+            h = s[b] - s[a]
+            for k in range(a + 1, b):
+                x, y = (s[b] - s[k]) / h, (s[k] - s[a]) / h
+                shift = h * h / 6.0 * (moments[span] * (x**3 - x) + moments[span + 1] * (y**3 - y))
+                _shift(result, nodes[k], shift, side, k)
+        for end, inner, stop, step in ((0, 1, -1, -1), (len(at) - 1, len(at) - 2, len(nodes), 1)):
+            begin, h = at[end], abs(s[at[end]] - s[at[inner]])
+            slope = h / 6.0 * (2.0 * moments[end] + moments[inner])
+            for k in range(begin + step, stop, step):  # past the last joint the rod is straight
+                far = abs(s[k] - s[begin])
+                _shift(result, nodes[k], far * (slope + 0.5 * far * moments[end]), side, k)
+
+
+@nb.njit(cache=True)
+def _shift(result, node, shift, side, k):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        result[node, i] += shift * side[k, i]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _sideways(points, normal, nodes):  # type: ignore[no-untyped-def]
+    """(n, 3) unit vectors in the surface across a rod."""
+    side, last = np.empty((len(nodes), 3)), len(nodes) - 1
+    for k in range(len(nodes)):
+        a, b, n, square = points[nodes[max(k - 1, 0)]], points[nodes[min(k + 1, last)]], normal[nodes[k]], 0.0
+        for i in range(3):
+            m, p = (i + 1) % 3, (i + 2) % 3
+            side[k, i] = n[m] * (b[p] - a[p]) - n[p] * (b[m] - a[m])
+            square += side[k, i] ** 2
+        for i in range(3):
+            side[k, i] /= np.sqrt(square)
+    return side
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _curvature(points, nodes, s, side):  # type: ignore[no-untyped-def]
+    """(n,) geodesic curvature towards `side` by three nodes [1/m], extrapolated to the ends."""
+    curvature = np.empty(len(nodes))
+    for k in range(1, len(nodes) - 1):
+        before, after, curvature[k] = s[k] - s[k - 1], s[k + 1] - s[k], 0.0
+        for i in range(3):
+            turn = (points[nodes[k + 1], i] - points[nodes[k], i]) / after
+            turn -= (points[nodes[k], i] - points[nodes[k - 1], i]) / before
+            curvature[k] += 2.0 * turn / (before + after) * side[k, i]
+    for end, k, step in ((0, 1, 1), (len(nodes) - 1, len(nodes) - 2, -1)):
+        rate = (curvature[k + step] - curvature[k]) / (s[k + step] - s[k])
+        curvature[end] = curvature[k] + rate * (s[end] - s[k])
+    return curvature
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _moments(s, first, last):  # type: ignore[no-untyped-def]
+    """(n,) second derivatives of the cubic spline that vanishes at `s` (n,), given those at its ends."""
+    moments, share = np.zeros(len(s)), np.zeros(len(s))
+    moments[0], moments[-1] = first, last
+    for k in range(1, len(s) - 1):
+        before, after = s[k] - s[k - 1], s[k + 1] - s[k]
+        pivot = 2.0 * (before + after) - before * share[k - 1]
+        share[k] = after / pivot
+        moments[k] = -before * moments[k - 1] / pivot
+    for k in range(len(s) - 2, 0, -1):
+        moments[k] -= share[k] * moments[k + 1]
+    return moments

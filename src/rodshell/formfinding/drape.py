@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 from rodshell.errors import InputError
 from rodshell.formfinding.bound_drape import bound_drape
-from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.gravity_drape import gravity_drape
-from rodshell.formfinding.methods import Bound, Gravity, Method, require_method
+from rodshell.formfinding.methods import Bound, Draped, Gravity, Method, require_method
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint, require_joint
 from rodshell.layout import GridLayout

@@ -15,7 +15,7 @@ from rodshell.formfinding.popup import FIRST_RISE, arched, laid_below
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, out_of_balance
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
@@ -112,7 +112,7 @@ def dynamic_pop_up(
     mesh = footprint.mesh
     shell = Shell.of(mesh, rod, joint=joint, coupling=settings.coupling)
     ends = mesh.ends.ravel()
-    flat = laid_below(mesh, boundary.points, float(boundary.points[:, 2].mean()))
+    flat = laid_below(mesh, boundary.points, float(boundary.points.mean(axis=0)[2]))
     state = shell.state(arched(footprint, flat, flat[ends], boundary))
 
     def supports(time: float) -> Supports:

@@ -16,7 +16,7 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.nets.cuts import inside_nodes
+from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_refinement import interpolated
 from rodshell.targets import Target
 

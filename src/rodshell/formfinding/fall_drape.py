@@ -13,13 +13,12 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
-from rodshell.formfinding.draped import Draped, DrapeFigures, smallest_joint_angle
-from rodshell.formfinding.initial_placement import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
+from rodshell.formfinding.gravity_drape import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
 from rodshell.formfinding.layers import middle_surface
-from rodshell.formfinding.methods import Fall
+from rodshell.formfinding.methods import Draped, DrapeFigures, Fall, smallest_joint_angle
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell

@@ -7,7 +7,7 @@ surfaces' distance times the curvature [do Carmo, Differential Geometry of Curve
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
 from rodshell.targets import Target

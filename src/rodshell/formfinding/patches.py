@@ -10,20 +10,18 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, RodshellError
-from rodshell.formfinding.agreement import Agreement
-from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.end_matching import Point
-from rodshell.formfinding.pipeline import PatchForm, find_stages
+from rodshell.formfinding.methods import Draped
+from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
 from rodshell.formfinding.popup import ENDS, Ends, Start
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.seams import FEWEST, Laid, Meeting, lay_patches
+from rodshell.formfinding.seams import FEWEST, Laid, Meeting, carried_heading, lay_patches, patches_of
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.section_limits import flat_warnings
-from rodshell.formfinding.target_patches import carried_heading, patches_of
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout
-from rodshell.layout.side_by_side import SideBySide, side_by_side
+from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.rods.section import Rod
 from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target

@@ -7,7 +7,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.contact.modified_mass import Touching
-from rodshell.geometry.vectors import dot
+from rodshell.geometry.frames import dot
 from rodshell.model import Freedom, Shell
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.linear_stability import slowest_modes

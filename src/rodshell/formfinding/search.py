@@ -12,7 +12,7 @@ from rodshell.formfinding.pipeline import find_stages
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.nets.cuts import inside_nodes
+from rodshell.nets.net_ends import inside_nodes
 from rodshell.rods.section import Rod
 from rodshell.targets import Target
 from rodshell.validation import choice

@@ -13,7 +13,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.formfinding.layers import node_normals
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist

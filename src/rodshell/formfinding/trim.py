@@ -6,10 +6,9 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding.draped import Draped
 from rodshell.formfinding.layers import node_normals, place_in_layers
-from rodshell.formfinding.methods import Bound
-from rodshell.geometry.vectors import unit
+from rodshell.formfinding.methods import Bound, Draped
+from rodshell.geometry.frames import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import cut_mesh
 

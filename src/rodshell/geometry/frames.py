@@ -1,12 +1,30 @@
-"""Adapted frames of a rod: a unit tangent t and a director d1 perpendicular to it; d2 = t x d1 completes the frame."""
+"""Vectors, and adapted frames of a rod: a unit tangent t and a director d1 perpendicular to it; d2 = t x d1."""
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.geometry.vectors import cross, dot, unit
 
 _ALONG = 1e-6  # [rad]: a director closer to its tangent does not define a frame
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Cross products (..., 3) of arrays (..., 3); several times faster than numpy's on short arrays."""
+    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    result[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    result[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    result[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return result
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Inner products (...) of arrays (..., 3)."""
+    return np.asarray(np.einsum("...i,...i->...", a, b))
+
+
+def unit(a: Floats) -> Floats:
+    """Vectors (..., 3) scaled to length 1."""
+    return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))
 
 
 def parallel_transport(vectors: Floats, start: Floats, end: Floats) -> Floats:

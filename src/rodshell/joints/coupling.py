@@ -11,10 +11,9 @@ from typing import Self
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.rods.section import Rod
-from rodshell.validation import positive
+from rodshell.validation import brief, positive
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,7 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.geometry.frames import adapted, parallel_transport
-from rodshell.geometry.vectors import unit
+from rodshell.geometry.frames import adapted, parallel_transport, unit
 from rodshell.layout import GridMesh
 
 

@@ -12,9 +12,8 @@ from math import inf, pi
 from typing import Literal, Protocol
 
 from rodshell.errors import InputError
-from rodshell.records import brief
 from rodshell.rods.section import Rod
-from rodshell.validation import described, instance, not_negative, number
+from rodshell.validation import brief, described, instance, not_negative, number
 
 
 class Joint(Protocol):

@@ -13,9 +13,9 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.joints.crossings import RodNodes
-from rodshell.records import brief
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import NO_HESSIANS
+from rodshell.validation import brief
 
 UP = (0.0, 0.0, 1.0)
 

@@ -25,8 +25,8 @@ from rodshell.joints.crossings import (
     with_source,
 )
 from rodshell.layout.flatgrid import sides
-from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
+from rodshell.validation import brief
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -31,11 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
-from rodshell.geometry.frames import adapted
-from rodshell.geometry.vectors import cross, dot
+from rodshell.geometry.frames import adapted, cross, dot
 from rodshell.joints.crossings import by_edge, edge_tangents, frame, of_edge, spread, with_source
-from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
+from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, Longs
-from rodshell.records import brief
+from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)

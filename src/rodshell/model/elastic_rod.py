@@ -18,15 +18,14 @@ from scipy.sparse import csc_matrix, diags
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.vectors import cross, unit
+from rodshell.geometry.frames import cross, unit
 from rodshell.model.assembly import Assembly, Freedom
 from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
-from rodshell.records import brief
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 from rodshell.rods.stretch import Stretch
-from rodshell.validation import described, direction, finite, vector
+from rodshell.validation import brief, described, direction, finite, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike
 _ANGLE = (1.0, 0.0, 0.0)  # the component of an angle block that is used

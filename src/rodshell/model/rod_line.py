@@ -9,11 +9,9 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.frames import adapted, directors_along, parallel_transport, signed_angle
-from rodshell.geometry.vectors import cross, dot
-from rodshell.records import brief
+from rodshell.geometry.frames import adapted, cross, directors_along, dot, parallel_transport, signed_angle
 from rodshell.rods.section import Rod
-from rodshell.validation import described, direction, finite, instance
+from rodshell.validation import brief, described, direction, finite, instance
 
 End = Literal["start", "end"]
 Rods = Rod | Sequence[Rod] | Callable[[float], Rod]

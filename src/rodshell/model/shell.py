@@ -19,8 +19,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
-from rodshell.geometry.vectors import unit
+from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (
     Ball,
     Coupling,

@@ -16,7 +16,7 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets import Implicit, Target
 
 Heights = tuple[float, float]

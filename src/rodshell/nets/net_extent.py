@@ -1,8 +1,8 @@
 """How far a net is marched: the lines of the lattice that can touch the target, and the nodes that are needed.
 
 Needed are nodes inside the target's end and up to a margin past it: what is bound to a target continues past its end
-(`apron`), and a rod is cut between nodes on both sides. Which nodes these are is known beforehand from the same net in
-longer steps; the first of these nets has a few long steps only.
+(`with_apron`), and a rod is cut between nodes on both sides. Which nodes these are is known beforehand from the same
+net in longer steps; the first of these nets has a few long steps only.
 """
 
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
 from rodshell.layout.mesh import edge_counts
 from rodshell.nets.compass import ON_SURFACE, Heights, Net, fill_quadrants, lay_axes
-from rodshell.nets.cuts import inside_nodes
+from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_refinement import march_near
 from rodshell.targets import Target
 from rodshell.units import length_text
 
-MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `apron`
+MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # of the first march, from the anchor each way
 FEWEST_STEPS = 6  # from line to line

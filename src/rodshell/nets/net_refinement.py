@@ -11,7 +11,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.curves import resampled
-from rodshell.geometry.vectors import cross, unit
+from rodshell.geometry.frames import cross, unit
 from rodshell.nets.compass import (
     NEWTON_STEPS,
     ON_SURFACE,

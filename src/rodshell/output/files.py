@@ -115,12 +115,22 @@ def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
 
 
 def reserved(kinds: Iterable[str] | None = None) -> list[str]:
-    """Patterns (of `Path.glob`) of every name that `files_of` may give for some kinds, whatever the archive."""
+    """Patterns (of `Path.glob`) of every name that `files_of` may give for some kinds, whatever the archive.
+
+    Parameters
+    ----------
+    kinds : see `KINDS`; default: all but 3dm.
+    """
     return [name for kind in (DEFAULT if kinds is None else kinds) for name in NAMES[kind]]
 
 
 def read_kinds(words: str) -> list[str]:
-    """The kinds named in "dxf, csv"."""
+    """The kinds named in "dxf, csv".
+
+    Parameters
+    ----------
+    words : in any case, with commas.
+    """
     kinds = [word.strip().lower() for word in words.split(",") if word.strip()]
     unknown = [word for word in kinds if word not in KINDS]
     if unknown or not kinds:

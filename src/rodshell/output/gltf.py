@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats
-from rodshell.geometry.frames import directors_along
-from rodshell.geometry.vectors import cross, unit
+from rodshell.geometry.frames import cross, directors_along, unit
 from rodshell.output.colour_scale import scale_of
 from rodshell.output.grid import rods_of, shape_of
 from rodshell.results import Archive
@@ -21,7 +20,12 @@ FLOAT, INDEX, VERTICES, ELEMENTS = 5126, 5125, 34962, 34963  # glTF's numbers fo
 
 
 def glb_bytes(archive: Archive, state: str) -> bytes:
-    """One node, mesh and name for each rod."""
+    """One node, mesh and name for each rod.
+
+    Parameters
+    ----------
+    state : "draped", "popped_pinned" or "popped_clamped".
+    """
     shape, rods = shape_of(archive, state), [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
     outline = section_outline(archive, float(np.ptp(shape.positions, axis=0).max()))
     scale = scale_of(archive, shape, "gap")
@@ -41,6 +45,10 @@ def section_outline(archive: Archive, size: float) -> Floats:
     """(s, 2) corners of the rods' section [m], across and up; of a section without a shape, a thin circle.
 
     Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
+
+    Parameters
+    ----------
+    size : of the shell [m], for the thickness of a section without a shape.
     """
     section = (archive.results.rod.section if archive.results.rod else None) or Section()
     if section.kind == "rectangle" and section.height is not None and section.width is not None:
@@ -56,6 +64,10 @@ def swept(curve: Floats, outline: Floats) -> tuple[Floats, Floats, NDArray[np.ui
     """A tube: points and normals (k s, 3), triangles (t, 3), the outline (s, 2) swept along a curve (k, 3).
 
     The frame has no twist and begins as upright as possible. The ends are open.
+
+    Parameters
+    ----------
+    curve : (k, 3) nodes [m]; outline : (s, 2) corners across and up [m].
     """
     edges = unit(np.diff(curve, axis=0))
     up = np.array([0.0, 0.0, 1.0]) if abs(edges[0, 2]) < 0.9 else np.array([1.0, 0.0, 0.0])

@@ -162,7 +162,12 @@ def take(label: Label, size: float, room: Room) -> None:
 
 
 def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
-    """Whether a label and the line to it find room; the label must cover none of the lines."""
+    """Whether a label and the line to it find room; the label must cover none of the lines.
+
+    Parameters
+    ----------
+    size : of the text; room : what is taken; lines : (m, 2, 2), all in the unit of the label.
+    """
     return (
         room.free(label.box(size))
         and not lines_meet(label.box(size), lines)
@@ -189,6 +194,10 @@ def spread(places: ArrayLike, gap: float) -> Floats:
     """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
 
     Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
+
+    Parameters
+    ----------
+    places : (k,) positions on a line; gap : least distance of neighbours.
     """
     asked = np.asarray(places, dtype=float)
     order = np.argsort(asked, kind="stable")
@@ -229,7 +238,12 @@ def upright(angle: float) -> float:
 
 
 def boxes_meet(box: Floats, others: Floats) -> bool:
-    """Whether the rectangle (4, 2) covers a part of one of `others` (m, 4, 2): no axis separates them."""
+    """Whether the rectangle (4, 2) covers a part of one of `others` (m, 4, 2): no axis separates them.
+
+    Parameters
+    ----------
+    box : (4, 2) corners in a row; others : (m, 4, 2) the same.
+    """
     if not len(others):
         return False
     sides_of_box = np.broadcast_to(box[[1, 3]] - box[0], (len(others), 2, 2))
@@ -240,14 +254,24 @@ def boxes_meet(box: Floats, others: Floats) -> bool:
 
 
 def lines_meet(box: Floats, lines: Floats) -> bool:
-    """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2): no axis separates them."""
+    """Whether one of the lines (m, 2, 2) runs through the rectangle (4, 2): no axis separates them.
+
+    Parameters
+    ----------
+    box : (4, 2) corners in a row; lines : (m, 2, 2) ends.
+    """
     sides = box[[1, 3]] - box[0]
     axes = (2.0 * sides / np.sum(sides**2, axis=1)[:, None]).T
     return bool(runs_through((lines - box.mean(axis=0)) @ axes).any())
 
 
 def lines_near(lines: Floats, place: Floats, reach: float) -> Floats:
-    """Those of the lines (m, 2, 2) that may come as near to a place (2,) as `reach`, across and along."""
+    """Those of the lines (m, 2, 2) that may come as near to a place (2,) as `reach`, across and along.
+
+    Parameters
+    ----------
+    lines : (m, 2, 2) ends; place : (2,); reach : distance across and along.
+    """
     if not len(lines):
         return lines
     near = np.all((lines.min(axis=1) < place + reach) & (lines.max(axis=1) > place - reach), axis=1)
@@ -284,6 +308,10 @@ def outward(places: Floats) -> Floats:
     """(k, 2) unit normals, to the right of an outline that is walked through the places (k, 2); 0 for a single one.
 
     At each place across the chord of its neighbours, so that places that nearly coincide do not turn it.
+
+    Parameters
+    ----------
+    places : (k, 2) along an outline, in their order.
     """
     along = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
     return _unit(np.column_stack([along[:, 1], -along[:, 0]]))

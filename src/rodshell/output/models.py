@@ -29,7 +29,12 @@ COLOURS = {"CUT": (34, 40, 47), "MARK": (179, 55, 44), "FINAL": (31, 95, 139), "
 
 
 def obj_text(archive: Archive, state: str) -> str:
-    """All nodes [m], then one object with one polyline for each rod."""
+    """All nodes [m], then one object with one polyline for each rod.
+
+    Parameters
+    ----------
+    state : "draped", "popped_pinned" or "popped_clamped".
+    """
     lines = [
         f"# rodshell, {state}, metres",
         *(f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in archive.states[state]),
@@ -41,7 +46,12 @@ def obj_text(archive: Archive, state: str) -> str:
 
 
 def vtp_text(archive: Archive, name: str) -> str:
-    """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`."""
+    """A shape [m]: gap [m], stress [Pa] and curvature [1/m] at the points; each line's index in `rods`.
+
+    Parameters
+    ----------
+    name : of a shape, see `shape_names`.
+    """
     shape = shape_of(archive, name)
     rods = [(k, rod.nodes) for k, rod in enumerate(rods_of(archive)) if len(rod.nodes) > 1]
     nodes = archive.states["rod_nodes"]
@@ -96,7 +106,12 @@ def _vtk_file(kind: str, body: str) -> str:
 
 
 def compas_json(archive: Archive, state: str) -> str:
-    """A state of the shell; the graph's nodes are joints, its edges the rods between them."""
+    """A state of the shell; the graph's nodes are joints, its edges the rods between them.
+
+    Parameters
+    ----------
+    state : "draped", "popped_pinned" or "popped_clamped".
+    """
     positions, rods = archive.states[state], rods_of(archive)
     places = joint_places(archive, positions)
     lines = [

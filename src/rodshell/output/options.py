@@ -106,7 +106,12 @@ class OutputOptions:
         return self.strength / self.shear_strength
 
     def judged_by(self, rod: Rod) -> "OutputOptions":
-        """The same with the strengths of the rod's preset material, where none was given."""
+        """The same with the strengths of the rod's preset material, where none was given.
+
+        Parameters
+        ----------
+        rod : section and material of every rod.
+        """
         material = rod.material
         if self.strength is not None or material is None or material.bending_strength is None:
             return self
@@ -118,7 +123,13 @@ class OutputOptions:
         )
 
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
-        """InputError where a strength is given and the stress that it stands against cannot be known."""
+        """InputError where a strength is given and the stress that it stands against cannot be known.
+
+        Parameters
+        ----------
+        rod : section and material of every rod.
+        joint : where rods cross.
+        """
         if self.strength is not None:
             require_known_stress(rod, twisted=joint.turns_frames or len(set(rod.bend_stiffnesses)) > 1)
 

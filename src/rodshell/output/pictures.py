@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.layout.outline import opens
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, length_unit, mixed, scale_of
 from rodshell.output.drawing import Drawing, Path, Pen, Pencil
-from rodshell.output.grid import GridRod, Shape, outlines_of, rods_of, shape_of
+from rodshell.output.grid import GridRod, Shape, opens, outlines_of, rods_of, shape_of
 from rodshell.output.svg import picture_document
 from rodshell.output.view import View, ground_axes
 from rodshell.results.archive import SHELLS, Archive, made_once
@@ -60,7 +59,12 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 
 
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
-    """The same as a drawing in units of about a pixel, y up, on a ground of paper."""
+    """The same as a drawing in units of about a pixel, y up, on a ground of paper.
+
+    Parameters
+    ----------
+    state, colour : as of `picture_svg`.
+    """
     shape, rods = shape_of(archive, state), rods_of(archive)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)

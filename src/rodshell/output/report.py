@@ -34,7 +34,13 @@ NOT_FOLLOWED = "The deployment from flat was not followed: nothing is known betw
 
 
 def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing]) -> str:
-    """The whole page; `plan` and `drawings` are the archive's."""
+    """The whole page; `plan` and `drawings` are the archive's.
+
+    Parameters
+    ----------
+    plan : the flat plan of the archive.
+    drawings : of the archive, by name, see `drawing_set`.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -239,7 +245,12 @@ def checks_table(results: Results) -> dict[str, Any] | None:
 
 
 def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]:
-    """Groups of key figures; what is not known is left out."""
+    """Groups of key figures; what is not known is left out.
+
+    Parameters
+    ----------
+    plan : the flat plan of the archive.
+    """
     rod, drape = results.rod, results.drape
     parts: list[Record | None] = [rod.section, rod.material, rod] if rod else []
     preset = _listed(rod.preset if rod else None, _PRESET, plan.rounding)

@@ -27,7 +27,12 @@ Show = Callable[[float | None], str]
 
 
 def head(column: str) -> tuple[str, str]:
-    """A column of a schedule as people read it: "cut_length_mm" is ("cut length", "mm"); "" where it has no unit."""
+    """A column of a schedule as people read it: "cut_length_mm" is ("cut length", "mm"); "" where it has no unit.
+
+    Parameters
+    ----------
+    column : as in CSV.
+    """
     words = column.split("_")
     unit = next((word for word in words[1:] if word in UNITS), "")
     name = " ".join(word for word in words if word != unit)
@@ -35,7 +40,12 @@ def head(column: str) -> tuple[str, str]:
 
 
 def heading(column: str) -> str:
-    """The same in one line: "cut length [mm]"."""
+    """The same in one line: "cut length [mm]".
+
+    Parameters
+    ----------
+    column : as in CSV.
+    """
     name, unit = head(column)
     return f"{name} [{unit}]" if unit else name
 
@@ -46,6 +56,10 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
     Splices and joints are measured from the cut end of the rod's start, as on the strips.
 
     Bending is that of the final shape; in columns named `pop_up` it is the worst of all shapes of the deployment.
+
+    Parameters
+    ----------
+    brief : only the columns that have room on a sheet.
     """
     final, mm = archive.final, rounding_of(archive.results).mm
     columns: list[tuple[str, bool, Callable[[GridRod], str]]] = [
@@ -86,6 +100,10 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
 
     The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines. Each entry of
     `columns` is a name and what it says of a joint: more may be added there.
+
+    Parameters
+    ----------
+    brief : only the columns that have room on a sheet.
     """
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
     placed = [_joints_in_space(archive, rod, final) for rod in rods]
@@ -132,7 +150,12 @@ def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], d
 
 
 def supports_table(archive: Archive, *, brief: bool = False) -> Table:
-    """One row a rod end: its place on the final boundary, its outward direction, and its reactions."""
+    """One row a rod end: its place on the final boundary, its outward direction, and its reactions.
+
+    Parameters
+    ----------
+    brief : only the columns that have room on a sheet.
+    """
     results, mm = archive.results, rounding_of(archive.results).mm
     columns = ["id", "rod", "end", *(f"{a}_mm" for a in "xyz"), *(f"tangent_{a}" for a in "xyz")]
     columns += [f"{kind}_{a}_{unit}_{ends}" for ends in results.reactions for kind, unit in _REACTIONS for a in "xyz"]
@@ -291,12 +314,22 @@ FORMULA = re.compile(rf'(^[\s"]*|[;,][\s"]*(?!{NUMBER}\s*(?:[;,]|$)))(?=[{RUN}])
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """Rows as CSV; a number stays as it is, a text that a spreadsheet would run gets an apostrophe."""
+    """Rows as CSV; a number stays as it is, a text that a spreadsheet would run gets an apostrophe.
+
+    Parameters
+    ----------
+    rows : cells; numbers are written by `str`.
+    """
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows([[safe_cell(str(cell)) for cell in row] for row in rows])
     return stream.getvalue()
 
 
 def safe_cell(cell: str) -> str:
-    """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons."""
+    """A cell that no spreadsheet takes for a formula, whether it parts cells by commas or by semicolons.
+
+    Parameters
+    ----------
+    cell : a number or a text.
+    """
     return cell if WHOLE.fullmatch(cell) else FORMULA.sub(r"\1'", printable(cell))

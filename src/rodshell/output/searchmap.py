@@ -23,7 +23,14 @@ class TrialLike(Protocol):
 
 
 def search_svg(title: str, trials: tuple[TrialLike, ...], best: TrialLike) -> str:
-    """Values in cells, dark the smallest; what failed stays empty."""
+    """Values in cells, dark the smallest; what failed stays empty.
+
+    Parameters
+    ----------
+    title : above the map.
+    trials : all that were tried.
+    best : the one to be framed.
+    """
     anchors = list(dict.fromkeys(trial.anchor for trial in trials))
     headings = list(dict.fromkeys(trial.heading for trial in trials))
     values = np.array([trial.value for trial in trials])

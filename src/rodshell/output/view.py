@@ -60,7 +60,12 @@ class View:
 
 
 def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
-    """The box's ground with millimetre ticks on its front edges, and the height on the left."""
+    """The box's ground with millimetre ticks on its front edges, and the height on the left.
+
+    Parameters
+    ----------
+    view : of the box; colour : of lines and numbers; text : size of the numbers [drawing units].
+    """
     (x0, y0, z0), (x1, y1, z1) = view.low, view.high
     thin, pale = Pen(colour, 0.8), Pen(mixed(colour, "#ffffff", 0.55), 0.8)
     corners = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.geometry.vectors import cross, dot
+from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, Joint
 from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell

@@ -87,7 +87,12 @@ class Archive:
 
 
 def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
-    """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods."""
+    """`make`, whose result is kept with the archive and must not be changed: many files are made from the same rods.
+
+    Parameters
+    ----------
+    make : a function of an archive alone.
+    """
 
     @wraps(make)
     def kept(archive: Archive) -> T:
@@ -100,7 +105,12 @@ def made_once(make: Callable[[Archive], T]) -> Callable[[Archive], T]:
 
 
 def archive_names(archive: Archive) -> list[str]:
-    """The names of the files that `put_archive` writes."""
+    """The names of the files that `put_archive` writes.
+
+    Parameters
+    ----------
+    archive : with or without a case.
+    """
     copies = kept_case(archive.case_toml, archive.inputs, Path())[1]
     return [*(name for name in ARCHIVE if name != "case.toml" or archive.case_toml), *copies]
 
@@ -146,7 +156,13 @@ def read(folder: str | os.PathLike[str]) -> Archive:
 
 def state_faults(states: Mapping[str, NDArray[Any]], results: Results) -> Iterator[str]:
     """What is wrong with states: shapes that do not fit each other or the results, indices out of range, places that
-    are not finite."""
+    are not finite.
+
+    Parameters
+    ----------
+    states : arrays by name, see `Archive`.
+    results : by which the number of rods and stages is known.
+    """
     for name, values in states.items():
         if values.dtype.kind not in ("iu" if name in ("rod_nodes", "rod_start") else "fiu"):
             yield f"{name} must be an array of {'whole ' if name.startswith('rod_') else ''}numbers"

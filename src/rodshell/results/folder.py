@@ -180,7 +180,12 @@ def open_folder(
 
 @contextmanager
 def reading(folder: str | os.PathLike[str]) -> Iterator[Callable[[str], Path]]:
-    """Where each file of a result is, by name: in its folder, or still in the stage of a commit that was killed."""
+    """Where each file of a result is, by name: in its folder, or still in the stage of a commit that was killed.
+
+    Parameters
+    ----------
+    folder : with a result, or one that a killed process was writing.
+    """
     path = Path(folder).expanduser()
     with _locked(path, shared=True):
         stage = next((stage for stage in _stages(path) if (stage / RECORD).exists()), None)
@@ -344,7 +349,12 @@ def _uninterrupted() -> Iterator[None]:
 
 
 def mark(folder: Path, name: str) -> Mark | None:
-    """What stands at a name in a folder, links not followed; None where nothing does."""
+    """What stands at a name in a folder, links not followed; None where nothing does.
+
+    Parameters
+    ----------
+    folder : of the result; name : of a file in it, with slashes.
+    """
     path = folder / name
     behind = next((part for part in above(name) if _is_no_folder(folder / part)), None)
     if behind is not None:
@@ -371,7 +381,12 @@ def read_manifest(folder: Path) -> dict[str, Mark]:
 
 
 def manifest_text(files: Mapping[str, Mark]) -> str:
-    """The content of manifest.json, a line for each file."""
+    """The content of manifest.json, a line for each file.
+
+    Parameters
+    ----------
+    files : marks of the files, by name.
+    """
     lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(files[name])}" for name in sorted(files))
     head = f' "format": {json.dumps(MANIFEST_FORMAT)},\n "version": {MANIFEST_VERSION},\n "files": {{\n'
     return "{\n" + head + lines + "\n }\n}\n"
@@ -383,7 +398,12 @@ def above(name: str) -> list[str]:
 
 
 def foreign(folder: Path, marks: Mapping[str, Mark | None]) -> list[str]:
-    """Of names and what stands there, those that rodshell did not write, or that stand in the way of such a name."""
+    """Of names and what stands there, those that rodshell did not write, or that stand in the way of such a name.
+
+    Parameters
+    ----------
+    folder : of the result; marks : what stands at each name, see `mark`.
+    """
     listed = read_manifest(folder)
     found = list[str]()
     for name, here in marks.items():

@@ -43,13 +43,23 @@ PREFERRED: tuple[Ends, Ends] = ("clamped", "pinned")  # the final shape is the f
 
 
 def sharpest(checks: Checks) -> Floats | None:
-    """(k,) sharpest bend [1/m] of each entry of `rod_nodes` in any shape; None: nothing was checked."""
+    """(k,) sharpest bend [1/m] of each entry of `rod_nodes` in any shape; None: nothing was checked.
+
+    Parameters
+    ----------
+    checks : of all shells.
+    """
     known = [bent.curvature for bent in (*checks.bending.values(), *checks.deployment_bending)]
     return np.max(known, axis=0) if known else None
 
 
 def final_ends(checks: Checks) -> Ends | None:
-    """The end condition of the final shape: clamped if that was checked, else pinned; None: neither was."""
+    """The end condition of the final shape: clamped if that was checked, else pinned; None: neither was.
+
+    Parameters
+    ----------
+    checks : of all shells.
+    """
     return next((ends for ends in PREFERRED if ends in checks.bending), None)
 
 
@@ -113,7 +123,12 @@ def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod
 
 
 def checked_states(checks: Checks) -> dict[str, NDArray[Any]]:
-    """States of the checks: curvature and stress at each entry of `rod_nodes`, and the deployment."""
+    """States of the checks: curvature and stress at each entry of `rod_nodes`, and the deployment.
+
+    Parameters
+    ----------
+    checks : of all shells; states that were not checked are left out.
+    """
     states: dict[str, NDArray[Any]] = {}
     for ends, bent in checks.bending.items():
         states[f"curvature_{ends}"] = bent.curvature

@@ -57,14 +57,24 @@ States = dict[str, NDArray[Any]]
 
 
 def results_of(stages: PatchForm | PatchedForm) -> Results:
-    """The results of a form, before it is checked."""
+    """The results of a form, before it is checked.
+
+    Parameters
+    ----------
+    stages : of a form in one piece, in patches, or from a table of rods.
+    """
     if isinstance(stages, PatchedForm):
         return patches_results(stages)
     return table_results(stages, "popup") if stages.from_table else form_results(stages)
 
 
 def states_of(stages: PatchForm | PatchedForm) -> States:
-    """The states of a form, before it is checked."""
+    """The states of a form, before it is checked.
+
+    Parameters
+    ----------
+    stages : as of `results_of`.
+    """
     if isinstance(stages, PatchedForm):
         return patches_states(stages)
     return table_states(stages) if stages.from_table else form_states(stages)
@@ -100,7 +110,12 @@ def form_states(form: PatchForm) -> States:
 
 
 def table_results(table: PatchForm, name: str) -> Results:
-    """The results of a table of rods that was popped up, before it is checked."""
+    """The results of a table of rods that was popped up, before it is checked.
+
+    Parameters
+    ----------
+    table : the stages; name : of the result, since a table has no target.
+    """
     return Results(
         **_head(name, table.status, table.warnings),
         rod=rod_type(table.rod),
@@ -149,7 +164,14 @@ def patches_states(form: PatchedForm) -> States:
 
 
 def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Results:
-    """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces."""
+    """The same results, the seams with what they carry: at each meeting the sum of both rods' support forces.
+
+    Parameters
+    ----------
+    results : of the form.
+    form : in patches.
+    checks : with the reactions of all patches, rod by rod.
+    """
     row = {rod.name: k for k, rod in enumerate(form.footprint.rods)}
     seams = []
     for k, seam in enumerate(results.seams):

@@ -31,7 +31,14 @@ def read_inputs(case_toml: str, where: Callable[[str], Path] = Path) -> dict[str
 
 
 def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tuple[str, dict[str, bytes]]:
-    """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it."""
+    """The case as it is kept in a result folder, its paths relative to that, and the files to be written with it.
+
+    Parameters
+    ----------
+    case_toml : with paths as they were given.
+    inputs : contents of files that are copied, by these paths.
+    folder : of the result.
+    """
     copies, places = dict[str, bytes](), dict[str, str]()
     for name in dict.fromkeys(_names(case_toml)):
         if name in inputs:
@@ -43,7 +50,12 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
 
 
 def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
-    """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone."""
+    """The case on a page that goes to others: paths as they are kept, of files that are not copied the names alone.
+
+    Parameters
+    ----------
+    case_toml, inputs : as of `kept_case`.
+    """
     kept, copies = kept_case(case_toml, inputs, Path.cwd())
     return _renamed(kept, {name: Path(name).name for name in _names(kept) if name not in copies})
 
@@ -59,7 +71,12 @@ def opened_case(case_toml: str, where: Callable[[str], Path]) -> tuple[str, dict
 
 
 def input_hash(case_toml: str, inputs: Mapping[str, bytes]) -> str:
-    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called."""
+    """Twelve digits of SHA-256 of a case and the contents of its files, wherever these are and however called.
+
+    Parameters
+    ----------
+    case_toml, inputs : as of `kept_case`; a file that is not copied counts as empty.
+    """
     names = list(dict.fromkeys(_names(case_toml)))
     digest = hashlib.sha256(_renamed(case_toml, {name: str(k) for k, name in enumerate(names)}).encode())
     for name in names:

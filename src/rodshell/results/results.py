@@ -183,7 +183,12 @@ def _renamed(table: Any, old: str, new: str) -> Any:
 
 
 def contradictions(results: Results) -> Iterator[str]:
-    """What the records say against each other: rods that do not exist, and counts that do not agree."""
+    """What the records say against each other: rods that do not exist, and counts that do not agree.
+
+    Parameters
+    ----------
+    results : whose values are each valid.
+    """
     ids = [rod.id for rod in results.rods]
     known = set(ids)
     if len(known) < len(ids):
@@ -230,7 +235,12 @@ def json_schema() -> dict[str, Any]:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null."""
+    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null.
+
+    Parameters
+    ----------
+    content : keys and values; NumPy's arrays and numbers will do.
+    """
     lines = []
     for name, value in plain(content).items():
         if isinstance(value, list) and value and isinstance(value[0], dict):
@@ -246,7 +256,12 @@ def _dumps(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable."""
+    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable.
+
+    Parameters
+    ----------
+    value : dictionaries, sequences, arrays, records, numbers, texts.
+    """
     if isinstance(value, float):  # most are; NumPy's float64 is one
         return float(value) if isfinite(value) else None
     if isinstance(value, str):

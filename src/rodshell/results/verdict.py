@@ -35,6 +35,10 @@ def verdict(results: Results) -> Verdict:
 
     An end condition can be used if its shell converged and is stable, its rods do not touch, hold, and are thin
     enough for their bends. Without one that can be used, or far off the target, the result is unbuildable.
+
+    Parameters
+    ----------
+    results : with checks; a figure that is missing counts as not checked.
     """
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}

@@ -41,6 +41,10 @@ def rounding_of(results: Results) -> Rounding:
     """The rule for a result: the power of ten not above half of the tolerance, so that rounding takes a quarter of it.
 
     Where no tolerance is given, the power of ten not above a ten-thousandth of the longest rod.
+
+    Parameters
+    ----------
+    results : of which the tolerance of the drawings and the lengths of the rods are used.
     """
     tolerance = results.drawings.tolerance if results.drawings else None
     if tolerance is None:
@@ -85,13 +89,25 @@ NAMES = {
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits; a large one in full, never as 1.42e+03."""
+    """A number with so many significant digits; a large one in full, never as 1.42e+03.
+
+    Parameters
+    ----------
+    digits : significant ones.
+    """
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if abs(float(text)) >= 10**digits else text
 
 
 def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXACT) -> str:
-    """A length [m] in mm with about `digits` significant digits, no finer than its rounding."""
+    """A length [m] in mm with about `digits` significant digits, no finer than its rounding.
+
+    Parameters
+    ----------
+    metres : None: not known.
+    digits : significant ones, about.
+    rounding : the finest that is shown.
+    """
     if metres is None or not isfinite(metres):
         return UNKNOWN
     value = 1e3 * metres
@@ -102,7 +118,12 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
 
 
 def nice_step(span: float, count: int) -> float:
-    """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less."""
+    """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less.
+
+    Parameters
+    ----------
+    span : length of the interval; count : of parts.
+    """
     if span <= 0:
         return 1.0
     power = 10.0 ** floor(log10(span / count))
@@ -110,14 +131,24 @@ def nice_step(span: float, count: int) -> float:
 
 
 def nice_ticks(low: float, high: float, count: int) -> list[float]:
-    """Round numbers from `low` to `high`, `count` + 1 at most."""
+    """Round numbers from `low` to `high`, `count` + 1 at most.
+
+    Parameters
+    ----------
+    low, high : ends of the interval; count : of steps at most.
+    """
     step = nice_step(high - low, count)
     first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
     return [k * step for k in range(first, last + 1)]
 
 
 def percent(share: float | None) -> str:
-    """A share as a percentage with two significant digits."""
+    """A share as a percentage with two significant digits.
+
+    Parameters
+    ----------
+    share : 1 is 100 %; None: not known.
+    """
     if share is None or not isfinite(share):
         return UNKNOWN
     if abs(share) < 1e-9:
@@ -178,7 +209,13 @@ def small(value: float | None) -> str:
 
 
 def place(point: Sequence[float | None], rounding: Rounding = EXACT) -> str:
-    """A point (3,) [m] in mm."""
+    """A point (3,) [m] in mm.
+
+    Parameters
+    ----------
+    point : (3,) coordinates [m]; None: not known.
+    rounding : how finely they are shown.
+    """
     known = [rounding.mm(x).replace("-", MINUS) for x in point if x is not None]
     return f"{', '.join(known)} mm" if len(known) == 3 else UNKNOWN
 

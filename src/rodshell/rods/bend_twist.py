@@ -36,10 +36,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
-from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
-from rodshell.geometry.vectors import cross, dot, unit
-from rodshell.records import brief
+from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.rods.elements import NO_HESSIANS
+from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)

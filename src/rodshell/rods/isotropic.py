@@ -21,10 +21,10 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.geometry.vectors import unit
-from rodshell.records import brief
+from rodshell.geometry.frames import unit
 from rodshell.rods.bend_twist import BendTwist, spread
 from rodshell.rods.elements import NO_HESSIANS
+from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)

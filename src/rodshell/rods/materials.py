@@ -8,9 +8,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, Self, get_args
 
 from rodshell.errors import InputError
-from rodshell.records import brief
 from rodshell.units import shown
-from rodshell.validation import number, positive
+from rodshell.validation import brief, number, positive
 
 _REPLACEABLE = ("youngs_modulus", "density", "shear", "poisson_ratio")
 PresetName = Literal["larch", "spruce", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel", "rubber"]

@@ -10,10 +10,9 @@ from functools import cached_property
 from math import pi, tanh
 
 from rodshell.errors import InputError
-from rodshell.records import brief
 from rodshell.rods.materials import Material as Material
 from rodshell.rods.materials import PresetName
-from rodshell.validation import instance, not_negative, positive
+from rodshell.validation import brief, instance, not_negative, positive
 
 MM = 1e-3
 

@@ -11,8 +11,8 @@ import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.records import brief
 from rodshell.rods.elements import NO_HESSIANS
+from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from rodshell.arrays import Floats
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, TangentAssembly, orthonormal, subspace_iteration
+from rodshell.solve.tangent import Tangent, TangentAssembly, by_projections, subspace_iteration
 
 Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "lost"]
 
@@ -302,9 +302,9 @@ class _Path:
             start = np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(MODES, size))[:, None]) * scale
         inverse, rows = subspace_iteration(
             lambda row: tangent.factors.solve(row / scale) / scale,
-            start / scale, settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS,
+            start / scale, settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS, orthonormalise=by_projections,
         )  # fmt: skip
-        return 1.0 / inverse, orthonormal(rows) * scale
+        return 1.0 / inverse, by_projections(rows) * scale
 
     def _reach(self, motion: Floats) -> float:
         """Largest displacement of a node [m]."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError
-from rodshell.geometry.vectors import cross, unit
+from rodshell.geometry.frames import cross, unit
 from rodshell.model import Freedom
 from rodshell.model.elastic_rod import ElasticRod, RodStrains
 from rodshell.model.rod_line import End

@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.frames import adapted, parallel_transport, signed_angle
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
 from rodshell.model import Freedom
 from rodshell.model.elastic_rod import ElasticRod
 from rodshell.model.rod_line import End

@@ -123,7 +123,9 @@ class Tangent:
             return root * factors.solve(root * vector)
 
         start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root))))).T
-        values, rows = subspace_iteration(inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps)
+        values, rows = subspace_iteration(
+            inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps, orthonormalise=by_reflections
+        )
         shapes = np.array([factors.solve(root * row) for row in rows[:count]]).reshape(count, size)
         shapes /= np.sqrt(np.einsum("ki,i,ki->k", shapes, weight, shapes))[:, None]
         expanded = np.array([self.freedom.expand(shape) for shape in shapes]).reshape(count, *self.state.shape)
@@ -160,7 +162,12 @@ class Tangent:
         root = np.sqrt(weight)
         start = np.random.default_rng(0).standard_normal((1, len(weight)))
         value, _ = subspace_iteration(
-            lambda x: root * factors.solve(root * x), start, settled=1, tolerance=1e-2, most_sweeps=MOST_SWEEPS
+            lambda x: root * factors.solve(root * x),
+            start,
+            settled=1,
+            tolerance=1e-2,
+            most_sweeps=MOST_SWEEPS,
+            orthonormalise=by_projections,
         )
         near = BELOW * (shift - 1.0 / float(value[0]))
         if near < shift and not (closer := self._shifted(near, weight)).negative:
@@ -233,7 +240,13 @@ class TangentAssembly:
 
 
 def subspace_iteration(
-    apply: Callable[[Floats], Floats], start: Floats, *, settled: int, tolerance: float, most_sweeps: int
+    apply: Callable[[Floats], Floats],
+    start: Floats,
+    *,
+    settled: int,
+    tolerance: float,
+    most_sweeps: int,
+    orthonormalise: Callable[[Floats], Floats],
 ) -> tuple[Floats, Floats]:
     """The largest eigenvalues of a symmetric positive operator, and their directions, by subspace iteration with
     Rayleigh and Ritz's values, which are a little too small, never too large [Golub and Van Loan 2013, 8.2.4].
@@ -245,6 +258,7 @@ def subspace_iteration(
     settled : so many of the largest eigenvalues must have settled.
     tolerance : relative change of these in the last sweep.
     most_sweeps : it ends after so many in any case.
+    orthonormalise : of the rows of a matrix: `by_reflections` or, of few vectors, `by_projections`.
 
     Returns
     -------
@@ -253,7 +267,7 @@ def subspace_iteration(
     rows, before = start, np.full(len(start), np.inf)
     values = before
     for _ in range(most_sweeps):
-        rows = orthonormal(rows)
+        rows = orthonormalise(rows)
         images = np.array([apply(row) for row in rows])
         values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
         values, rows = values[::-1], np.einsum("ji,jk->ik", turn[:, ::-1], images)
@@ -263,11 +277,14 @@ def subspace_iteration(
     return values, rows
 
 
-def orthonormal(rows: Floats) -> Floats:
-    """The rows (m, n), orthogonal to each other and of unit length, by Gram and Schmidt, twice, the first row first.
+def by_reflections(rows: Floats) -> Floats:
+    """Rows (m, n), made orthogonal and of unit length by Householder's reflections."""
+    return np.ascontiguousarray(np.linalg.qr(rows.T)[0].T)
 
-    Vectors are few and long here: threads of a BLAS would cost more than they save.
-    """
+
+def by_projections(rows: Floats) -> Floats:
+    """Rows (m, n), made orthogonal and of unit length by Gram and Schmidt, twice, the first row first: of a few long
+    rows, where the threads of a BLAS cost more than they save."""
     result = rows.copy()
     for k, row in enumerate(result):
         for _ in range(2):

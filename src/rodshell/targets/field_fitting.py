@@ -7,9 +7,8 @@ import numpy as np
 from numba import njit
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.geometry.vectors import cross, dot, unit
-from rodshell.targets.cell_list import CellList
-from rodshell.targets.smooth_field import TERMS, SmoothField
+from rodshell.geometry.frames import cross, dot, unit
+from rodshell.targets.smooth_field import TERMS, CellList, SmoothField
 from rodshell.targets.trianglemesh import TriangleMesh, unique_rows
 
 # samples of a mesh

@@ -9,7 +9,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.vectors import cross, dot, unit
+from rodshell.geometry.frames import cross, dot, unit
 from rodshell.targets.field_fitting import cubic_spacing, fill_openings, fit_field, mesh_samples
 from rodshell.targets.rim import Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField

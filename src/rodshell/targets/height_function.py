@@ -10,8 +10,8 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
-from rodshell.targets.domain import Disc, Rectangle
 from rodshell.targets.jet import Jet, differences
+from rodshell.targets.rim import Disc, Rectangle
 
 Region = Disc | Rectangle
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.vectors import unit
+from rodshell.geometry.frames import unit
 from rodshell.targets.target import Gap, Implicit, Target
 
 BEYOND = 1e3  # lengths of an open seam by which its two ends are prolonged

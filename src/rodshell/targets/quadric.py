@@ -10,7 +10,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.targets.domain import Disc, Domain, EllipseDomain
+from rodshell.targets.rim import Disc, Domain, EllipseDomain
 from rodshell.targets.target import Implicit
 from rodshell.targets.wall_below_rim import WalledTarget
 from rodshell.validation import number, positive

@@ -8,7 +8,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints, Longs
 from rodshell.errors import InputError
-from rodshell.geometry.vectors import cross, dot
+from rodshell.geometry.frames import cross, dot
 
 CREASE = 40.0  # degrees between faces: a smooth piece ends there
 WELD = 1e-6  # of the largest extent: vertices this close are merged; single precision has 1e-7

@@ -13,9 +13,8 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
-from rodshell.geometry.vectors import dot, unit
-from rodshell.targets.domain import Domain
-from rodshell.targets.rim import Rim
+from rodshell.geometry.frames import dot, unit
+from rodshell.targets.rim import Domain, Rim
 from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Gap, Implicit, Target, offset_shape
 from rodshell.targets.trianglemesh import TriangleMesh

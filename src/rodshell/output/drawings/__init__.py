@@ -28,15 +28,28 @@ FINER = {"bracing": 0.45}  # texts of a drawing at 1:1 over those of the plan, w
 
 
 def drawing_set(archive: Archive, plan: FlatPlan) -> dict[str, Drawing]:
-    """Every drawing that the archive has content for, at 1:1 with a title block, by name."""
+    """Every drawing that the archive has content for, at 1:1 with a title block, by name.
+
+    Parameters
+    ----------
+    plan : the flat plan of the archive.
+    """
     block = title_block(archive, plan.summary)
-    makers = {"plan": lambda text: flat_drawing(plan, text), "strips": lambda text: strips_drawing(plan, text)}
-    makers |= _of_the_shell(archive, plan)
+    makers: dict[str, Compose] = {
+        "plan": lambda text: flat_drawing(plan, text),
+        "strips": lambda text: strips_drawing(plan, text),
+        **_of_the_shell(archive, plan),
+    }
     return {name: with_title(make(FINER.get(name, 1.0) * plan.text), block) for name, make in makers.items()}
 
 
 def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[float, float]]:
-    """All sheets in mm of paper, and the paper's size."""
+    """All sheets in mm of paper, and the paper's size.
+
+    Parameters
+    ----------
+    plan : the flat plan of the archive.
+    """
     results = archive.results
     paper = PAPERS[results.drawings.paper if results.drawings else "A3"]
 

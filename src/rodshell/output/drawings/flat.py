@@ -14,9 +14,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats
-from rodshell.layout.outline import opens
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
-from rodshell.output.grid import GridJoint, GridRod, joints_of, outlines_of, rods_of
+from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, lines_meet, outward, place, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
@@ -116,7 +115,12 @@ def flat_plan(archive: Archive) -> FlatPlan:
 
 
 def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
-    """The flat plan [mm], its rods labelled in the size `text` [mm]."""
+    """The flat plan [mm], its rods labelled in the size `text` [mm].
+
+    Parameters
+    ----------
+    text : usual size of the texts [mm at 1:1].
+    """
     pencil = Pencil()
     for outline in plan.footprint:
         pencil.line(outline, "BOUNDARY-FLAT", closed=True)
@@ -285,7 +289,13 @@ def _axes(pencil: Pencil, plan: FlatPlan, text: float) -> None:
 
 
 def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None = None) -> Drawing:
-    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0."""
+    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0.
+
+    Parameters
+    ----------
+    text : usual size of the texts [mm at 1:1].
+    rods : those to be drawn; default: all.
+    """
     pencil = Pencil()
     layer = {rod.id: rod.record.layer for rod in plan.rods}
     chosen = plan.rods if rods is None else rods
@@ -296,7 +306,13 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None =
 
 
 def per_sheet(height: float, text: float) -> int:
-    """How many strips find room in a height [mm]."""
+    """How many strips find room in a height [mm].
+
+    Parameters
+    ----------
+    height : of the room on a sheet [mm].
+    text : size of the texts [mm].
+    """
     return max(int((height / text - 3) // TALL), 1)
 
 

@@ -58,7 +58,12 @@ class TitleBlock:
 
 
 def title_block(archive: Archive, summary: str) -> TitleBlock:
-    """The title block of an archive."""
+    """The title block of an archive.
+
+    Parameters
+    ----------
+    summary : the cut list in one line.
+    """
     results = archive.results
     given, rod = results.drawings or Drawings(), results.rod or RodType()
     kept = results.plain()
@@ -142,7 +147,14 @@ def on_a_page(drawing: Drawing) -> Drawing:
 def write_entries(
     pencil: Pencil, block: TitleBlock, left: float, y: float, width: float, size: float, line: float
 ) -> float:
-    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line."""
+    """The entries in columns from (left, y) down, each shortened to its column; the baseline of the next line.
+
+    Parameters
+    ----------
+    left, y : baseline of the first entry [mm].
+    width : of all columns [mm].
+    size : of the texts; line : from baseline to baseline [mm].
+    """
     step = width / COLUMNS
     for k, (label, value) in enumerate(block.entries):
         x, down = left + step * (k % COLUMNS), y - line * (k // COLUMNS)
@@ -153,13 +165,26 @@ def write_entries(
 
 
 def shortened(text: str, width: float, size: float) -> str:
-    """A text that takes at most a width [mm] in a size; what is cut off is shown by dots."""
+    """A text that takes at most a width [mm] in a size; what is cut off is shown by dots.
+
+    Parameters
+    ----------
+    width : that is available [mm]; size : of the text [mm].
+    """
     letters = int(width / (LETTER * size))
     return text if len(text) <= letters else text[: letters - 1].rstrip() + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def scale_bar(pencil: Pencil, right: float, y: float, longest: float, text: float, scale: float) -> None:
-    """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`."""
+    """A bar of a round length of at most about `longest` [mm of the sheet], ending at `right`, at 1:`scale`.
+
+    Parameters
+    ----------
+    right, y : lower right corner [mm of the sheet].
+    longest : of the bar [mm of the sheet].
+    text : size of its numbers [mm of the sheet].
+    scale : lengths of the object over those of the sheet.
+    """
     length = nice_step(scale * longest, 2) * 2 / scale
     for k in range(4):
         x = right - length + k * length / 4
@@ -182,12 +207,23 @@ class Sheet:
 
 
 def room(paper: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of what a sheet has for its drawing [mm]."""
+    """Lower left and upper right corner of what a sheet has for its drawing [mm].
+
+    Parameters
+    ----------
+    paper : width and height of a sheet [mm].
+    """
     return np.array([MARGIN + 4, MARGIN + BLOCK + 4]), np.array(paper) - MARGIN - 4
 
 
 def fitted(compose: Compose, paper: tuple[float, float]) -> Sheet:
-    """A drawing on one sheet, in the middle, at the largest standard scale at which it fits."""
+    """A drawing on one sheet, in the middle, at the largest standard scale at which it fits.
+
+    Parameters
+    ----------
+    compose : makes the drawing for a text size [mm at 1:1].
+    paper : width and height of a sheet [mm].
+    """
     low, high = room(paper)
     bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
     for scale in (scale for scale in SCALES if np.all(bare / scale <= high - low)):
@@ -225,7 +261,13 @@ def _tiles(extent: Floats, paper: tuple[float, float]) -> Ints:
 
 
 def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
-    """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where those are too many."""
+    """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where those are too many.
+
+    Parameters
+    ----------
+    compose, paper : as of `fitted`.
+    scale : lengths of the object over those of the sheet.
+    """
     low, high = room(paper)
     drawing = compose(TEXT * scale).placed(1 / scale, np.zeros(2))
     bottom, top = drawing.box()
@@ -247,7 +289,13 @@ def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Ite
 
 
 def table(title: str, content: Table, paper: tuple[float, float]) -> Iterator[Sheet]:
-    """A table over as many sheets as it takes, in as many columns side by side as fit."""
+    """A table over as many sheets as it takes, in as many columns side by side as fit.
+
+    Parameters
+    ----------
+    content : names of the columns, and rows of cells.
+    paper : width and height of a sheet [mm].
+    """
     (columns, rows), (low, high) = content, room(paper)
     if not columns:
         return
@@ -275,7 +323,13 @@ def _wrapped(words: str, unit: str, width: int) -> list[str]:
 
 
 def bound(sheets: Sequence[Sheet], block: TitleBlock, paper: tuple[float, float]) -> list[Drawing]:
-    """The sheets with frames and title blocks, numbered."""
+    """The sheets with frames and title blocks, numbered.
+
+    Parameters
+    ----------
+    sheets : in their order.
+    paper : width and height of a sheet [mm].
+    """
     return [
         replace(
             _frame(block, sheet, k, len(sheets), paper) + sheet.content,

@@ -37,12 +37,22 @@ SIDES = ((-1, 0.3), (1, 0.3), (-1, -0.85), (1, -0.85))  # half of the diagonal, 
 
 
 def rod_curves(archive: Archive, positions: Floats) -> list[Floats]:
-    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m]."""
+    """The nodes (k, 3) [mm] of each rod that the states hold, in a state (n, 3) [m].
+
+    Parameters
+    ----------
+    positions : (n, 3) nodes of a state [m].
+    """
     return [1e3 * positions[rod.nodes] for rod in rods_of(archive) if len(rod.nodes) > 1]
 
 
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
-    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
+    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions.
+
+    Parameters
+    ----------
+    text : usual size of the texts [mm at 1:1].
+    """
     pencil, final = Pencil(), archive.final
     assert final is not None
     curves = rod_curves(archive, archive.states[final])
@@ -62,7 +72,12 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
 
 
 def erection_drawing(archive: Archive, text: float) -> Drawing:
-    """Ways of the rod ends from flat to their supports, seen from above, and the shell's side at each stage."""
+    """Ways of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
+
+    Parameters
+    ----------
+    text : usual size of the texts [mm at 1:1].
+    """
     pencil, history = Pencil(), archive.states["history"]
     assert archive.results.deployment is not None
     stages, mm = archive.results.deployment.stages, rounding_of(archive.results).mm
@@ -93,8 +108,13 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
 
 
 def thinned(curve: Floats) -> Floats:
-    """A curve by about every third of its nodes, its ends kept."""
-    return curve[np.unique(np.append(np.arange(0, len(curve), 3), len(curve) - 1))]
+    """A curve by about every third of its nodes, its ends kept.
+
+    Parameters
+    ----------
+    curve : (k, 2 or 3) nodes.
+    """
+    return np.asarray(curve[np.unique(np.append(np.arange(0, len(curve), 3), len(curve) - 1))])
 
 
 def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
@@ -136,7 +156,13 @@ def axes(pencil: Pencil, text: float) -> None:
 
 
 def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
-    """Where every rod end goes, seen from above, with the direction in which its rod arrives there."""
+    """Where every rod end goes, seen from above, with the direction in which its rod arrives there.
+
+    Parameters
+    ----------
+    plan : the flat plan of the archive.
+    text : usual size of the texts [mm at 1:1].
+    """
     pencil, final = Pencil(), archive.final
     assert final is not None
     seen_from_above(pencil, archive, text)
@@ -238,6 +264,10 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
 
     Each number stands off all rods and diagonals of its cell, as large as finds room; where there is none the table
     has it.
+
+    Parameters
+    ----------
+    text : usual size of the texts [mm at 1:1].
     """
     pencil, final = Pencil(), archive.final
     assert final is not None

@@ -1,6 +1,13 @@
-"""Where the lines of a net leave a target: runs of inside nodes, and cuts between nodes."""
+"""Where the lines of a net end on a target: runs of inside nodes, cuts between nodes, and the apron past them.
+
+A rod that ends at the rim is free from its last joint on: there it would follow a geodesic, not the net, and its end
+would be up to millimetres off. So the net that is bound to a target is continued by an apron, two more rings of joints
+past every end, on the surface's smooth continuation, with all the lines that meet there; the apron is cut off
+afterwards. Across an opening the net simply continues: the drape ignores it.
+"""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 from typing import NamedTuple
@@ -10,10 +17,12 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import lagrange
+from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets.compass import Net
 from rodshell.targets import Target
 
 SQUARE = 5  # nodes each way
+RINGS = 2  # with one the ends are 0.5 mm off the net on a 0.2 m hemisphere at 40 mm spacing, with two 0.1 mm
 
 
 class Cut(NamedTuple):
@@ -246,3 +255,86 @@ def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: F
             array[left] for array in (index, at, outer, inner, below, above, side, tiny)
         )
     return found
+
+
+def with_apron(rods: Sequence[FlatRod], net: Net, lines: tuple[Floats, Floats], clearance: float) -> FlatGrid:
+    """The flat grid of rods, each prolonged past both ends.
+
+    Pieces of a line become one rod where the net continues between them. Lines that are crossed only there become
+    virtual rods. A rod keeps its end where the net ends.
+
+    Parameters
+    ----------
+    rods : each from end to end of the target.
+    net : in which they lie.
+    lines : offsets of the lines of the lattice, see `ChebyshevNet` [m].
+    clearance : distance of the first joint past an end from that end, at least [m].
+    """
+    u, v = lines
+    alive = np.isfinite(net.points[np.searchsorted(net.u, u - 1e-12)][:, np.searchsorted(net.v, v - 1e-12), 0])
+    families = {"u": _Lines.of(u, v, alive.T), "v": _Lines.of(v, u, alive)}
+    spans: dict[tuple[str, int, int], FlatRod] = {}
+    for rod in rods:
+        key = (rod.family, *families[rod.family].stretch_of(rod))
+        known = spans.get(key, rod)
+        spans[key] = known.cut(min(known.start, rod.start), max(known.end, rod.end))
+    joints = {family: np.zeros(family_lines.live.shape, dtype=bool) for family, family_lines in families.items()}
+    for (family, line, _), rod in spans.items():
+        stations, live = families[family].stations, families[family].live[line]
+        first = int(np.searchsorted(stations, rod.start - clearance, side="right")) - RINGS
+        last = int(np.searchsorted(stations, rod.end + clearance, side="left")) + RINGS - 1
+        span = np.arange(max(first, 0), min(last, len(stations) - 1) + 1)
+        joints[family][line, span[live[span]]] = True
+    spanned: dict[tuple[str, int], set[int]] = {}
+    for family, line, stretch in spans:
+        spanned.setdefault((family, line), set()).add(stretch)
+    points = joints["u"] | joints["v"].T
+    prolonged = list[FlatRod]()
+    for family, table in (("u", points), ("v", points.T)):
+        family_lines = families[family]
+        for line, offset in enumerate(family_lines.offsets.tolist()):
+            stations = family_lines.stations[table[line]]
+            stretches = family_lines.stretches[line][table[line]]
+            for stretch in sorted(spanned.get((family, line), set()).union(stretches.tolist())):
+                prolonged += _prolonged(
+                    spans.get((family, line, stretch)), family, offset, stations[stretches == stretch]
+                )
+    return FlatGrid.of(prolonged)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Lines of one family.
+
+    Parameters
+    ----------
+    stations : (n,) where they are crossed [m].
+    offsets : (m,) [m].
+    live : (m, n) where the net has nodes.
+    stretches : (m, n) number of the stretch of each node on its line; a stretch ends where the net has no node.
+    """
+
+    stations: Floats
+    offsets: Floats
+    live: Bools
+    stretches: Ints
+
+    @staticmethod
+    def of(stations: Floats, offsets: Floats, live: Bools) -> "_Lines":
+        return _Lines(stations, offsets, live, np.cumsum(~live, axis=1))
+
+    def stretch_of(self, rod: FlatRod) -> tuple[int, int]:
+        """The line and the stretch of it on which a rod lies."""
+        line = int(np.argmin(np.abs(self.offsets - rod.offset)))
+        away = np.where(self.live[line], np.abs(self.stations - 0.5 * (rod.start + rod.end)), np.inf)
+        return line, int(self.stretches[line, np.argmin(away)])
+
+
+def _prolonged(rod: FlatRod | None, family: str, offset: float, joints: Floats) -> list[FlatRod]:
+    """A rod from the first to the last joint on its line, including its own ends."""
+    if rod is not None:
+        return [rod.cut(min(rod.start, *joints), max(rod.end, *joints)) if len(joints) else rod]
+    if len(joints) < 2:
+        return []
+    make = FlatRod.u if family == "u" else FlatRod.v
+    return [make(f"apron {family.upper()} {offset:+.4f}", offset, float(joints[0]), float(joints[-1]), virtual=True)]
