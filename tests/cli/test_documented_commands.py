@@ -65,6 +65,16 @@ def test_a_documented_command_runs(line: str, folder: Path, monkeypatch: pytest.
     assert main([command, *arguments, *([] if "--help" in arguments else QUICK.get(command, []))]) == 0
 
 
+def test_the_readme_shows_what_the_program_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The pavilion's summary, word for word; numbers are compared elsewhere."""
+    shown = re.search(r"```\n(pavilion: .*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert shown is not None
+    assert main(["form", "pavilion", "--out", str(tmp_path / "pavilion"), "--only", "csv"]) == 0
+    printed = capsys.readouterr().out.splitlines()[:-1]  # the last line names the folder
+    number = re.compile(r"\d[\d.]*(e[-+]\d+)?")
+    assert [number.sub("#", line) for line in printed] == [number.sub("#", line) for line in shown[1].splitlines()]
+
+
 def test_the_commands_are_found() -> None:
     assert len(README) > 10
     assert len(FILES) >= 4
