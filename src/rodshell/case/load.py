@@ -192,6 +192,9 @@ def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
                     table.pop(key.name, None)
     if "rod.material.preset" in overrides:
         raw["rod"]["material"] = {}
+    for name, instead in (("shear", "poisson_ratio"), ("poisson_ratio", "shear")):
+        if overrides.get(f"rod.material.{name}") is not None and f"rod.material.{instead}" not in overrides:
+            _table(raw, "rod.material").pop(instead, None)
     method = overrides.get("drape.method")
     if method is not None and method != raw["drape"].get("method", "bound"):
         for name in IDLE.get(str(method), ()):
