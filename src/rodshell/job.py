@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rodshell.case import Case, load_case
 from rodshell.case.case import built
 from rodshell.case.from_objects import case_of, case_of_rod_ends
-from rodshell.case.load import changed_case, flattened
+from rodshell.case.load import changed_case, flattened, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
 from rodshell.errors import InputError
 from rodshell.form import Form
@@ -170,7 +170,9 @@ class Job:
         require_joint(joint)
         if rod is not None:
             instance("rod", rod, Rod)
-        ends, case = _ends_and_case(source, unit, flattened({**(overrides or {}), **more}))
+        changes = flattened({**(overrides or {}), **more})
+        require_keys_of_rods(changes)
+        ends, case = _ends_and_case(source, unit, changes)
         given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
         return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))

@@ -392,6 +392,17 @@ def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
         job.to_toml()
 
 
+@pytest.mark.parametrize("changes", [{"pop_up.ends": "clamped"}, {"layout.rotate": 1}, {"drape.method": "gravity"}])
+def test_keys_that_a_table_of_rods_does_not_have_are_refused(
+    changes: dict[str, object], earlier: rs.Form, tmp_path: Path
+) -> None:
+    table = earlier.save(tmp_path / "dome", kinds=["csv"]) / "schedule" / "rods.csv"
+    job = rs.Job.of_table(table)
+    for make in (lambda: rs.Job.of_table(table, changes), lambda: job.changed(changes)):
+        with pytest.raises(InputError, match=f"{next(iter(changes))} is not used for a table of rods"):
+            make()
+
+
 def test_the_command_line_runs_the_job(tmp_path: Path) -> None:
     options = [word for key, value in COARSE.items() for word in (f"--{key}", str(value))]
     assert main(["form", "hemisphere", *options, "--only", "csv", "--out", str(tmp_path / "out"), "-q"]) == 0
