@@ -14,8 +14,8 @@ from rodshell.formfinding.popup import laid_below
 from rodshell.formfinding.trim import Boundary
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.path import relax
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.relax import relax
 from tests.acceptance.targets_random import random_case
 
 

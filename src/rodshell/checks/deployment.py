@@ -24,7 +24,7 @@ from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
-from rodshell.solve.path import EASY, Snap, Trace, follow, trace, unaccounted
+from rodshell.solve.path import EASY, Snap, Trace, follow, relax, trace, unaccounted
 from rodshell.solve.problem import Problem, half_width
 from rodshell.units import length_text, percent_text
 
@@ -250,8 +250,6 @@ class _Path:
         )
         if found.report.stable:
             return found
-        from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
-
         return self._counted(relax(problem, state))
 
     def _down(self, here: Equilibrium, start: float, stop: float) -> Equilibrium | None:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
+from rodshell.checks.bending import fibre_strain
 from rodshell.errors import InputError, NetLimitError
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, Tube, scaled, size_text
-from rodshell.rods.section_stress import fibre_strain
 from rodshell.targets import Target
 from rodshell.units import length_text, rounded_down
 

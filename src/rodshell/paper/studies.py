@@ -21,9 +21,7 @@ from rodshell.formfinding.progress import Progress
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
 from rodshell.nets import chebyshev_net
-from rodshell.paper.cases import EDGE, HEIGHT, LENGTH, ROD
-from rodshell.paper.figure import Figure
-from rodshell.paper.plotting import Chart, Series, charts_svg
+from rodshell.paper.figure import EDGE, HEIGHT, LENGTH, ROD, Chart, Figure, Series, charts_svg
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere

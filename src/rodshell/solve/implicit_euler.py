@@ -34,9 +34,8 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
-from rodshell.solve.forces import Damping, Force, ImplicitForce, PointLoads
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
-from rodshell.solve.problem import NO_CURVATURE, Constraint, Supports
+from rodshell.solve.problem import NO_CURVATURE, Constraint, Damping, Force, ImplicitForce, PointLoads, Supports
 from rodshell.solve.sparse_ldl import SingularError
 
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
