@@ -156,7 +156,7 @@ def test_snaps_are_said_to_go_on_to_the_final_shape() -> None:
     _, way = snapping()
     (words,) = way.warnings
     assert words.startswith("on its way from flat the shell snaps forward by itself, at 99 % of the way, by up to ")
-    assert words.endswith(" mm, and goes on to its final shape")
+    assert words.endswith(" mm, and continues to its final shape")
 
 
 def test_every_stage_of_a_path_forwards_is_a_stable_equilibrium_with_its_ends_on_their_lines() -> None:

@@ -232,7 +232,7 @@ class Bending:
     curvature : [1/m].
     axial_strain : [-], mean of the edges on both sides.
     stress : the largest over the section of bending, stretch and torsion together [Pa], see
-        `checks.section_stress`; None where the section's fibres are not known.
+        `checks.bending`; None where the section's fibres are not known.
     strain : of the outermost fibre, bending and axial; None as the stress.
     normal_curvature, geodesic_curvature : parts of the curvature out of the shell and within it [1/m]; None where
         no rods cross.
@@ -290,7 +290,7 @@ def bending(
         upper bound, as if it bent towards its farthest point.
     twist_rate : (k,) twist per length [rad/m]; without, none.
     normals : (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without `components`.
-    shear_weight : of the shear stress against the normal stress, see `checks.section_stress`.
+    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
     """
     turns, tangents = _turns(mesh, positions, clamps)
     curvature, axial = np.linalg.norm(turns, axis=1), axial_strains(mesh, positions)

@@ -156,7 +156,7 @@ class Checks:
             return ()
         return (
             f"torsion shears the rods by up to {stress_text(sheared)}, counted by von Mises as in isotropic "
-            "materials; timber and fibre composites bear less along their fibres: give checks.shear_strength",
+            "materials; timber and fibre composites withstand less shear along the fibres: give checks.shear_strength",
         )
 
 
@@ -171,7 +171,7 @@ def check(
     popped : the shells of one footprint by their end condition.
     rod : of which they are made.
     stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.section_stress`.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
         was found until then is returned.
     """
@@ -203,7 +203,7 @@ def check(
 
 
 def _settled(shape: PopUp) -> PopUp:
-    """Settled once more from where the pop-up has ended: the order of equal figures depends on the last bits."""
+    """Solved again from where the pop-up ended: the order of equal figures depends on the last bits."""
     last = shape.equilibrium
     found = find_equilibrium(last.problem, last.state, last.forces)
     return replace(shape, shell=shape.shell.with_elements(found.elements), equilibrium=found)

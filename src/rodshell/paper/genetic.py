@@ -181,7 +181,7 @@ def make(
         if history is None:
             new_seed = SEED if seed is None else seed
             history = find(case, folder, seed=new_seed, jobs=jobs or 1, most=generations or MOST, progress=progress)
-        progress(f"{case.target.name}, once more", "pop-up", 0.0)
+        progress(f"{case.target.name}, again", "pop-up", 0.0)
         comparisons.append(compare(case, history))
     return Genetic(tuple(comparisons))
 

@@ -103,7 +103,7 @@ class Studies(Figure):
         return [line.row() for line in self.lines]
 
     def content(self) -> dict[str, Any]:
-        """The runs; what there is not is None."""
+        """The runs; None for a run that was not made."""
         return {"lines": [{k: None if v != v else v for k, v in asdict(line).items()} for line in self.lines]}
 
     def pictures(self) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """Following an equilibrium along a path of loads or supports, and down its energy to a stable one.
 
 `follow` wants the end, from t = 0 to t = 1, by whatever stable equilibria Newton's method finds on the way. `trace`
-wants the path: it goes on only from one equilibrium to the next on the same branch, and tells them by their energy.
+wants the path: it continues only to the next equilibrium on the same branch, which it recognises by the energy.
 Between two equilibria on one branch the work of the supports accounts for the change of energy; where it does not,
 the step was too long, or the branch has ended in a limit point or a bifurcation. What happens there in reality is a
 snap: at held supports the energy falls until the structure rests in another stable equilibrium.
@@ -293,7 +293,7 @@ def _pace(problem: Problem, state: Floats) -> Floats:
         count, width = element.blocks.shape
         hessians = np.zeros((count, 3 * width, 3 * width))
         element.evaluate(state, np.zeros_like(state), hessians)
-        own = np.abs(np.einsum("mii->mi", hessians)).reshape(count, width, 3).max(axis=2)
-        np.add.at(diagonal, element.blocks, own)
+        largest = np.abs(np.einsum("mii->mi", hessians)).reshape(count, width, 3).max(axis=2)
+        np.add.at(diagonal, element.blocks, largest)
     least = 1e-6 * float(diagonal.max())
     return np.repeat(np.maximum(diagonal, least)[:, None], 3, axis=1)

@@ -180,7 +180,7 @@ class Problem:
         ----------
         points : (k, 3) points of the shape [m], whose width gives the characteristic length.
         goals : (k, 3) where the ends, and the ghost nodes of clamps after them, go [m]; None: they stay.
-        elements : the shell's own energies, with their source frames elsewhere; None: as the shell has them.
+        elements : the shell's own energies, with their source frames elsewhere; None: those of the shell.
         pattern : of an earlier solve of this shell.
         """
         free = shell.held_ends()

@@ -69,7 +69,7 @@ class RodLoads:
     ----------
     forces : node -> force (3,) [N]; or (n, 3), one for each node.
     moments : edge, or clamped end that spins -> moment about the tangent [N m]. Conservative: its work is that of
-        the twist angle, counted from frames carried from the last step's shape.
+        the twist angle, counted from frames transported from the last step's shape.
     gravity : acceleration (3,) [m/s2].
     """
 
@@ -181,9 +181,9 @@ class _TurningClamp:
             if end in wanted.directors:
                 d1 = rod.reference_directors(state)[rod.edge_count + k]
                 m1 = np.cos(state[block, 0]) * d1 + np.sin(state[block, 0]) * cross(now, d1)
-                carried = parallel_transport(m1, now, then)
+                transported = parallel_transport(m1, now, then)
                 given = direction(f'the director at the "{end}"', wanted.directors[end])
-                theta += float(signed_angle(carried, adapted(given, then), then))
+                theta += float(signed_angle(transported, adapted(given, then), then))
             goals[block] = np.array([theta, 0.0, 0.0])
         return _TurningClamp(ghost, state[node], goals[node], outward * reach, now, side, angle)
 
@@ -300,7 +300,7 @@ def solve_rod(
         Where ends travel far in a step, the solver can land on another branch than the one that a rod would
         follow, with loops or twist in it: an equilibrium, but another. Give ten steps or more then, and see whether
         twice as many end with the same energy.
-    stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path goes on
+    stable : leave a saddle for a stable equilibrium, and refuse what is not stable. If False, the path continues
         over saddles, and the report counts the negative modes at its end.
 
     Raises
@@ -361,7 +361,7 @@ def _start_state(rod: ElasticRod, start: ArrayLike | RodShape | None) -> Floats:
     """(N, 3) the state to start from."""
     if isinstance(start, RodShape):
         if start.rod is not rod:
-            raise InputError("twist angles belong to their frames: go on from a shape with its own rod, shape.rod")
+            raise InputError("twist angles belong to their frames: continue from a shape with its own rod, shape.rod")
         return start.state
     state = rod.state() if start is None else np.array(start, dtype=float)
     if state.shape != (rod.block_count, 3):

@@ -335,7 +335,7 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
 
     Parameters
     ----------
-    coordinates : (n, d) where each block lies; any coordinates in which neighbours are near will do.
+    coordinates : (n, d) where each block lies; any in which neighbours are near are suitable.
     start, neighbours : the blocks coupled to block i are neighbours[start[i] : start[i + 1]].
 
     Returns
@@ -349,7 +349,7 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
 @nb.njit(cache=True)
 def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-def]
     """Segments of the rows of `along` (d, n), blocks sorted by each coordinate, are divided in place until they are
-    small, and stay sorted; `segment` tells which one a block is in."""
+    small, and stay sorted; `segment` is the segment of each block."""
     n = len(coordinates)
     segment = np.zeros(n, dtype=np.int64)
     rank, crossing, part = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int8)

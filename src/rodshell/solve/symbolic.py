@@ -32,7 +32,7 @@ class Plan(NamedTuple):
     entry_place: Longs  # where it goes in the rows of the front's pivots
     panel_start: Longs  # (n_s + 1,) where its part of the factor begins
     update_start: Longs  # (n_s,) where its update matrix lies in `stacks`
-    part_start: Longs  # (p + 1,) parts that can be eliminated at the same time, but for the last, which needs them all
+    part_start: Longs  # (p + 1,) parts that can be eliminated at the same time, except the last, which needs them all
     parts: Longs  # (n_s,) the supernodes of each part, ascending
     stack_size: int
     largest_front: int
@@ -55,7 +55,7 @@ def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> Blocks:
 
 
 def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan:
-    """Of a pattern whose `blocks` are eliminated in `order` (b,), but for what the tree leaves open."""
+    """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open."""
     order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
