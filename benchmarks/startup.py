@@ -45,14 +45,13 @@ gc.set_threshold(RARELY)  # as the command does
 from rodshell.case import load_case
 import rodshell.cli.form
 case = load_case("hemisphere")
-target, layout, rod, options = case.build()
-from rodshell.form import find_form
+from rodshell.job import Job
 told("other imports")
-form = find_form(target, layout, rod, **options)
+form = Job.of_case(case).run(until="pop-up")
 told("solve")
-archive = form.archive(case.to_toml(), options=case.output_options())
+archive = form.archive()
 told("checks")
-from rodshell.output.files import Content, DEFAULT, KINDS
+from rodshell.output.files import Content, DEFAULT, KINDS, save
 content = Content(archive)
 content.drawings
 told("drawings")
@@ -60,7 +59,7 @@ for kind in DEFAULT:
     list(KINDS[kind](content))
     told(kind)
 with tempfile.TemporaryDirectory() as folder:
-    archive.save(folder + "/a", [])
+    save(archive, folder + "/a", [])
 told("archive")
 print(json.dumps(stages))
 """
