@@ -24,8 +24,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.formfinding.layers import joint_normals, joint_tangents
 from rodshell.formfinding.popup import Ends
 from rodshell.geometry.frames import cross, dot, unit
-from rodshell.joints.crossings import RodNodes
-from rodshell.joints.linkers import LinkerBend
+from rodshell.joints.crossings import LinkerBend, RodNodes
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
 from rodshell.solve.critical import first_critical

@@ -31,9 +31,8 @@ from rodshell.joints import (
     Ties,
     require_joint,
 )
-from rodshell.joints.crossings import RodNodes
+from rodshell.joints.crossings import Corners, LinkerBend, RodNodes
 from rodshell.joints.joint import elastic_joints, refuse_mixtures
-from rodshell.joints.linkers import Corners, LinkerBend
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
