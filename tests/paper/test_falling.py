@@ -16,7 +16,7 @@ from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.results.folder import read_manifest
-from rodshell.solve.report import Status
+from rodshell.solve.equilibrium import Status
 from rodshell.solve.simulate import TimeSeries
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
 

@@ -12,10 +12,9 @@ from rodshell.formfinding.methods import Fall
 from rodshell.joints import ExplicitPenalty, Ties
 from rodshell.layout import mesh_grid
 from rodshell.model import Freedom, Shell
-from rodshell.solve.forces import GravityForce
 from rodshell.solve.implicit_euler import ContactEuler, Motion, Step
 from rodshell.solve.linear_stability import step_limit
-from rodshell.solve.problem import Supports
+from rodshell.solve.problem import GravityForce, Supports
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, coarse_layout, slope
 
 C = 3.0  # N/m

@@ -14,9 +14,8 @@ from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.frames import unit
 from rodshell.nets.chebyshev import crossing_angle
 from rodshell.output.grid import joint_places
-from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.equilibrium import Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.report import Status
 
 R, APART = 0.2, 4e-3
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))

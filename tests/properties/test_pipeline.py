@@ -16,7 +16,7 @@ from rodshell.formfinding.section_limits import section_rotation
 from rodshell.results import read
 from rodshell.results.results import json_text
 from rodshell.results.verdict import verdict
-from rodshell.solve.report import Status
+from rodshell.solve.equilibrium import Status
 from tests.properties.altered import with_report
 
 SIZE = 0.2

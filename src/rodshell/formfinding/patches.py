@@ -23,7 +23,7 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout
 from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.rods.section import Rod
-from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.units import shown
