@@ -388,7 +388,7 @@ def _free(name: str, place: Floats, start: Floats, way: Floats, size: float, roo
     lines = lines_near(lines, start, 2 * half + CLOSE * size) if near else lines
     for step in range(CLOSE if near and room.free(foot) else 0):
         label = Label(name, start + (half + 0.5 * step * size) * way, angle, start, moved=True)
-        if fits(label, size, room, lines):
+        if fits(label, size, room, lines) and room.free(thin(label.leader(size), THIN * size)):
             room.take(foot)
             take(label, size, room)
             return label
