@@ -15,8 +15,7 @@ import rodshell as rs
 from rodshell.checks import Deployment
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.report import checks_table, key_figures
-from rodshell.output.viewer import viewer_data, viewer_json
+from rodshell.output.report import checks_table, key_figures, viewer_data, viewer_json
 from rodshell.results import Archive, Results, wording
 from rodshell.results.checked import Bending, WorstBent
 from rodshell.results.from_form import rod_type

@@ -54,7 +54,7 @@ def _pictures(form: "Form") -> dict[str, str]:
     """The picture of the search, if there was one."""
     if form.search is None:
         return {}
-    from rodshell.output.searchmap import search_svg
+    from rodshell.output.colour_scale import search_svg
 
     title = f"{form.search.title} by anchor and heading"
     return {SEARCH: search_svg(title, form.search.trials, form.search.best)}

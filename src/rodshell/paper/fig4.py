@@ -12,8 +12,8 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.formfinding.progress import Progress
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
+from rodshell.output.pictures import RIGHT, UP
 from rodshell.output.svg import document, label, number, tag
-from rodshell.output.view import RIGHT, UP
 from rodshell.paper.figure import Figure
 from rodshell.paper.plotting import INK, PAPER, SOFT
 from rodshell.paper.two_rods import EDGE, LENGTH, RATE, Demonstration, Run, run_in_time, run_statics

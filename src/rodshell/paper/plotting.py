@@ -9,8 +9,8 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.layout import GridMesh
+from rodshell.output.pictures import RIGHT, TOWARDS, UP
 from rodshell.output.svg import document, label, number, tag
-from rodshell.output.view import RIGHT, TOWARDS, UP
 from rodshell.targets import Target
 
 PAPER, INK, SOFT, BODY = "#fdfdfb", "#22282f", "#7b838a", "#e2dccd"
