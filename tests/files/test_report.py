@@ -17,10 +17,10 @@ from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.report import checks_table, key_figures, viewer_data, viewer_json
 from rodshell.results import Archive, Results, wording
-from rodshell.results.checked import Bending, WorstBent
+from rodshell.results.archive import shown_case
 from rodshell.results.from_form import rod_type
-from rodshell.results.inputs import shown_case
 from rodshell.results.records import Layout, Material, Target
+from rodshell.results.results import Bending, WorstBent
 from rodshell.results.verdict import facts
 from rodshell.results.wording import Rounding
 from rodshell.solve.path import Snap

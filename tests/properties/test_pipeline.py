@@ -14,7 +14,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import bound_drape, pipeline
 from rodshell.formfinding.section_limits import section_rotation
 from rodshell.results import read
-from rodshell.results.results import json_text
+from rodshell.results.records import json_text
 from rodshell.results.verdict import verdict
 from rodshell.solve.report import Status
 from tests.properties.altered import with_report

@@ -32,7 +32,7 @@ def command(name: str, **values: Any) -> int:
     """
     output = read_output_options(values)
     case = load_case(name, overrides_of(values))
-    from rodshell.results.inputs import kept_case, read_inputs
+    from rodshell.results.archive import kept_case, read_inputs
 
     copies = kept_case(case.to_toml(), read_inputs(case.to_toml()), Path())[1]
     names = [*copies, *([SEARCH] if case.undecided else []), *_frames(case)]

@@ -25,10 +25,9 @@ from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
 from rodshell.output.svg import drawing_svg, inline
 from rodshell.results import Archive, Results, wording
-from rodshell.results.archive import SHELLS
-from rodshell.results.checked import Clearance, Reactions, Stock
-from rodshell.results.inputs import shown_case
+from rodshell.results.archive import SHELLS, shown_case
 from rodshell.results.records import Agreement, Drape, Ends, PopUp, Record
+from rodshell.results.results import Clearance, Reactions, Stock
 from rodshell.results.verdict import ENDS, facts, unknown_below
 from rodshell.results.wording import Rounding, nice_ticks, percent, rounding_of, whole_percent
 

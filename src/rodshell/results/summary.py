@@ -3,9 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
-from rodshell.results.checked import Bending
 from rodshell.results.records import Bent, RodType
-from rodshell.results.results import Results
+from rodshell.results.results import Bending, Results
 from rodshell.results.verdict import unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,

@@ -6,9 +6,8 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rodshell.results.checked import Clearance, Deployment, Level, Verdict, WorstBent
 from rodshell.results.records import Agreement, Ends, PopUp
-from rodshell.results.results import Results
+from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
 from rodshell.results.wording import millimetres, percent, place, rounded, rounding_of, whole_percent
 
 ENDS: tuple[Ends, Ends] = ("clamped", "pinned")

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from math import ceil, floor, isfinite, log10, pi
 from typing import Any
 
-from rodshell.results.checked import SelfWeight
 from rodshell.results.records import Record
-from rodshell.results.results import Results
+from rodshell.results.results import Results, SelfWeight
 from rodshell.units import stress_text
 
 FINEST, COARSEST = 1e-3, 1.0  # mm
