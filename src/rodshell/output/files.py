@@ -275,4 +275,4 @@ NAMES: dict[str, list[str]] = {
     "png": [f"pictures/{state}{what}.png" for state in (*SHELLS, *_STAGES) for what in ("", "-stress")],
     "report": ["report.html"],
 }  # fmt: skip
-"""Of the files of each kind: what may stand in the way of a result is asked before the work."""
+"""Of the files of each kind: names that may conflict with files of others are checked before the work."""

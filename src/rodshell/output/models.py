@@ -118,7 +118,7 @@ def compas_json(archive: Archive, state: str) -> str:
     state : "draped", "popped_pinned" or "popped_clamped".
     """
     positions, rods = archive.states[state], rods_of(archive)
-    places = joint_places(archive, positions)
+    joint_positions = joint_places(archive, positions)
     lines = [
         {
             "dtype": "compas.geometry/Polyline",
@@ -128,7 +128,7 @@ def compas_json(archive: Archive, state: str) -> str:
         for rod in rods
         if len(rod.nodes) > 1
     ]
-    node = {repr(name): dict(zip("xyz", at.tolist(), strict=True)) for name, at in places.items()}
+    node = {repr(name): dict(zip("xyz", at.tolist(), strict=True)) for name, at in joint_positions.items()}
     edge: dict[str, dict[str, Any]] = {name: {} for name in node}
     on_rod: dict[int, list[tuple[float, str]]] = {}
     for joint in joints_of(rods):

@@ -34,12 +34,12 @@ from rodshell.results.wording import Rounding, nice_ticks, percent, rounding_of,
 IN_PAGE = ("supports", "elevations", "erection")
 FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends{gaps}."
 PARTLY = (
-    "Below {share} of the deployment no stage could be found: nothing is known there. Above, every stage is an "
+    "Below {share} of the deployment no stage could be found, and the shape is not known. Above it, every stage is an "
     "equilibrium of the elastic grid with pinned ends{gaps}."
 )
-SNAPS = "; at {places} of the deployment the shell snaps forward"
-GUIDED = "; between {start} and {stop} of the deployment it has to be guided, and nothing is known there"
-NOT_FOLLOWED = "The deployment from flat was not followed: nothing is known between these shapes."
+SNAPS = "; at {shares} of the deployment the shell snaps forward"
+GUIDED = "; between {start} and {stop} of the deployment it has to be guided, and its shape is not known"
+NOT_FOLLOWED = "The deployment from flat was not followed: the shapes in between are not known."
 
 
 def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing]) -> str:
@@ -120,7 +120,7 @@ def _note(archive: Archive) -> str:
         return NOT_FOLLOWED
     gaps = ""
     if deployment.snaps:
-        gaps += SNAPS.format(places=", ".join(whole_percent(start) for start, _ in deployment.snaps))
+        gaps += SNAPS.format(shares=", ".join(whole_percent(start) for start, _ in deployment.snaps))
     if deployment.guided:
         start, stop = deployment.guided
         gaps += GUIDED.format(start=whole_percent(start), stop=whole_percent(stop))
@@ -303,14 +303,14 @@ def _side_by_side(listed: tuple[Entry, ...], records: Sequence[Record], rounding
 
 
 def _weight_rows(results: Results, ends: Sequence[Ends], rounding: Rounding) -> Columns:
-    """How much of its own weight the shell bears with each end condition."""
+    """How much of its own weight the shell carries with each end condition."""
     found = [results.self_weight.get(end) for end in ends]
     if not any(found):
         return []
     shares = [wording.share_of_weight(weight) if weight else wording.UNKNOWN for weight in found]
     deflections = [_shown(wording.millimetres, weight.deflection if weight else None, rounding) for weight in found]
     whose = "the weakest patch, its seam held," if results.patches else "it"
-    rows = [(f"Own weight that {whose} bears", shares)]
+    rows = [(f"Own weight that {whose} carries", shares)]
     return (
         rows
         if set(deflections) == {wording.UNKNOWN}
@@ -405,12 +405,12 @@ def _frame(
     shape: Shape, scales: dict[Colour, Scale], nodes: Ints, entries: Ints,
     low: Floats, size: float,
 ) -> dict[str, Any]:  # fmt: skip
-    places = np.rint((shape.positions[nodes] - low) / size * STEPS).astype("<u2")
+    coordinates = np.rint((shape.positions[nodes] - low) / size * STEPS).astype("<u2")
     coloured: dict[str, Any] = {
         colour: {"bins": _packed(scale.bins[entries].astype(np.uint8)), **_legend(scale)}
         for colour, scale in scales.items()
     }
-    return {"name": shape.name, "caption": shape.caption, "places": _packed(places), **coloured}
+    return {"name": shape.name, "caption": shape.caption, "places": _packed(coordinates), **coloured}
 
 
 def _legend(scale: Scale) -> dict[str, Any]:

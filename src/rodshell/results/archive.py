@@ -53,14 +53,14 @@ def kept_case(case_toml: str, inputs: Mapping[str, bytes], folder: Path) -> tupl
     inputs : contents of files that are copied, by these paths.
     folder : of the result.
     """
-    copies, places = dict[str, bytes](), dict[str, str]()
+    copies, new_names = dict[str, bytes](), dict[str, str]()
     for name in dict.fromkeys(_names(case_toml)):
         if name in inputs:
-            places[name] = f"{FOLDER}/{_free_name(Path(name).name, copies)}"
-            copies[places[name]] = inputs[name]
+            new_names[name] = f"{FOLDER}/{_free_name(Path(name).name, copies)}"
+            copies[new_names[name]] = inputs[name]
         else:
-            places[name] = _relative(name, folder)
-    return _renamed(case_toml, places), copies
+            new_names[name] = _relative(name, folder)
+    return _renamed(case_toml, new_names), copies
 
 
 def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
@@ -102,12 +102,12 @@ def _names(case_toml: str) -> list[str]:
     return [json.loads(text) for _, text in NAMED.findall(case_toml)]
 
 
-def _renamed(case_toml: str, places: Mapping[str, str]) -> str:
+def _renamed(case_toml: str, new_names: Mapping[str, str]) -> str:
     """The case with other names of its files."""
 
     def line(found: re.Match[str]) -> str:
         name = json.loads(found[2])
-        return f"{found[1]} = {json.dumps(places.get(name, name), ensure_ascii=False)}"
+        return f"{found[1]} = {json.dumps(new_names.get(name, name), ensure_ascii=False)}"
 
     return NAMED.sub(line, case_toml)
 
@@ -130,7 +130,7 @@ def _relative(name: str, folder: Path) -> str:
 
 
 ARCHIVE = ("result.json", "case.toml", "states.npz")  # from which every other file can be made again
-SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order they come about
+SHELLS = ("draped", "popped_pinned", "popped_clamped")  # the states in space, in the order in which they are computed
 GAPS = {"draped": "gap_draped", "popped_pinned": "gap_pinned", "popped_clamped": "gap_clamped"}
 BENT = ("curvature", "stress")  # known at each entry of `rod_nodes`
 T = TypeVar("T")

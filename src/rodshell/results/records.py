@@ -87,7 +87,7 @@ def json_text(content: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    content : keys and values; NumPy's arrays and numbers will do.
+    content : keys and values; NumPy's arrays and numbers are converted.
     """
     lines = []
     for name, value in plain(content).items():

@@ -123,10 +123,10 @@ class JointLoad(Record):
 
 
 class SelfWeight(Record):
-    """How much of its own weight the shell bears."""
+    """How much of its own weight the shell carries."""
 
     load_factor: Number = key("factor on the weight at which stability is lost; null: above 100, or no mass given")
-    deflection: Number = key("largest displacement under the whole weight; null: it does not bear it", "m")
+    deflection: Number = key("largest displacement under the whole weight; null: it does not carry it", "m")
     limit: Text | None = key("limit point, bifurcation, unstable unloaded, none, not followed, or no mass")
 
 
@@ -285,7 +285,7 @@ class Results(Record):
     bending: Bending | None = key("bending and stress")
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
-    self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell bears")
+    self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
     deployment: Deployment | None = key("the shell on its way from flat to popped up")
     contact: Contact | None = key("contact of rods with each other")
     other_shapes: ByEnds[OtherShapes] = by_ends("other stable shapes on the same supports")
@@ -299,12 +299,12 @@ class Results(Record):
 
         Parameters
         ----------
-        content : dictionaries, lists, numbers and texts; NumPy's arrays and numbers will do.
+        content : dictionaries, lists, numbers and texts; NumPy's arrays and numbers are converted.
         source : what messages call it.
 
         Raises
         ------
-        OutputError : it is no such content; the sentence names the key.
+        OutputError : the content is not valid; the sentence names the key.
         """
         return cls.from_text(json.dumps(plain(upgraded(content, source=source))), source=source)
 
@@ -329,7 +329,7 @@ def read_results(path: Path) -> Results:
 
     Raises
     ------
-    OutputError : there is no such file, or it is no result that this version understands; the sentence names the key.
+    OutputError : there is no such file, or this version cannot read it; the sentence names the key.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -393,7 +393,7 @@ def contradictions(results: Results) -> Iterator[str]:
     known = set(ids)
     if len(known) < len(ids):
         twice = next(name for k, name in enumerate(ids) if name in ids[:k])
-        yield f'rods: the id "{twice}" stands twice'
+        yield f'rods: the id "{twice}" occurs twice'
     for where, name in _named_rods(results):
         if name not in known:
             yield f'{where}: there is no rod "{name}"'

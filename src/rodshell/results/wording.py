@@ -156,7 +156,7 @@ def percent(share: float | None) -> str:
 
 
 def share_of_weight(found: SelfWeight) -> str:
-    """How much of its own weight a shell bears."""
+    """How much of its own weight a shell carries."""
     factor = found.load_factor
     if found.limit == "no mass":
         return "unknown: no mass was given"
