@@ -82,7 +82,7 @@ def test_a_step_that_the_flat_grid_bears_is_refused_once_it_has_landed() -> None
     with pytest.raises(StabilityError, match=r"once the grid has landed: at t = 0\.\d+ s, \d+ nodes touching"):
         rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=fall)
     # what is stopped along the normal alone keeps its velocity along the surface
-    sliding = replace(fall, stopped="along the normal")
+    sliding = replace(fall, stopped="normal")
     assert rs.drape(coarse_layout(), PAPER_ROD, HEMISPHERE, method=sliding).rest is not None
 
 
