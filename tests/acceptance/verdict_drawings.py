@@ -16,11 +16,10 @@ import numpy as np
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.output import export
-from rodshell.output.drawing import Drawing
+from rodshell.output.drawing import CAPITAL, Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.files import KINDS
-from rodshell.output.fonts import CAPITAL
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive, read
 from rodshell.results.wording import rounding_of

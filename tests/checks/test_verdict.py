@@ -71,8 +71,8 @@ def test_a_result_without_fault_is_good_and_says_what_was_not_checked() -> None:
     found = verdict(changed())
     assert found.level == "good"
     assert found.headline == (
-        "Good: with pinned and clamped ends the shell is stable and bears at least 3 times its own weight; with "
-        "clamped ends it keeps to the target within 0.1 % of its size"
+        "Good: with pinned and clamped ends the shell is stable and carries at least 3 times its own weight; with "
+        "clamped ends the gap to the target is at most 0.1 % of its size"
     )
     assert "neither snow, wind nor people" in found.reasons[-1]
 
@@ -102,10 +102,10 @@ def test_different_faults_of_all_end_conditions_leave_none_to_build() -> None:
     ("changes", "words"),
     [([("bending.deployment", {"utilisation": 1.69, "share": 0.25, "rod": "U03", "at": 0.2})],
       "during deployment (at 25 % of the way) the rods would break: 169 % of their strength in U03, 200 mm from its"),
-     ([("bending.deployment.max_bending_strain", 0.08)], "too thick for their bends"),
+     ([("bending.deployment.max_bending_strain", 0.08)], "too thick for this curvature"),
      ([("contact.deployment", TOUCHING)], "5 pairs of rods touch or cross, worst: U03 and U04 overlap by 3.00 mm"),
      ([("target.flat", True)], "the target is flat, nothing pops up"),
-     ([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.051)], "off the target"),
+     ([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.051)], "deviates from the target"),
      ([("pop_up", {}), ("status", "drape stalled")], "did not converge: drape stalled")],
 )  # fmt: skip
 def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]], words: str) -> None:
@@ -116,7 +116,7 @@ def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]]
 
 @pytest.mark.parametrize(
     ("changes", "words"),
-    [([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.021)], "off the target"),
+    [([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.021)], "deviates from the target"),
      ([("self_weight.pinned.load_factor", 0.024), ("self_weight.clamped.load_factor", 0.051)],
       "2.4 % of its own weight with pinned ends and 5.1 % of its own weight with clamped ends"),
      ([("self_weight", MISSING)], "own weight was not checked"),
@@ -124,9 +124,9 @@ def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]]
      ([("other_shapes.clamped.found", [{"distance": 0.49, "energy": 1.16, "mirror": False}])],
       "another stable shape, 49 % of its size away at 1.16 times the energy"),
      ([("bending.strength", None)], "no strength was given"),
-     ([("contact", MISSING)], "whether rods touch and are thin enough for their bends was not checked"),
+     ([("contact", MISSING)], "whether rods touch and are thin enough for their curvature was not checked"),
      ([("bending.clamped.max_bending_strain", None)], "rod.section.fibre_distances"),
-     ([("agreement.pinned", MISSING)], "how near the shell comes to the target was not checked"),
+     ([("agreement.pinned", MISSING)], "the gap to the target was not checked"),
      ([("deployment.clamped.reached_from_flat", None)], "whether the clamped shape is reached from the pinned one"),
      ([("bending.strength_of", "larch"), ("bending.pinned.utilisation", 0.99)], "permanently use 99 %"),
      ([("deployment", MISSING), ("status", "out of time after 3 s: not checked: the deployment from flat"),
@@ -170,7 +170,7 @@ def test_the_verdict_of_a_result_is_the_one_that_it_holds() -> None:
 
 
 def test_supports_are_recommended_only_where_both_can_be_used() -> None:
-    advice = "gain little here: pinned ones will do"
+    advice = "improve little here: pinned ones are enough"
     close = ("agreement.pinned", {"max": 0.003, "max_relative": 0.0015})
     near = changed(close)
     assert any(advice in fact for fact in facts(near))

@@ -10,9 +10,9 @@ from sample_archive import sample_archive
 
 from rodshell.output import save
 from rodshell.output.drawings.sheets import title_block
-from rodshell.results import inputs as inputs_module
+from rodshell.results import archive as archive_module
 from rodshell.results import read
-from rodshell.results.inputs import read_inputs
+from rodshell.results.archive import read_inputs
 
 
 def case_of(*files: Path) -> str:
@@ -66,7 +66,7 @@ def test_what_was_read_is_written_again_elsewhere(files: tuple[Path, Path], tmp_
 def test_a_large_file_stays_and_is_named_from_the_folder(
     files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inputs_module, "LARGEST", 0)
+    monkeypatch.setattr(archive_module, "LARGEST", 0)
     out = saved(case_of(files[0]), tmp_path / "out")
     assert named(out) == ['../a/ro=of "1".obj']
     again = save(read(out), tmp_path / "deep/er/again", [])

@@ -16,8 +16,8 @@ from forms import archive, wished
 from rodshell.errors import InputError
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.gltf import section_outline, swept
 from rodshell.output.grid import joints_of, rods_of
+from rodshell.output.models import section_outline, swept
 from rodshell.results import Results
 
 RADIUS = 1e-3  # m, of the rods

@@ -15,10 +15,9 @@ from sample_archive import sample_archive
 from rodshell.cli import main
 from rodshell.errors import OutputWarning
 from rodshell.output import export, save
-from rodshell.output.drawing import Drawing, Pen, Pencil, Text
+from rodshell.output.drawing import CAPITAL, Drawing, Pen, Pencil, Text
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.fonts import CAPITAL
 from rodshell.output.options import PAPERS
 from rodshell.output.pdf import drawings_pdf, text_width
 from rodshell.results import Archive, Results

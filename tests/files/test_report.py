@@ -15,13 +15,12 @@ import rodshell as rs
 from rodshell.checks import Deployment
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.report import checks_table, key_figures
-from rodshell.output.viewer import viewer_data, viewer_json
+from rodshell.output.report import checks_table, key_figures, viewer_data, viewer_json
 from rodshell.results import Archive, Results, wording
-from rodshell.results.checked import Bending, WorstBent
+from rodshell.results.archive import shown_case
 from rodshell.results.from_form import rod_type
-from rodshell.results.inputs import shown_case
 from rodshell.results.records import Layout, Material, Target
+from rodshell.results.results import Bending, WorstBent
 from rodshell.results.verdict import facts
 from rodshell.results.wording import Rounding
 from rodshell.solve.path import Snap
@@ -110,7 +109,7 @@ def test_frames_of_the_view_are_the_archive_s_shapes() -> None:
 def test_without_a_deployment_the_view_says_that_nothing_is_known_between(tmp_path: Path) -> None:
     made = sample_archive()
     page = page_of(made, tmp_path).read_text()
-    assert "The deployment from flat was not followed: nothing is known between these shapes." in page
+    assert "The deployment from flat was not followed: the shapes in between are not known." in page
     assert len((viewer_data(made) or {})["frames"]) == 3  # flat, pinned, clamped, and nothing made up
 
 
@@ -186,9 +185,9 @@ def with_stages(strength_used: float | None, lost: float | None, snaps: list[lis
     ("lost", "snaps", "words", "note", "head"),
     [(None, [], "deployment included.", "Every stage is an equilibrium", "deployment"),
      (None, [[0.14, 0.25]], "the stress during a snap is not known.", "Every stage", "deployment"),
-     (0.5625, [], "above 56 % of the deployment; below, nothing is known of it.", "Below 56 %",
+     (0.5625, [], "above 56 % of the deployment; below that share the stress is not known.", "Below 56 %",
       "deployment above 56 %"),
-     (1.0, [], "nothing is known of the deployment, which could not be followed.",
+     (1.0, [], "for the deployment, which could not be followed, the stress is not known.",
       "The deployment from flat was not followed", None)],
 )  # fmt: skip
 def test_no_more_is_said_of_the_deployment_than_was_followed(
@@ -216,9 +215,9 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
       "snaps forward."),
      (None, [], [0.25, 0.5625],
       "Every stage is an equilibrium of the elastic grid with pinned ends; between 25 % and 56 % of the deployment it "
-      "has to be guided, and nothing is known there."),
+      "has to be guided, and its shape is not known."),
      (0.5625, [], None,
-      "Below 56 % of the deployment no stage could be found: nothing is known there. Above, every stage is an "
+      "Below 56 % of the deployment no stage could be found, and the shape is not known. Above it, every stage is an "
       "equilibrium of the elastic grid with pinned ends.")],
 )  # fmt: skip
 def test_under_the_view_stands_where_the_stages_do_not_follow_each_other_smoothly(

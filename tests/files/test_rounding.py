@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from rodshell.output.schedules import heading
 from rodshell.results import Results
-from rodshell.results.checked import Drawings
 from rodshell.results.records import Rod
+from rodshell.results.results import Drawings
 from rodshell.results.wording import rounding_of
 
 

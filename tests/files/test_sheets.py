@@ -12,11 +12,10 @@ from sample_archive import sample_archive, table_archive
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.joints import Joint, joint_parameters
-from rodshell.output.drawing import LETTER, TEXT, Drawing
+from rodshell.output.drawing import CAPITAL, LETTER, TEXT, Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
 from rodshell.output.drawings.sheets import MARGIN, fitted, parts, tiled, title_block
-from rodshell.output.fonts import CAPITAL
 from rodshell.output.options import PAPERS, DrawingStyle
 from rodshell.results import Archive, Results
 

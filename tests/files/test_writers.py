@@ -16,8 +16,7 @@ from rodshell.output.colour_scale import mixed, scale_of
 from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
 from rodshell.output.grid import rods_of, shape_of
 from rodshell.output.labels import Room, lines_meet
-from rodshell.output.pictures import LAYERS, PAPER, picture
-from rodshell.output.png import drawing_png
+from rodshell.output.pictures import DEPTHS, PAPER, drawing_png, picture
 from rodshell.output.svg import drawing_svg, number
 from rodshell.results import Archive, Results
 
@@ -124,7 +123,7 @@ def test_a_picture_draws_every_rod_whole_and_once_over_a_halo(state: str) -> Non
     assert lengths[0] == pytest.approx(lengths[1], rel=1e-12)
     pieces = sum(len(path.points) - 1 for path in ink)
     assert pieces == sum(len(rod.nodes) - 1 for rod in rods_of(archive))
-    assert len({path.pen.width for path in ink if path.pen}) <= LAYERS
+    assert len({path.pen.width for path in ink if path.pen}) <= DEPTHS
     assert len(ink) >= len(rods_of(archive))
 
 

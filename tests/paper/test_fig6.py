@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from rodshell.formfinding.methods import Fall
 from rodshell.nets import sphere_net_end
-from rodshell.output.view import TOWARDS
+from rodshell.output.pictures import TOWARDS
 from rodshell.paper import drapes
 from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
 from rodshell.paper.figure import Case, standing

@@ -14,7 +14,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import bound_drape, pipeline
 from rodshell.formfinding.section_limits import section_rotation
 from rodshell.results import read
-from rodshell.results.results import json_text
+from rodshell.results.records import json_text
 from rodshell.results.verdict import verdict
 from rodshell.solve.equilibrium import Status
 from tests.properties.altered import with_report
@@ -115,7 +115,7 @@ def test_rods_that_stretch_under_their_weight_are_warned_of_with_the_right_remed
     if stretched:
         assert f"stretch by {100 * form.draped.report.max_strain:.2g} %" in found[0]
         assert "rod.material" in found[0]
-        off = [text for text in form.verdict.reasons if "off the target" in text]
+        off = [text for text in form.verdict.reasons if "deviates from the target" in text]
         assert len(off) == 1
         assert "dips and ridges" not in off[0]
 
@@ -199,7 +199,7 @@ def test_a_drape_by_weight_that_fails_is_told_of_the_bound_one_once(method, stat
 def test_a_wave_that_springs_off_is_advised_seams():
     gap = replace(hemisphere_form().agreement["clamped"], max=0.03 * SIZE)
     form = replace(hemisphere_form(), stages=replace(hemisphere_form().stages, agreement={"clamped": gap}))
-    (words,) = [text for text in verdict(form.results()).reasons if "off the target" in text]
+    (words,) = [text for text in verdict(form.results()).reasons if "deviates from the target" in text]
     assert words.endswith("dips and ridges need seams, graded stiffness or supports")
 
 

@@ -26,8 +26,8 @@ from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker, Pin, SharedDofs
 from rodshell.layout import mesh_grid, straight_rods
 from rodshell.model import Shell
+from rodshell.output.pictures import RIGHT, UP
 from rodshell.output.svg import document, label, number, tag
-from rodshell.output.view import RIGHT, UP
 from rodshell.paper.figure import INK, PAPER, ROD, SOFT, Figure
 from rodshell.results.wording import nice_ticks
 from rodshell.solve.implicit_euler import Motion

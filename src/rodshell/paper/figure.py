@@ -12,9 +12,9 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.layout import GridLayout, GridMesh
+from rodshell.output.pictures import RIGHT, TOWARDS, UP
 from rodshell.output.schedules import csv_text
 from rodshell.output.svg import document, label, number, tag
-from rodshell.output.view import RIGHT, TOWARDS, UP
 from rodshell.results.folder import ResultFolder, open_folder
 from rodshell.results.results import FORMAT
 from rodshell.rods.materials import Material
