@@ -111,7 +111,7 @@ class Run:
         earlier = self.earlier.stages if self.earlier is not None else None
         return find_patched_stages(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
-            own=case.seams.own(), joint=found.joint, ends=found.ends,
+            overrides=case.seams.own(), joint=found.joint, ends=found.ends,
             warm_start=earlier if isinstance(earlier, PatchedForm) else None,
             same_drape="trim" in same, progress=self.progress,
         )  # fmt: skip

@@ -13,7 +13,7 @@ from rodshell.checks import self_weight
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.end_matching import LEAVE_OUT, choose_families
-from rodshell.formfinding.seams import End, carried_heading, in_a_row, patches_of
+from rodshell.formfinding.seams import End, transported_heading, in_a_row, patches_of
 from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.mesh import side_by_side
 from rodshell.results import read
@@ -329,7 +329,7 @@ def test_a_heading_carried_over_a_sphere_keeps_its_angle_with_the_way(rotate: fl
     """Parallel transport along the great circle from the top."""
     for x, y in ((0.12, 0.0), (-0.1, 0.13), (0.05, -0.17)):
         top, there = np.array([0.0, 0.0, 0.2]), np.array([x, y, np.sqrt(0.04 - x**2 - y**2)])
-        carried = carried_heading(DOME, (x, y), rotate)
+        carried = transported_heading(DOME, (x, y), rotate)
         plan = np.array([np.cos(carried), np.sin(carried)])
         heading = np.array([*(plan * there[2]), -plan @ there[:2]])  # the tangent over this direction of the plan
         heading /= np.linalg.norm(heading)

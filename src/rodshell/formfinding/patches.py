@@ -1,5 +1,5 @@
-"""Several simple gridshells sewn together: a target is cut into patches, each is formed alone, and on the seams the
-rod ends of both sides share their places [HQK 3.4, the outlook]."""
+"""Several simple gridshells joined at seams: a target is cut into patches, each patch is formed by itself, and on the
+seams the rod ends of both sides meet at common points [HQK 3.4, the outlook]."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -15,7 +15,7 @@ from rodshell.formfinding.methods import Draped
 from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
 from rodshell.formfinding.popup import ENDS, Ends, Start
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.seams import FEWEST, Laid, Meeting, carried_heading, lay_patches, patches_of
+from rodshell.formfinding.seams import FEWEST, LaidPatch, Meeting, lay_patches, patches_of, transported_heading
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.section_limits import flat_warnings
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
@@ -29,20 +29,20 @@ from rodshell.targets.patch import Patch, Seam
 from rodshell.units import shown
 from rodshell.validation import choices_of
 
-MANY = 0.1  # of the rods: a share left out that is worth a word
-ASTRAY = 0.005  # of the size: ends that are moved further are worth a word
+MANY = 0.1  # of the rods: a larger share left out gives a warning
+ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
 GAP = 2.0  # spacings between the flat grids of neighbouring patches
 
 
 @dataclass(frozen=True)
 class PatchLayout:
-    """What a patch has of its own; None: as the others.
+    """Settings of one patch that replace those of the layout; None: as in the layout.
 
     Parameters
     ----------
     anchor : x, y of the point where its axes cross [m]; default: its middle.
-    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the whole's heading at its
-        summit, carried to the anchor.
+    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the layout's heading at
+        the target's summit, transported to the anchor.
     spacing : between its rods, of families u and v [m].
     """
 
@@ -53,12 +53,12 @@ class PatchLayout:
 
 @dataclass(frozen=True)
 class MergedPopUp:
-    """The popped-up shells of all patches as one; the mechanical model is each patch's own.
+    """The popped-up shells of all patches, merged; the mechanical models stay separate.
 
     Parameters
     ----------
     positions : (n, 3) of the nodes of all patches, one after the other [m].
-    report : the figures of all solves together.
+    report : the merged report of all solves.
     """
 
     ends: Ends
@@ -75,10 +75,11 @@ class PatchedForm:
 
     Parameters
     ----------
+    overrides : settings of single patches, by name.
     laid, found : of each patch by its name: its rods, and every stage of its form.
     meetings : where rods of two patches end at one point.
-    moved : of each patch how far rod ends were moved to these points [m]: what its mesh missed them by.
-    ends : the end conditions asked for.
+    moved : of each patch the largest distance between a rod end of its mesh and that point, to which it was moved [m].
+    ends : the requested end conditions.
     """
 
     target: Target
@@ -86,8 +87,8 @@ class PatchedForm:
     layout: GridLayout
     rod: Rod
     joint: Joint
-    own: Mapping[str, PatchLayout]
-    laid: dict[str, Laid]
+    overrides: Mapping[str, PatchLayout]
+    laid: dict[str, LaidPatch]
     found: dict[str, PatchForm]
     meetings: tuple[Meeting, ...]
     moved: dict[str, float]
@@ -103,12 +104,12 @@ class PatchedForm:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        whole = set(self.target.warnings)  # said once; and a patch may be flat where the shell is not
+        whole = set(self.target.warnings)  # reported once; and a patch may be flat where the shell is not
         whole.update(*(flat_warnings(form.trimmed.positions, self.rod) for form in self.found.values()))
         words = [f"patch {k}: {word}" for k, form in self.found.items() for word in form.warnings if word not in whole]
         words += [
-            f"patch {k}: rod ends were moved by up to {by:.3g} m to where they meet others: its net does not hold them "
-            "well there, another heading or anchor may"
+            f"patch {k}: rod ends were moved by up to {by:.3g} m to the points where they meet others: its net does "
+            "not reach these points well; try another heading or anchor"
             for k, by in self.moved.items()
             if by > ASTRAY * self.target.size
         ]
@@ -116,19 +117,19 @@ class PatchedForm:
         if share > MANY:
             words.append(
                 f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
-                "seam: another heading may leave out fewer (layout.rotate, or seams.patches for one patch alone)"
+                "seam: another heading may leave out fewer (layout.rotate, or seams.patches for a single patch)"
             )
         return (*flat_warnings(self.draped, self.rod), *self.target.warnings, *words)
 
     def parameters(self) -> dict[str, object]:
-        """Seams and what patches have of their own, as they stand in a case file."""
-        own = [{"name": name, **_given(one)} for name, one in self.own.items()]
-        return {"lines": [seam.points.tolist() for seam in self.seams], "patches": own}
+        """Seams and the settings of single patches, as they are written in a case file."""
+        patches = [{"name": name, **_given(settings)} for name, settings in self.overrides.items()]
+        return {"lines": [seam.points.tolist() for seam in self.seams], "patches": patches}
 
     @cached_property
     def flat(self) -> SideBySide:
         """The flat grids of all patches in a row."""
-        gap = GAP * max(max(one.layout.spacing) for one in self.laid.values())
+        gap = GAP * max(max(patch.layout.spacing) for patch in self.laid.values())
         return side_by_side({name: form.footprint.mesh for name, form in self.found.items()}, gap)
 
     @property
@@ -142,14 +143,14 @@ class PatchedForm:
 
     @cached_property
     def boundary(self) -> Boundary:
-        """Of all patches, rod by rod."""
+        """The boundary of all patches, rod by rod."""
         parts = [form.trimmed.boundary for form in self.found.values()]
         points, tangents = (np.concatenate([getattr(part, what) for part in parts]) for what in ("points", "tangents"))
         return Boundary(points, tangents, self.draped)
 
     @cached_property
     def popped(self) -> dict[Ends, MergedPopUp]:
-        """The shells of all patches as one, for each kind of ends that all were popped up with."""
+        """The merged shells of all patches, for each end condition with which all of them were popped up."""
         forms = list(self.found.values())
         return {
             ends: MergedPopUp(
@@ -189,7 +190,7 @@ def find_patched_stages(
     layout: GridLayout,
     rod: Rod,
     *,
-    own: Mapping[str, PatchLayout] | None = None,
+    overrides: Mapping[str, PatchLayout] | None = None,
     joint: Joint | None = None,
     ends: Ends | Sequence[Ends] = ENDS,
     warm_start: PatchedForm | None = None,
@@ -198,54 +199,57 @@ def find_patched_stages(
 ) -> PatchedForm:
     """Cut a target into patches, lay their rods such that they meet, and form each; see `rodshell.find_form`.
 
-    warm_start, same_drape : as of `find_stages`, patches being matched by their names.
+    Parameters
+    ----------
+    overrides : settings of single patches, by name.
+    warm_start, same_drape : as in `find_stages`; patches are matched by their names.
     """
     ends = choices_of("ends", ends, ENDS)
     require_joint(joint)
-    own, joint = dict(own or {}), joint or Ball()
+    overrides, joint = dict(overrides or {}), joint or Ball()
     earlier = warm_start.found if warm_start is not None else {}
     if warm_start is not None and same_drape:
         laid, meetings = warm_start.laid, warm_start.meetings
     else:
-        laid, meetings = _lay(target, seams, layout, own, joint.eccentricity, progress)
+        laid, meetings = _lay(target, seams, layout, overrides, joint.eccentricity, progress)
     found, moved = dict[str, PatchForm](), dict[str, float]()
     for name, patch in laid.items():
-        places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
+        end_points = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
 
         def patch_progress(stage: str, detail: str, residual: float, name: str = name) -> None:
             if stage == "net":
-                return  # which was laid: marched again, it is no reason to lose what is finished
+                return  # the net is known and only marched again: a time limit must not discard the finished patches here
             progress(stage, f"patch {name}, {detail}", residual)
 
         found[name] = find_stages(
             patch.patch, patch.layout, rod,
             anchor=patch.anchor, joint=joint, ends=ends, warm_start=earlier.get(name), same_drape=same_drape,
-            name=name, cut=partial(cut_with_ends, places=places), progress=patch_progress,
+            name=name, cut=partial(cut_with_ends, end_points=end_points), progress=patch_progress,
         )  # fmt: skip
         moved[name] = _moved(found[name])
-    return PatchedForm(target, tuple(seams), layout, rod, joint, own, laid, found, meetings, moved, ends)
+    return PatchedForm(target, tuple(seams), layout, rod, joint, overrides, laid, found, meetings, moved, ends)
 
 
 def best_heading(
     target: Target,
     seams: Sequence[Seam],
     layout: GridLayout,
-    own: Mapping[str, PatchLayout],
+    overrides: Mapping[str, PatchLayout],
     *,
     eccentricity: float = 0.0,
     progress: Progress = silent,
 ) -> float:
-    """The heading at the target's summit [rad] that leaves out the smallest share of the rods, of a few tried.
+    """The heading at the target's summit [rad] that leaves out the smallest share of the rods; a few headings are tried.
 
     Raises
     ------
-    RodshellError : none will do; the reason is the first one's.
+    RodshellError : every heading fails; the error is that of the first heading.
     """
     shares, reasons = dict[float, float](), list[RodshellError]()
     for heading in HEADINGS:
         progress("seams", f"trying {degrees(heading):.0f} deg", 0.0)
         try:
-            laid, _ = _lay(target, seams, replace(layout, rotate=heading), own, eccentricity, silent)
+            laid, _ = _lay(target, seams, replace(layout, rotate=heading), overrides, eccentricity, silent)
             shares[heading] = left_out(laid)
         except RodshellError as reason:
             reasons.append(reason)
@@ -254,83 +258,94 @@ def best_heading(
     return min(shares, key=lambda heading: round(shares[heading], 2))
 
 
-def left_out(laid: Mapping[str, Laid]) -> float:
-    """The share of the rods that is left out for want of another at a seam."""
-    missing = sum(len(one.layout.left_out) for one in laid.values())
-    return missing / (missing + sum(len(one.rods) for one in laid.values()))
+def left_out(laid: Mapping[str, LaidPatch]) -> float:
+    """The share of the rods that is left out because no rod of the next patch meets them at a seam."""
+    missing = sum(len(patch.layout.left_out) for patch in laid.values())
+    return missing / (missing + sum(len(patch.rods) for patch in laid.values()))
 
 
 def _lay(
     target: Target,
     seams: Sequence[Seam],
     layout: GridLayout,
-    own: Mapping[str, PatchLayout],
+    overrides: Mapping[str, PatchLayout],
     eccentricity: float,
     progress: Progress,
-) -> tuple[dict[str, Laid], tuple[Meeting, ...]]:
+) -> tuple[dict[str, LaidPatch], tuple[Meeting, ...]]:
     if layout.rods != "auto" or layout.length != "auto":
         raise InputError('a target cut by seams counts its rods itself: leave layout rods and length at "auto"')
     progress("seams", "cutting", 0.0)
     patches = patches_of(target, tuple(seams))
-    for name in own:
+    for name in overrides:
         if name not in patches:
             raise InputError(f"there is no patch {shown(name)}: the seams make the patches {', '.join(patches)}")
-    layouts = {name: _own_layout(patch, layout, own.get(name, PatchLayout())) for name, patch in patches.items()}
-    anchors = {name: own[name].anchor if name in own else None for name in patches}
+    layouts = {
+        name: _patch_layout(patch, layout, overrides.get(name, PatchLayout())) for name, patch in patches.items()
+    }
+    anchors = {name: overrides[name].anchor if name in overrides else None for name in patches}
     return lay_patches(patches, layouts, anchors, eccentricity=eccentricity, progress=progress)
 
 
-def _own_layout(patch: Patch, layout: GridLayout, own: PatchLayout) -> GridLayout:
-    spacing, rotate = own.spacing or layout.spacing, own.rotate
+def _patch_layout(patch: Patch, layout: GridLayout, settings: PatchLayout) -> GridLayout:
+    """The layout of a patch: that of the whole target with the patch's own settings."""
+    spacing, rotate = settings.spacing or layout.spacing, settings.rotate
     if rotate is None:
-        rotate = carried_heading(patch.whole, own.anchor or patch.middle, layout.rotate)
+        rotate = transported_heading(patch.whole, settings.anchor or patch.middle, layout.rotate)
     return replace(layout, spacing=spacing, edge=min(layout.edge, *spacing), rotate=rotate)
 
 
-def cut_with_ends(draped: Draped, places: Mapping[tuple[str, int], Floats]) -> Trimmed:
-    """The trimmed shell, some rod ends, by rod and side, put where their seams have them; ends of rods in layers over
-    or under these points."""
+def cut_with_ends(draped: Draped, end_points: Mapping[tuple[str, int], Floats]) -> Trimmed:
+    """Trim a draped grid, and move the rod ends at seams to the points where they meet others.
+
+    Parameters
+    ----------
+    draped : a grid on its patch.
+    end_points : (3,) the point of each of these ends, by rod and side [m]; the ends of rods in layers are put above or
+        below it.
+    """
     trimmed = trim(draped, fewest=FEWEST)
     mesh, positions = trimmed.mesh, trimmed.positions.copy()
     for k, rod in enumerate(mesh.grid.rods):
         for side in (0, 1):
-            if (rod.name, side) in places:
-                node, place = mesh.ends[k, side], places[rod.name, side]
-                lift = mesh.heights[node] * draped.target.on_surface(place[None]).normal[0] if mesh.layered else 0.0
-                positions[node] = place + lift
+            if (rod.name, side) in end_points:
+                node, point = mesh.ends[k, side], end_points[rod.name, side]
+                lift = mesh.heights[node] * draped.target.on_surface(point[None]).normal[0] if mesh.layered else 0.0
+                positions[node] = point + lift
     boundary = replace(trimmed.boundary, points=positions[mesh.ends.ravel()], draped=positions)
     return replace(trimmed, positions=positions, boundary=boundary)
 
 
 def _moved(form: PatchForm) -> float:
-    """How far the ends of a patch's rods were moved from where its own drape has them, at most [m]."""
-    own, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
-    return float(np.linalg.norm(own.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0))
+    """Largest distance by which rod ends of a patch were moved from their draped positions [m]."""
+    unmoved, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
+    return float(
+        np.linalg.norm(unmoved.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0)
+    )
 
 
-def _given(own: PatchLayout) -> dict[str, object]:
-    return {key: value for key, value in asdict(own).items() if value is not None}
+def _given(settings: PatchLayout) -> dict[str, object]:
+    return {key: value for key, value in asdict(settings).items() if value is not None}
 
 
 def merged_report(reports: Sequence[SolveReport]) -> SolveReport:
-    """Of solves that have nothing to do with each other."""
-    worst = next((one.status for one in reports if not one.converged), Status.CONVERGED)
+    """The merged report of independent solves: sums of counts, and the worst status and residual."""
+    worst = next((report.status for report in reports if not report.converged), Status.CONVERGED)
     total = replace(
         reports[0],
         status=worst,
-        reason=next((one.reason for one in reports if one.reason), ""),
-        dofs=sum(one.dofs for one in reports),
-        force_residual=max(one.force_residual for one in reports),
-        max_strain=max(one.max_strain for one in reports),
-        negative_modes=sum(one.negative_modes for one in reports),
+        reason=next((report.reason for report in reports if report.reason), ""),
+        dofs=sum(report.dofs for report in reports),
+        force_residual=max(report.force_residual for report in reports),
+        max_strain=max(report.max_strain for report in reports),
+        negative_modes=sum(report.negative_modes for report in reports),
     )
     return total.after(*reports[1:])
 
 
 def merged_agreement(parts: Sequence[Agreement]) -> Agreement:
-    """Of several patches; each counts by its nodes."""
-    worst = max(parts, key=lambda one: one.max)
-    count = np.array([len(one.gaps) for one in parts])
-    square = np.array([one.rms for one in parts]) ** 2
+    """The merged agreement of several patches, weighted by their numbers of nodes."""
+    worst = max(parts, key=lambda part: part.max)
+    count = np.array([len(part.gaps) for part in parts])
+    square = np.array([part.rms for part in parts]) ** 2
     rms = float(np.sqrt(np.average(square, weights=count)))
-    return replace(worst, gaps=np.concatenate([one.gaps for one in parts]), rms=rms)
+    return replace(worst, gaps=np.concatenate([part.gaps for part in parts]), rms=rms)
