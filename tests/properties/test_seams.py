@@ -13,7 +13,7 @@ from rodshell.checks import self_weight
 from rodshell.cli import main
 from rodshell.errors import InputError, NetLimitError
 from rodshell.formfinding.end_matching import LEAVE_OUT, choose_families
-from rodshell.formfinding.seams import End, transported_heading, in_a_row, patches_of
+from rodshell.formfinding.seams import End, in_a_row, patches_of, transported_heading
 from rodshell.geometry.curves import closed_loops, join_end_to_end
 from rodshell.layout.mesh import side_by_side
 from rodshell.results import read

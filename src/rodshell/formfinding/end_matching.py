@@ -100,7 +100,7 @@ class _Line:
 def match_net(
     target: Target, layout: GridLayout, anchor: Point, goals: EndGoals, *, eccentricity: float = 0.0
 ) -> MatchedNet:
-    """Choose the lines of a layout such that its rods end at the goals, one rod at each; some goals may remain without a rod.
+    """Choose the lines of a layout such that its rods end at the goals, one at each; goals may remain without a rod.
 
     Parameters
     ----------

@@ -218,7 +218,7 @@ def find_patched_stages(
 
         def patch_progress(stage: str, detail: str, residual: float, name: str = name) -> None:
             if stage == "net":
-                return  # the net is known and only marched again: a time limit must not discard the finished patches here
+                return  # the net is known and only marched again: no reason to discard what is finished
             progress(stage, f"patch {name}, {detail}", residual)
 
         found[name] = find_stages(
@@ -239,7 +239,7 @@ def best_heading(
     eccentricity: float = 0.0,
     progress: Progress = silent,
 ) -> float:
-    """The heading at the target's summit [rad] that leaves out the smallest share of the rods; a few headings are tried.
+    """The heading at the target's summit [rad] that leaves out the smallest share of the rods; a few are tried.
 
     Raises
     ------

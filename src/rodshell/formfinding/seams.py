@@ -61,7 +61,7 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
 def transported_heading(target: Target, anchor: tuple[float, float], rotate: float) -> float:
     """Angle against x, seen from above [rad], of the summit's heading `rotate`, transported to an anchor.
 
-    It is rotated as the surface's normal is from one point to the other, so that mirrored patches get mirrored headings.
+    It is rotated as the surface's normal is from one point to the other: mirrored patches get mirrored headings.
     """
     points = target.lift(np.array([target.summit, anchor]))
     n, m = target.on_surface(points).normal
@@ -176,7 +176,7 @@ class LaidPatch:
 
 @dataclass(frozen=True)
 class _OpenEnd:
-    """A rod end on a seam that no rod meets yet: the sides of the patch beyond, and its tangent, mirrored in the seam."""
+    """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its tangent mirrored in the seam."""
 
     end: End
     seam: int
@@ -250,7 +250,7 @@ def _rows(seams: Ints, points: Floats) -> list[Ints]:
 
 
 def in_a_row(points: Floats) -> Ints:
-    """The order (n,) of points (n, 3) along a curve through them, from one of its ends, by their minimum spanning tree."""
+    """The order (n,) of points (n, 3) along a curve through them, from one end, by their minimum spanning tree."""
     from scipy.sparse.csgraph import minimum_spanning_tree, shortest_path
     from scipy.spatial.distance import cdist
 
