@@ -342,7 +342,7 @@ def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
             return (
                 f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "
                 f"{degrees(angles.max()):.0f} ({ends} ends), and bend about their weak axes, since nothing holds them: "
-                'bolted laths keep their orientation, with larger stresses; set joint.kind = "pin", or swap the width and the '
-                "height of the section",
+                'bolted laths keep their orientation, with larger stresses; set joint.kind = "pin", or swap the '
+                "width and the height of the section",
             )
     return ()

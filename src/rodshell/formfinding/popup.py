@@ -196,9 +196,10 @@ class _Stages:
         return shell.state(positions, tangents, normals)
 
     def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
-        """Release the draped state: the ends stay, the target's forces vanish. In one solve, or by descending the energy.
+        """Release the draped state: the ends stay, the target's forces vanish.
 
-        Abandoned where it has more negative modes than `most_modes`.
+        In one solve, or, where that fails, by descending the energy. Abandoned where the state has more negative modes
+        than `most_modes`.
         """
         if self.boundary.draped is None:
             raise InputError('this boundary has no draped state to start from: use start="flat"')

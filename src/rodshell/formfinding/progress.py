@@ -73,5 +73,5 @@ class TimeLimit:
 
 
 def limited(progress: Progress, seconds: float | None) -> Progress:
-    """`progress` with a time limit of `seconds` [s] from now; without a limit where that is None."""
+    """`progress` with a time limit of `seconds` [s] from now; None: no limit."""
     return progress if seconds is None else TimeLimit(progress, seconds)

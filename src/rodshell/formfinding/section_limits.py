@@ -125,8 +125,8 @@ def strong_bending(target: Target, mesh: GridMesh, positions: Floats, bends: Boo
 def section_rotation(shell: Shell, state: Floats) -> Floats | None:
     """(b,) angle by which each bend's section is turned about the rod's axis out of the shell's normal [rad].
 
-    From 0 to pi/2, between the rod's first material director and the normal, both projected along the rod; None where rods
-    have no directors, because they bend alike in all directions.
+    From 0 to pi/2, between the rod's first material director and the normal, both projected along the rod; None where
+    rods have no directors, because they bend alike in all directions.
 
     Parameters
     ----------
