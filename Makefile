@@ -1,4 +1,4 @@
-# The habits of the house. `make` alone shows them.
+# Commands of the project; `make` alone lists them.
 .PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-house house paper pictures bench bench-quick bench-rods
 
 help:
@@ -34,16 +34,16 @@ accept-rods: ## print the table of the rod alone
 accept-joints: ## print the table of joints and couplings
 	python -m tests.acceptance.joints
 
-accept-output: ## print the table of what people take away: drawings, checks, reports
+accept-output: ## print the table of outputs: drawings, checks, reports
 	python -m tests.acceptance.output
 
 accept-paper: ## print the table of the paper's own time stepping (some minutes)
 	python -m tests.acceptance.paper
 
-accept-verdict: ## print the table of harm and verdicts (some minutes)
+accept-verdict: ## print the table of invalid inputs and verdicts (some minutes)
 	python -m tests.acceptance.verdict
 
-accept-house: ## print the table of what must not be lost: results before and after, archives, misuses (ten minutes)
+accept-house: ## print the table of results before and after, archives, misuses (ten minutes)
 	python -m tests.acceptance.house
 
 house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
@@ -61,6 +61,6 @@ bench:     ## all benchmarks as one table, into docs/performance.md (some minute
 bench-quick: ## the short ones, printed only
 	python benchmarks/run.py --quick
 
-bench-rods: ## time of a rod's step against its nodes; a cantilever beside PyElastica (pip install -e ".[bench]"; ten minutes)
+bench-rods: ## time of a rod's step against its nodes; a cantilever compared with PyElastica (pip install -e ".[bench]"; ten minutes)
 	python benchmarks/rod_scaling.py
 	python benchmarks/pyelastica_cantilever.py

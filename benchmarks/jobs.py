@@ -136,10 +136,10 @@ BUMPS = rs.HeightField(
 
 
 def warm(runs: int) -> Section:
-    """A form found again after its spacing grew, from nothing and from the last form (`start=`), by turns.
+    """A form found again after its spacing grew, from nothing and from the last form (`warm_start=`), by turns.
 
     From nothing there is little to save: the drape starts from the net in either case, and a new spacing is a new mesh,
-    whose matrices are planned and factorised anew. What is saved are steps of Newton's method in pop-ups that are far
+    whose matrices are planned and factorised again. What is saved are steps of Newton's method in pop-ups that are far
     from the draped state.
     """
     rows = []

@@ -6,7 +6,7 @@
 included, instead of time on the clock: for machines that do other work.
 
 The solve is the form finding alone, in a process that has imported nothing yet (so with kernels read from disk); the
-checks are the way up from flat, solves too, which the command does and `rs.find_form` does not.
+checks are the deployment from flat, solves too, which the command does and `rs.find_form` does not.
 """
 
 import json
@@ -45,14 +45,13 @@ gc.set_threshold(RARELY)  # as the command does
 from rodshell.case import load_case
 import rodshell.cli.form
 case = load_case("hemisphere")
-target, layout, rod, options = case.build()
-from rodshell.form import find_form
+from rodshell.job import Job
 told("other imports")
-form = find_form(target, layout, rod, **options)
+form = Job.of_case(case).run(until="pop-up")
 told("solve")
-archive = form.archive(case.to_toml(), options=case.output_options())
+archive = form.archive()
 told("checks")
-from rodshell.output.files import Content, DEFAULT, KINDS
+from rodshell.output.files import Content, DEFAULT, KINDS, save
 content = Content(archive)
 content.drawings
 told("drawings")
@@ -60,7 +59,7 @@ for kind in DEFAULT:
     list(KINDS[kind](content))
     told(kind)
 with tempfile.TemporaryDirectory() as folder:
-    archive.save(folder + "/a", [])
+    save(archive, folder + "/a", [])
 told("archive")
 print(json.dumps(stages))
 """
@@ -94,12 +93,12 @@ class Startup:
 
     @property
     def ratio_without_checks(self) -> float:
-        """The same, the way up counted as a solve."""
+        """The same, the deployment counted as a solve."""
         return (self.whole - self.solve - self.stages["checks"]) / self.bare
 
     @property
     def quick_ratio(self) -> float:
-        """The same with the files that a designer looks at first and without the way up."""
+        """The same with the files that a designer looks at first and without the deployment."""
         return (self.quick - self.solve) / self.bare
 
 
@@ -157,14 +156,14 @@ def _output(command: Sequence[str], folder: str) -> str:
 
 def section(runs: int) -> Section:
     """Whole processes on the clock, `rodshell form hemisphere` with every default file; the solve is `rs.find_form` in
-    a process that loads its kernels from disk; the checks are the way up from flat, solves too."""
+    a process that loads its kernels from disk; the checks are the deployment from flat, solves too."""
     found = startup(runs=runs)
     rows = [
         Row(f"`rodshell --help` over `python -c 'import {FRONT}'`", f"{found.help / found.front:.2f}", "at most 3"),
         Row("whole process over the bare imports of numpy, scipy.sparse and numba and the solve", f"{found.share:.2f}",
             "at most 3"),
         Row("read strictly: (whole process - solve) over the bare imports", f"{found.ratio:.2f}", "at most 3"),
-        Row("the same, the way up counted as a solve", f"{found.ratio_without_checks:.2f}"),
+        Row("the same, the deployment counted as a solve", f"{found.ratio_without_checks:.2f}"),
         Row(f"the same with `{' '.join(QUICK)}`", f"{found.quick_ratio:.2f}"),
         Row("whole process", f"{found.whole:.2f} s; bare imports {found.bare:.2f} s"),
         *(Row(f"   {name}", ms(seconds)) for name, seconds in found.stages.items()),
@@ -179,7 +178,7 @@ def main(*, fresh: bool, cpu: bool) -> None:
     print(f"whole process {found.whole:.2f} s, {few}; bare imports {found.bare:.2f} s")
     print("stages, ms: " + ", ".join(f"{name} {1e3 * seconds:.0f}" for name, seconds in found.stages.items()))
     print(f"whole / (bare imports + solve) = {found.share:.2f}")
-    print(f"(whole - solve) / bare imports = {found.ratio:.2f}, with the way up counted as a solve ", end="")
+    print(f"(whole - solve) / bare imports = {found.ratio:.2f}, with the deployment counted as a solve ", end="")
     print(f"{found.ratio_without_checks:.2f}, with few files {found.quick_ratio:.2f}")
     print(f"rodshell --help / python -c 'import {FRONT}' = {found.help / found.front:.2f}")
 

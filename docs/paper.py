@@ -14,27 +14,29 @@ HERE = Path(__file__).parent
 HEAD = """# The paper's figures
 
 HQK = W. Huang, L. Qin, M. Khalid Jawed, J. Appl. Mech. 88 (2021). Made by `make paper`; a single one by
-`rodshell paper FIGURE`, all of them by `rodshell paper all`. What differs from the paper, and why, is in
-[equations.md](equations.md), E1 to E23. Times are of one thread and of the machine at hand: only their ratios mean
-something.
+`rodshell paper FIGURE`, all of them by `rodshell paper all`. Differences from the paper, with their reasons,
+are in [equations.md](equations.md), E1 to E23. Times are those of one thread on one machine: only their ratios can be
+compared.
 """
 
-BESIDE = {  # what the paper has where we have this
-    "fig1": "The paper shows the same three, without numbers.",
-    "fig4": "The paper says that the second rod turns at the same angular velocity, 10 rpm, in both, and gives no lag.",
-    "fig6": 'The paper shows the same panels, its own method only, without numbers: "the good match indicates the '
-    'correctness". Rod counts, spacing and rod are its own; edges are 15 mm, which gives its 8000 unknowns (E21). '
-    "The bound drape starts from the net, and its G0 is the net's: shown is where it would end by itself, which "
-    "measures what the finite spacing does.",
+COMPARED = {  # what the paper shows in this place
+    "fig1": "The paper shows the same three shells, without numbers.",
+    "fig4": "The paper states that the second rod turns at the same angular velocity, 10 rpm, in both demonstrations, "
+    "and gives no lag.",
+    "fig6": 'The paper shows the same panels for its method only, without numbers: "the good match indicates the '
+    'correctness". Rod counts, spacing and rod are those of the paper; edges are 15 mm, which gives its 8000 unknowns '
+    "(E21). The bound drape starts from the net and uses the net's G0; the figure shows where the rods of the drape "
+    "alone would end, which measures the effect of the finite spacing.",
     "fig7": 'The paper: the flat grids "match well with the analytical solution in both of these two cases".',
     "fig8": "The paper, on one thread of an i7-6600U at some 8000 unknowns: 50 s (hemisphere), 30 s (paraboloid), 20 s "
-    "(ellipsoid), which may be simulated times or its own; h = 0.1 s against unknowns, which explicit ties do not bear "
-    "(E7).",
+    "(ellipsoid), which may be simulated times or computing times; h = 0.1 s in the chart against unknowns, at which "
+    "explicit ties are unstable (E7).",
     "genetic": 'The paper: a hemispherical gridshell "may take approximately" 100 generations of 500 individuals, or '
-    "50,000 forward simulations, for which its own method needs one. It has the algorithm's G0 for the paraboloid and "
-    "the ellipsoid, from reference 30, as a line in its figure, without numbers. Which shapes still stand depends on "
-    "the last digits of the solver, and a search on that: the ellipsoid's, made again after those had changed, stalled "
-    "at 6.2 mm, and its values here are those found before, their best popped up again with the solver as it is.",
+    "50,000 forward simulations, where its direct method needs one. It shows the algorithm's G0 for the paraboloid and "
+    "the ellipsoid, from reference 30, as a line in its figure, without numbers. Which shapes are still stable depends "
+    "on the last digits of the solver, and so does a search: that for the ellipsoid, repeated after those digits had "
+    "changed, stalled at 6.2 mm. The values here are those of the earlier search, whose best shape was popped up "
+    "again with the present solver.",
     "studies": 'The paper: H, E, r and g "do not significantly influence the actuated shape" of soft, inextensible '
     'rods; C1 = C2 = 1e6 EI "after a convergent study".',
 }
@@ -43,8 +45,8 @@ BESIDE = {  # what the paper has where we have this
 def section(name: str, folder: Path) -> str:
     """A figure's part of the page, from its files."""
     table = (folder / "table.txt").read_text(encoding="utf-8").rstrip()
-    beside = f"{BESIDE[name]}\n\n" if name in BESIDE else ""
-    return f"## {name}: {FIGURES[name]}\n\n{beside}```\n{table}\n```\n\n![{name}](paper/{name}/{name}.svg)\n"
+    compared = f"{COMPARED[name]}\n\n" if name in COMPARED else ""
+    return f"## {name}: {FIGURES[name]}\n\n{compared}```\n{table}\n```\n\n![{name}](paper/{name}/{name}.svg)\n"
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Several simple gridshells sewn together: a roof of two bumps cut in its valley, and a ball that no one net covers.
+"""Several simple gridshells joined at seams: a roof of two bumps cut in its valley, and a ball that no one net covers.
 
 `python examples/seams.py NAME ...` keeps the results in out/NAME; without names nothing is kept.
 """
@@ -30,15 +30,15 @@ def check(form: rs.Form) -> None:
     assert form.status == "converged"
     for ends in form.popped:
         place = {
-            (name, rod.name, side): found.popped[ends].positions[found.footprint.mesh.ends[k, side]]
-            for name, found in form.found.items()
+            (found.name, rod.name, side): found.popped[ends].positions[found.footprint.mesh.ends[k, side]]
+            for found in form.patches
             for k, rod in enumerate(found.footprint.rods)
             for side in (0, 1)
         }
         for meeting in form.meetings:
             first, second = ((end.patch, end.rod, end.side) for end in meeting.ends)
             assert np.array_equal(place[first], place[second])
-        assert form.popped[ends][1].stable
+        assert form.popped[ends].report.stable
 
 
 def roof() -> rs.Form:
@@ -56,7 +56,7 @@ def sphere() -> rs.Form:
     except rs.NetLimitError as reason:
         print(reason)
     form = rs.find_form(ball(), LAYOUT, LATH, seams=[[(-6.0, 0.0), (6.0, 0.0)]])
-    assert min(degrees(laid.net.min_angle) for laid in form.laid.values()) > 30.0
+    assert min(degrees(patch.draped.net.min_angle) for patch in form.patches) > 30.0
     assert form.agreement["clamped"].rms_relative < 5e-4
     return form
 

@@ -45,7 +45,7 @@ for name, at in sliders.items():
         footprint = rs.map_back(rs.trim(draped))
         times.append(time.perf_counter() - begin)
     afresh = rs.map_back(rs.trim(rs.drape(layout, rod, target, anchor=anchor)))
-    assert [one.name for one in footprint.rods] == [one.name for one in afresh.rods]
+    assert [line.name for line in footprint.rods] == [line.name for line in afresh.rods]
     apart = float(np.abs(footprint.points - afresh.points).max())
     assert apart < 1e-9 * target.size  # the net's equations are solved to 1e-12
     print(f"{name:>8}: {1 / np.median(times):5.1f} updates a second, {apart:.0e} m from the answer found from nothing")

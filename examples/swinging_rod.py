@@ -1,4 +1,4 @@
-"""A rod let go swings on its clamped end; the record streams to disk, and the motion goes on from where it stopped.
+"""A released rod swings on its clamped end; the record streams to disk, and the motion continues from where it stopped.
 
 Implicit Euler is of first order: the example shows how much of the energy the step takes, and that half the step
 takes about half as much.
@@ -53,7 +53,7 @@ def main() -> None:
     assert last is not None
     rest = rs.simulate(last.motion, last.state, last.velocity, start=UNTIL / 2, until=UNTIL, step=1e-3)
     apart = np.abs(rest.states[-1] - swing(1e-3).states[-1]).max()
-    print(f"stopped half way and gone on: {apart:.1e} from the swing in one go")
+    print(f"stopped half way and continued: {apart:.1e} from the uninterrupted swing")
     assert apart < 1e-9
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.checks import Checks, check
+from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
-from rodshell.checks.merge import merged_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
@@ -102,7 +102,7 @@ class Form:
     @property
     def patches(self) -> tuple[PatchForm, ...]:
         """The stages of each patch; a form in one piece has one."""
-        return tuple(self.stages.found.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
+        return tuple(self.stages.patches.values()) if isinstance(self.stages, PatchedForm) else (self.stages,)
 
     @property
     def seams(self) -> tuple[Seam, ...]:
@@ -241,7 +241,7 @@ class Form:
         Parameters
         ----------
         options : as of `archive`.
-        kinds : of files besides the archive, such as "dxf", "csv"; default: all that every installation can.
+        kinds : of files in addition to the archive, such as "dxf", "csv"; default: all that every installation can.
         force : also replace files that rodshell did not write, or that were changed since, where it has to write.
 
         Raises
@@ -294,7 +294,7 @@ class Form:
         settings: dict[str, Any] = {"stages": self.options.stages, "shear_weight": self._weight(self.options)}
         if not isinstance(self.stages, PatchedForm):
             return check(self.stages.popped, self.rod, **settings, progress=progress)
-        found = self.stages.found
+        found = self.stages.patches
         each = {name: check(patch.popped, self.rod, **settings, progress=progress) for name, patch in found.items()}
         met = {}
         for ends in self.stages.popped:

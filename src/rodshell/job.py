@@ -60,8 +60,8 @@ class Job:
     joint : what the rods do to each other where they cross, see `pop_up`; default: ball joints.
     ends : end conditions of the pop-up: "pinned", "clamped", or "both"; also in a tuple, which may be empty.
     seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches; each
-        goes on straight past its ends, unless it is closed. Rods and length of the layout are then "auto", its heading
-        is that at the target's summit, and "auto" is the one that leaves out the fewest rods.
+        continues straight past its ends, unless it is closed. Rods and length of the layout are then "auto"; its
+        heading is that at the target's summit, and "auto" is the heading that leaves out the fewest rods.
     patches : what patches, by their names A, B, ... from left to right, have of their own.
     options : of checks, fabrication and drawings.
 
@@ -118,7 +118,7 @@ class Job:
         /,
         **more: object,
     ) -> Self:
-        """The job of a case, with some keys set anew: `Job.load("hemisphere", layout__rotate="45 deg")`.
+        """The job of a case, with some keys changed: `Job.load("hemisphere", layout__rotate="45 deg")`.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class Job:
         ----------
         source : a CSV table; the folder of an earlier result; or the ends themselves.
         overrides, more : as of `load`, of the tables rod, checks, fabrication and drawings.
-        unit : of a table's coordinates, unless its columns end in _mm.
+        unit : of the coordinates in a table, unless its columns end in _mm.
         rod : section and material; default: those of the result, or a rod that is chosen to fit.
         joint : where rods cross, without eccentricity; default: that of the result, or ball joints.
 
@@ -174,7 +174,7 @@ class Job:
         return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))
 
     def changed(self, overrides: Mapping[str, object] | None = None, /, **more: object) -> Self:
-        """The same job with some keys set anew: `job.changed(layout__rotate="10 deg")`; arguments as of `load`.
+        """The same job with some keys changed: `job.changed(layout__rotate="10 deg")`; arguments as of `load`.
 
         Raises
         ------
@@ -217,9 +217,9 @@ class Job:
         warm_start : an earlier form. Only the stages from the first one on whose part of the case has changed are run
             again, see `STAGES`; `Form.reused` names the others. Where a stage runs again, the earlier form is its first
             guess: its net is where the new net is looked for (with `Bound()`), and where its shells went from their
-            draped states is where the new ones start, rods being matched by their place in the lattice. Any form will
-            do; what does not help is left, and the result is the same as without, to the solver's tolerance. A shell
-            that has several equilibria stays with the one that it is in.
+            draped states is where the new ones start, rods being matched by their place in the lattice. Any form is
+            accepted; what does not help is left, and the result is the same as without, to the solver's tolerance. A
+            shell that has several equilibria stays in its own.
         progress : called as progress(stage, detail, residual) at every iteration.
         time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
         announce : called with a sentence for each thing that the job decided itself, before the form is searched.
@@ -242,14 +242,15 @@ class Job:
         run = Run(self._case, self._target, warm_start, limited(progress, time_limit), announce, Path(frames_in))
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
         with entered:
-            form = run.table_form() if self._case.target.kind == "table" else run.form()
+            form = run.table_form() if self._case.of_table else run.form()
             return form if until == "pop-up" else form.finished(run.progress)
 
     def __repr__(self) -> str:
         case = self._case
-        if case.target.kind == "table":
-            return f"<rodshell.Job: pop up {case.target.held.what}>"
-        what = case.drawings.name or (case.target.held.what if case.target.held else case.target.kind)
+        target = case.target.held.what if case.target.held else case.target.kind
+        if case.of_table:
+            return f"<rodshell.Job: pop up {target}>"
+        what = case.drawings.name or target
         source = getattr(case.target, "file", None)
         spacing = "auto" if case.layout.spacing == "auto" else " x ".join(map(length_text, case.layout.spacing))
         seams = f", {len(case.seams.lines)} seams" if case.seams.lines else ""

@@ -56,7 +56,7 @@ class Run:
         self.inputs = read_inputs(case.text())
         self.options = case.output_options()
         self.earlier = warm_start
-        if warm_start is not None and warm_start.from_table != (case.target.kind == "table"):
+        if warm_start is not None and warm_start.from_table != case.of_table:
             self.earlier = None
 
     def form(self) -> Form:
@@ -111,7 +111,7 @@ class Run:
         earlier = self.earlier.stages if self.earlier is not None else None
         return find_patched_stages(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
-            overrides=case.seams.own(), joint=found.joint, ends=found.ends,
+            patch_layouts=case.seams.patch_layouts(), joint=found.joint, ends=found.ends,
             warm_start=earlier if isinstance(earlier, PatchedForm) else None,
             same_drape="trim" in same, progress=self.progress,
         )  # fmt: skip
@@ -140,7 +140,7 @@ class Run:
 
     def _best_heading(self, case: Case, found: Built) -> float:
         return best_heading(
-            found.target, [Seam.of(line) for line in case.seams.lines], found.layout, case.seams.own(),
+            found.target, [Seam.of(line) for line in case.seams.lines], found.layout, case.seams.patch_layouts(),
             eccentricity=found.joint.eccentricity, progress=self.progress,
         )  # fmt: skip
 
@@ -208,8 +208,8 @@ def _same_drapes(now: Stages, before: Stages) -> bool:
     if isinstance(now, PatchForm) and isinstance(before, PatchForm) and not now.from_table:
         return now.draped is before.draped
     if isinstance(now, PatchedForm) and isinstance(before, PatchedForm):
-        return list(now.found) == list(before.found) and all(
-            patch.draped is before.found[name].draped for name, patch in now.found.items()
+        return list(now.patches) == list(before.patches) and all(
+            patch.draped is before.patches[name].draped for name, patch in now.patches.items()
         )
     return now is before
 

@@ -7,7 +7,7 @@ from math import radians
 import numpy as np
 
 import rodshell as rs
-from rodshell.paper.two_rods import Demonstration, run_in_time, run_statics
+from rodshell.paper.fig4 import Demonstration, run_in_time, run_statics
 from rodshell.solve.linear_stability import step_limit
 from tests.acceptance.rows import Row, print_table
 from tests.analytic import coupling_problems as couplings

@@ -169,7 +169,7 @@ def friction_rows() -> Iterator[Row]:
     for friction in (0.2, 0.0):
         offsets = []
         for duration in (2.0, 12.0):
-            fall = Fall(friction=friction, drag=5.0, stopped="along the normal", duration=duration, settle=False)
+            fall = Fall(friction=friction, drag=5.0, stopped="normal", duration=duration, settle=False)
             draped = rs.drape(coarse, ROD, TARGETS["hemisphere"], method=fall, anchor=(1e-3, 0.0))
             middle = draped.positions[np.argmin(np.linalg.norm(draped.mesh.flat, axis=1))]
             offsets.append(1e3 * float(np.linalg.norm(middle[:2])))

@@ -7,8 +7,8 @@ import numpy as np
 import rodshell as rs
 from rodshell.checks import Deployment, OtherShapes, check, deploy, other_shapes
 from rodshell.solve.equilibrium import find_stable
+from rodshell.solve.path import relax
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.relax import relax
 from tests.acceptance.cases import AUTO
 from tests.acceptance.rows import Row, form_of
 from tests.acceptance.targets_random import REASONS, ROD, random_case

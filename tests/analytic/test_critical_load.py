@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from rodshell.model import Freedom
+from rodshell.rods.elements import Stretch
 from rodshell.rods.isotropic import IsotropicBend
-from rodshell.rods.stretch import Stretch
 from rodshell.solve.critical import CLOSE, first_critical
-from rodshell.solve.equilibrium import Equilibrium
+from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.report import SolveReport, Status
 
 GREENHILL = 7.8373  # q L^3 / EI of a column under its own weight [Timoshenko and Gere, section 2.12]
 EDGES = 40

@@ -7,12 +7,12 @@ from scipy.special import ellipk
 import rodshell as rs
 from rodshell.formfinding import popup as popup_module
 from rodshell.model import Freedom
+from rodshell.rods.elements import Stretch
 from rodshell.rods.isotropic import IsotropicBend
-from rodshell.rods.stretch import Stretch
-from rodshell.solve import relax as relax_module
+from rodshell.solve import path
 from rodshell.solve.implicit_euler import ImplicitEuler
+from rodshell.solve.path import relax
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.relax import relax
 
 PINNED, SLIDING, PLANE = ((), ((1.0, 0.0, 0.0),), ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 
@@ -83,7 +83,7 @@ def test_energy_never_grows_and_every_step_is_counted(monkeypatch):
             seen.append(energy(problem, taken.state))
         return taken
 
-    monkeypatch.setattr(relax_module.ImplicitEuler, "take", recorded)
+    monkeypatch.setattr(path.ImplicitEuler, "take", recorded)
     found = relax(problem, state)
     assert found.report.stable
     assert len(seen) > 5
@@ -102,7 +102,7 @@ def test_shell_that_newtons_method_loses_pops_up_by_sliding(monkeypatch):
     footprint = rs.map_back(trimmed)
     popped = rs.pop_up(footprint, trimmed.boundary, rod, ends="pinned")
     assert popped.report.stable
-    monkeypatch.setattr(relax_module, "MOST_STEPS", 0)
+    monkeypatch.setattr(path, "MOST_STEPS", 0)
     assert not rs.pop_up(footprint, trimmed.boundary, rod, ends="pinned").report.stable
     # the state is an equilibrium: without its ends' forces nothing is left of the gradient
     gradient = np.zeros_like(popped.state)

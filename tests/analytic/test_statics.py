@@ -16,11 +16,10 @@ import rodshell as rs
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.model import Shell
 from rodshell.solve import equilibrium
-from rodshell.solve.equilibrium import find_equilibrium, find_stable
+from rodshell.solve.equilibrium import Status, find_equilibrium, find_stable
 from rodshell.solve.newton_step import NewtonStep
 from rodshell.solve.path import follow
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.report import Status
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e9, density=1e3))
 EI, EA = ROD.bend_stiffness, ROD.stretch_stiffness

@@ -5,7 +5,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks import SelfWeight, self_weight
-from rodshell.checks.self_weight import weakest
+from rodshell.checks.loads import weakest
 from rodshell.model import Shell
 from tests.checks.shells import ROD, dome
 

@@ -197,7 +197,7 @@ def test_without_a_pinned_shell_the_deployment_is_not_blamed_on_options() -> Non
 
 def test_no_more_than_a_lower_bound_is_made_of_a_path_that_was_lost() -> None:
     lost = {"load_factor": 0.12, "deflection": None, "limit": "not followed"}
-    words = "with pinned ends the shell bears at least 12 % of its own weight; above, its path could not be followed"
+    words = "with pinned ends the shell carries at least 12 % of its own weight; above, its path could not be followed"
     found = verdict(changed(("self_weight.pinned", lost), ("warnings", [words])))
     assert found.reasons == (words,)
 

@@ -571,7 +571,7 @@ def test_a_bad_row_is_named_with_its_line(
     assert finder.calls == []
 
 
-@pytest.mark.parametrize(("ids", "message"), [(["A", "A"], 'the id "A" stands twice'), (["A", ""], "rod 2 has no id")])
+@pytest.mark.parametrize(("ids", "message"), [(["A", "A"], 'the id "A" occurs twice'), (["A", ""], "rod 2 has no id")])
 def test_ids_must_tell_rods_apart(
     ids: list[str], message: str, finder: FakeFinder, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from rodshell.case.rod_ends import COLUMNS
 from rodshell.cli import main, warmup
+from rodshell.job import Job
 
 pytestmark = pytest.mark.slow
 
@@ -64,6 +65,28 @@ def test_a_documented_command_runs(line: str, folder: Path, monkeypatch: pytest.
     assert main([command, *arguments, *([] if "--help" in arguments else QUICK.get(command, []))]) == 0
 
 
+def test_the_readme_shows_what_the_program_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The pavilion's summary, word for word; numbers are compared elsewhere."""
+    shown = re.search(r"```\n(pavilion: .*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert shown is not None
+    assert main(["form", "pavilion", "--out", str(tmp_path / "pavilion"), "--only", "csv"]) == 0
+    printed = capsys.readouterr().out.splitlines()[:-1]  # the last line names the folder
+    number = re.compile(r"\d[\d.]*(e[-+]\d+)?")
+    assert [number.sub("#", line) for line in printed] == [number.sub("#", line) for line in shown[1].splitlines()]
+
+
 def test_the_commands_are_found() -> None:
     assert len(README) > 10
     assert len(FILES) >= 4
+
+
+@pytest.mark.slow
+def test_the_documented_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of README.md, then all of docs/files.md, as one script each in a user's folder."""
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for page in (ROOT / "README.md", ROOT / "docs" / "files.md"):
+        for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
+            exec(block, names)
+        Job.load("hemisphere", {"layout.spacing": "60 mm", "checks.stages": 0}).run().save("out/dome", kinds=[])
+    assert names["longer"].reused == ("target", "drape", "trim", "pop-up", "checks")  # type: ignore[attr-defined]

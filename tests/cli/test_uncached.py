@@ -28,7 +28,7 @@ announce_compilation()
 def test_kernels_that_cannot_be_kept_are_declared_and_that_is_one_sentence(tmp_path: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", DECLARED], capture_output=True, text=True, env={**os.environ})
     assert ended.returncode == 0, ended.stderr
-    assert ended.stderr.startswith("rodshell: compiling kernels anew")
+    assert ended.stderr.startswith("rodshell: compiling kernels again")
     assert ended.stderr.count("\n") == 1
 
 

@@ -18,8 +18,8 @@ from numpy.linalg import norm
 from rodshell.errors import InputError
 from rodshell.geometry.frames import directors_along, parallel_transport
 from rodshell.rods.bend_twist import BendTwist
+from rodshell.rods.elements import Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
-from rodshell.rods.stretch import Stretch
 
 NODES = 7
 Z = np.array([0.0, 0.0, 1.0])

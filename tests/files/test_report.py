@@ -218,7 +218,7 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
       "Every stage is an equilibrium of the elastic grid with pinned ends; between 25 % and 56 % of the deployment it "
       "has to be guided, and nothing is known there."),
      (0.5625, [], None,
-      "Below 56 % of the deployment no stage could be found: nothing is known there. Above, every one is an "
+      "Below 56 % of the deployment no stage could be found: nothing is known there. Above, every stage is an "
       "equilibrium of the elastic grid with pinned ends.")],
 )  # fmt: skip
 def test_under_the_view_stands_where_the_stages_do_not_follow_each_other_smoothly(
@@ -334,7 +334,7 @@ def test_the_page_says_that_the_fewest_bars_are_a_bound(tmp_path: Path) -> None:
     stock = wished().results.plain()["fabrication"]["stock"]
     page = " ".join(page_of(wished(), tmp_path).read_text().split())
     assert f"{len(stock['bars'])} bars, " in page
-    assert f"total length alone it takes {stock['fewest']} bars; that is a bound" in page
+    assert f"total length alone it takes {stock['fewest']} bars; that is a lower bound" in page
 
 
 def test_a_grid_that_rests_on_its_target_tells_depth_and_not_gap() -> None:

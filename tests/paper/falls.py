@@ -7,10 +7,9 @@ import rodshell as rs
 from rodshell.contact.modified_mass import ModifiedMass, Stopped
 from rodshell.model import Freedom
 from rodshell.rods.elements import Elements
-from rodshell.solve.forces import GravityForce
 from rodshell.solve.implicit_euler import ContactEuler, MakeMatrix, Motion, Step
 from rodshell.solve.newton_matrix import narrow_or_sparse
-from rodshell.solve.problem import Supports
+from rodshell.solve.problem import GravityForce, Supports
 
 Floats = NDArray[np.float64]
 

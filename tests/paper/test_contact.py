@@ -8,7 +8,7 @@ import rodshell as rs
 from rodshell.contact.modified_mass import ModifiedMass
 from rodshell.errors import InputError
 from rodshell.model import Freedom
-from rodshell.rods.stretch import Stretch
+from rodshell.rods.elements import Stretch
 from rodshell.solve.newton_matrix import SparseSum
 from rodshell.targets.rim import Domain, EllipseDomain
 from tests.paper.falls import HEMISPHERE, MASS, PAPER_ROD, RADIUS, STEP, TARGETS, G, Particles, slope

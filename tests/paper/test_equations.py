@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.paper.two_rods import LENGTH, RATE, run_in_time
+from rodshell.paper.fig4 import LENGTH, RATE, run_in_time
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")

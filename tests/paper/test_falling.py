@@ -16,7 +16,7 @@ from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.rest import energy_decay, rest_advice
 from rodshell.joints import ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
 from rodshell.results.folder import read_manifest
-from rodshell.solve.report import Status
+from rodshell.solve.equilibrium import Status
 from rodshell.solve.simulate import TimeSeries
 from tests.paper.falls import HEMISPHERE, PAPER_ROD, RADIUS, coarse_layout
 
@@ -205,7 +205,7 @@ def test_friction_holds_what_else_slides_off() -> None:
     offsets = {}
     for friction in (0.0, 0.2):
         layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=0.06, edge=0.03, length=0.9)
-        fall = Fall(friction=friction, drag=DRAG, stopped="along the normal", duration=2.0)
+        fall = Fall(friction=friction, drag=DRAG, stopped="normal", duration=2.0)
         draped = rs.drape(layout, PAPER_ROD, HEMISPHERE, method=fall, anchor=(1e-3, 0.0))
         middle = draped.positions[np.argmin(np.linalg.norm(draped.mesh.flat, axis=1))]
         offsets[friction] = abs(float(middle[0]))

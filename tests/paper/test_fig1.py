@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rodshell.paper import fig1
-from rodshell.paper.cases import Case
+from rodshell.paper.figure import Case
 from rodshell.targets import Hemisphere
 from tests.paper.falls import RADIUS
 

@@ -15,9 +15,8 @@ from rodshell.formfinding.methods import Fall
 from rodshell.nets import sphere_net_end
 from rodshell.output.view import TOWARDS
 from rodshell.paper import drapes
-from rodshell.paper.cases import Case
 from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
-from rodshell.paper.plotting import standing
+from rodshell.paper.figure import Case, standing
 from tests.paper.falls import HEMISPHERE
 
 pytestmark = pytest.mark.slow

@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Footprint, PatchForm, find_stages
 from rodshell.formfinding.progress import silent
 from rodshell.paper import genetic, genetic_search
-from rodshell.paper.cases import CASES, Case
+from rodshell.paper.figure import CASES, Case
 from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
 from rodshell.paper.genetic_search import Design
 from tests.paper.falls import HEMISPHERE, PAPER_ROD

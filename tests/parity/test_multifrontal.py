@@ -5,8 +5,7 @@ import pytest
 import scipy.sparse as sparse
 
 from rodshell.solve import dense, sparse_ldl
-from rodshell.solve.ordering import dissect
-from rodshell.solve.sparse_ldl import Multifrontal, Qdldl, SingularError
+from rodshell.solve.sparse_ldl import Multifrontal, Qdldl, SingularError, dissect
 
 RANDOM = np.random.default_rng(20211)
 

@@ -10,8 +10,8 @@ from scipy.linalg import eigh
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.model import Freedom
+from rodshell.rods.elements import Stretch
 from rodshell.rods.isotropic import IsotropicBend
-from rodshell.rods.stretch import Stretch
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.sparse_ldl import SingularError

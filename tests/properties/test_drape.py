@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 import rodshell as rs
 from rodshell.contact.static import BoundToTarget
 from rodshell.model import Assembly, Shell
-from rodshell.rods.stretch import Stretch
+from rodshell.rods.elements import Stretch
 
 SAME = 1e-9  # of the size, see above
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))

@@ -10,7 +10,7 @@ import rodshell as rs
 from rodshell.contact.static import UnilateralContact
 from rodshell.errors import InputError
 from rodshell.nets import sphere_net_end
-from rodshell.solve.report import Status
+from rodshell.solve.equilibrium import Status
 
 RADIUS, GRAVITY = 0.2, 9.81
 HEMISPHERE = rs.Hemisphere(RADIUS)

@@ -75,7 +75,7 @@ def test_a_job_of_objects_is_the_job_of_their_case() -> None:
     again = rs.Job.load(seams.to_toml())
     assert again == seams
     assert again.case.layout.rotate == "auto"
-    assert again.case.seams.own() == {"B": rs.PatchLayout(spacing=(0.02, 0.02))}
+    assert again.case.seams.patch_layouts() == {"B": rs.PatchLayout(spacing=(0.02, 0.02))}
 
 
 def bowl(x, y):

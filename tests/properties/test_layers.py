@@ -14,9 +14,8 @@ from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.frames import unit
 from rodshell.nets.chebyshev import crossing_angle
 from rodshell.output.grid import joint_places
-from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.equilibrium import Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.report import Status
 
 R, APART = 0.2, 4e-3
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -146,10 +145,10 @@ def test_seams_join_points_between_the_layers():
     target = rs.Ellipsoid(a=0.3, b=0.2, c=0.12)
     sewn = rs.find_form(target, layout(0.06), ROD, seams=[seam], joint=PIN, ends=("clamped",))
     assert sewn.status == "converged"
-    assert max(sewn.moved.values()) < 1e-3 * R  # nets of one surface would miss each other by h/R
+    assert max(sewn.stages.moved.values()) < 1e-3 * R  # nets of one surface would miss each other by h/R
     for meeting in sewn.meetings:
         for end in meeting.ends:
-            part = sewn.found[end.patch].trimmed
+            part = sewn.stages.patches[end.patch].trimmed
             k = [rod.name for rod in part.mesh.grid.rods].index(end.rod)
             own = part.positions[part.mesh.ends[k, end.side]]
             assert norm(own - meeting.point) == pytest.approx(0.5 * APART, rel=1e-6)
@@ -204,7 +203,11 @@ def test_laths_buckle_between_pins_where_they_are_said_to(height, buckles):
     released = rs.Shell.of(cut.mesh, rod, joint=rs.Pin())
     state = released.state(cut.positions, normals=target.on_surface(cut.positions).normal)
     problem = Problem(
-        released.elements, released.stretch, Supports(released.held_ends()), 2.0, flat_coordinates=released.places
+        released.elements,
+        released.stretch,
+        Supports(released.held_ends()),
+        2.0,
+        flat_coordinates=released.flat_coordinates,
     )
     counted = find_equilibrium(problem, state, np.zeros(len(cut.mesh.edges)), most_modes=0)
     assert (counted.report.status is Status.BUCKLED) == buckles
@@ -234,6 +237,6 @@ def test_laths_that_buckle_everywhere_are_given_up_at_once_with_the_cause():
 
 @pytest.mark.slow
 def test_popup_of_a_result_in_two_layers_is_refused(tmp_path):
-    folder = form("ellipsoid").archive().save(tmp_path / "oval", kinds=())
+    folder = form("ellipsoid").save(tmp_path / "oval", kinds=())
     with pytest.raises(rs.InputError, match="two layers 4 mm apart, and popup joins its rods at one point"):
         read_result(folder)

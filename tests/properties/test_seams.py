@@ -59,7 +59,7 @@ every_case = pytest.mark.parametrize("name", CASES)
 
 def place_of(form: rs.Form, end: End) -> Floats:
     """Where the popped-up pinned shell of a patch has an end."""
-    shell = form.stages.found[end.patch]
+    shell = form.stages.patches[end.patch]
     rods = [rod.name for rod in shell.footprint.rods]
     return shell.popped["pinned"].positions[shell.footprint.mesh.ends[rods.index(end.rod), end.side]]
 
@@ -103,7 +103,7 @@ def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
     met = [end for meeting in form.meetings for end in meeting.ends]
     assert len(met) == len(set(met)) == 2 * len(form.meetings)
     inside = 0
-    for patch, found in form.stages.found.items():
+    for patch, found in form.stages.patches.items():
         ends = found.trimmed.boundary.points
         for k in np.flatnonzero(form.target.margin(ends) > 2e-3 * form.target.size):
             assert End(patch, found.footprint.rods[k // 2].name, int(k % 2)) in met
@@ -115,11 +115,11 @@ def test_no_rod_ends_alone_on_a_seam(name: str) -> None:
 @every_case
 def test_every_patch_lies_on_the_target_on_its_own_side(name: str) -> None:
     form = sewn(name)
-    for found, laid in zip(form.stages.found.values(), form.stages.laid.values(), strict=True):
+    for found, laid in zip(form.stages.patches.values(), form.stages.patch_nets.values(), strict=True):
         x = found.trimmed.positions
         assert np.abs(form.target.gap(x).distance).max() < 1e-9 * form.target.size
         assert laid.patch.margin(x).min() > -3e-3 * form.target.size  # straight chords beside a curved edge
-    assert sum(len(found.footprint.rods) for found in form.stages.found.values()) == len(form.footprint.rods)
+    assert sum(len(found.footprint.rods) for found in form.stages.patches.values()) == len(form.footprint.rods)
 
 
 @pytest.mark.slow
@@ -146,7 +146,7 @@ def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
     form = sewn(name)
     for meeting in form.meetings:
         end = meeting.ends[1]
-        laid = form.stages.laid[end.patch]
+        laid = form.stages.patch_nets[end.patch]
         rod = next(rod for rod in laid.rods if rod.name == end.rod)
         if [other.ends[1].rod for other in form.meetings if other.ends[1].patch == end.patch].count(end.rod) > 1:
             continue
@@ -160,9 +160,9 @@ def test_lines_of_the_net_are_led_through_the_points(name: str) -> None:
 def test_a_patch_alone_is_the_same_form() -> None:
     """One job with the patch's boundary and rods; only its ends are not moved (0.1 mm) to where the others are."""
     form = sewn("dome, diagonal")
-    for name, laid in form.stages.laid.items():
+    for name, laid in form.stages.patch_nets.items():
         alone = rs.find_form(laid.patch, laid.layout, ROD, anchor=laid.anchor, ends=("clamped",))
-        found = form.stages.found[name]
+        found = form.stages.patches[name]
         held = found.footprint.mesh.ends.ravel()
         free = np.setdiff1d(np.arange(found.footprint.mesh.node_count), held)
         np.testing.assert_array_equal(found.trimmed.positions[free], alone.trimmed.positions[free])
@@ -175,7 +175,7 @@ def test_a_patch_alone_is_the_same_form() -> None:
 @pytest.mark.parametrize("name", ["dome, across", "dome, diagonal", "ball"])
 def test_patches_of_a_mirrored_target_mirror_each_other(name: str) -> None:
     form = sewn(name)
-    first, second = form.stages.found.values()
+    first, second = form.stages.patches.values()
     swapped = [1, 0, 2] if name == "dome, diagonal" else [0, 1, 2]
     sign = 1 if name == "dome, diagonal" else np.array([1, -1, 1])
     for here, there in ((first, second), (second, first)):
@@ -209,7 +209,8 @@ def test_of_patches_the_weakest_says_what_share_of_the_own_weight_is_borne() -> 
     for ends, weighed in archive.results.plain()["self_weight"].items():
         popped = [patch.popped[ends] for patch in form.patches]
         own = [self_weight(patch.shell, patch.equilibrium) for patch in popped]
-        assert weighed["load_factor"] == min(one.load_factor for one in own)
+        # checks settle each pop-up once more: 2e-12 apart
+        assert weighed["load_factor"] == pytest.approx(min(patch.load_factor for patch in own), rel=1e-9)
     assert archive.summary().count("(weakest patch, its seam held)") == 2
 
 
@@ -218,7 +219,7 @@ def test_a_sphere_beyond_the_nets_limit_is_formed_in_two() -> None:
     with pytest.raises(NetLimitError):
         rs.find_form(BALL, layout_of(0.035), ROD)
     form = sewn("ball")
-    assert min(laid.net.min_angle for laid in form.stages.laid.values()) > np.radians(20)
+    assert min(laid.net.min_angle for laid in form.stages.patch_nets.values()) > np.radians(20)
     assert all("would swing" in why for _, why in form.dropped)
 
 
@@ -241,8 +242,8 @@ def test_the_search_leaves_out_no_more_rods_than_the_default_heading() -> None:
 def test_a_patch_may_have_its_own_spacing_and_anchor() -> None:
     own = {"B": rs.PatchLayout(anchor=(0.1, -0.1), spacing=(0.05, 0.05))}
     form = rs.find_form(DOME, layout_of(0.04), ROD, seams=[DIAGONAL], patches=own, ends=())
-    assert form.stages.laid["B"].layout.spacing == (0.05, 0.05)
-    np.testing.assert_allclose(form.stages.laid["B"].anchor, (0.1, -0.1), atol=0.03 * 0.05)
+    assert form.stages.patch_nets["B"].layout.spacing == (0.05, 0.05)
+    np.testing.assert_allclose(form.stages.patch_nets["B"].anchor, (0.1, -0.1), atol=0.03 * 0.05)
     assert len(form.meetings) > 10
 
 
@@ -406,7 +407,7 @@ def test_points_are_put_in_a_row_along_an_overhanging_curve() -> None:
 @pytest.mark.slow
 def test_grids_side_by_side_are_the_same_grids() -> None:
     form = sewn("vault in three")
-    meshes = {name: found.footprint.mesh for name, found in form.stages.found.items()}
+    meshes = {name: found.footprint.mesh for name, found in form.stages.patches.items()}
     both = side_by_side(meshes, 0.05)
     at = 0
     for name, mesh in meshes.items():
@@ -455,14 +456,14 @@ def test_hardly_a_rod_is_left_out_where_rods_can_meet(name: str) -> None:
 def test_figures_of_all_patches_are_joined() -> None:
     form = sewn("two bumps, in the valley")
     for ends, gap in form.agreement.items():
-        parts = [found.agreement[ends] for found in form.stages.found.values()]
+        parts = [found.agreement[ends] for found in form.stages.patches.values()]
         assert gap.max == max(part.max for part in parts)
         assert min(part.rms for part in parts) <= gap.rms <= max(part.rms for part in parts)
         np.testing.assert_array_equal(gap.gaps, np.concatenate([part.gaps for part in parts]))
         # the edges' middles count too, so all nodes alone give it nearly
         assert gap.rms == pytest.approx(np.sqrt(np.mean(gap.gaps**2)), rel=0.05)
         report = form.popped[ends].report
-        assert report.dofs == sum(found.popped[ends].report.dofs for found in form.stages.found.values())
+        assert report.dofs == sum(found.popped[ends].report.dofs for found in form.stages.patches.values())
 
 
 @pytest.mark.slow

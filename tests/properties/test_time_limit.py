@@ -9,7 +9,7 @@ import rodshell as rs
 from rodshell import OutOfTimeError
 from rodshell.formfinding import progress as module
 from rodshell.formfinding.progress import TimeLimit, silent
-from rodshell.solve.report import Status
+from rodshell.solve.equilibrium import Status
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
 HEMISPHERE = rs.Hemisphere(0.2)

@@ -91,7 +91,7 @@ class Case(Table):
 
     def text(self) -> str:
         """As `to_toml`, or a comment on why no case file can give the same again."""
-        if self.target.kind == "table":
+        if self.of_table:
             return ""
         for held in self.held_objects.values():
             if not held.writable:
@@ -105,6 +105,12 @@ class Case(Table):
         if all(paths[key] == path for key, path in rooted.items()):
             return self
         return self.model_copy(update={"target": self.target.model_copy(update=rooted)})
+
+    @property
+    def of_table(self) -> bool:
+        """Whether it is about a table of rods, in place of a target."""
+        kind: str = self.target.kind
+        return kind == "table"
 
     @property
     def files(self) -> set[str]:
@@ -182,8 +188,8 @@ class Case(Table):
 
     def _require_stock(self, layout: "GridLayout") -> None:
         """InputError where bars of stock are shorter than any two joints are apart: no rod could be spliced of them."""
-        own = [patch.spacing for patch in self.seams.patches if patch.spacing is not None]
-        shortest, stock = min(map(min, (layout.spacing, *own))), self.fabrication.stock_length
+        spacings = [patch.spacing for patch in self.seams.patches if patch.spacing is not None]
+        shortest, stock = min(map(min, (layout.spacing, *spacings))), self.fabrication.stock_length
         if stock is not None and stock < shortest:
             raise InputError(
                 f"fabrication.stock_length = {shown(stock)}: shorter than the {length_text(shortest)} between joints, "
@@ -205,7 +211,7 @@ class Case(Table):
                 raise InputError(f"{key} = {shown(value)}: {instead}")
 
     def output_options(self) -> "OutputOptions":
-        """What checks, workshop and drawings are told.
+        """Options of checks, fabrication and drawings.
 
         Raises
         ------
@@ -247,7 +253,7 @@ def _value(value: object) -> str:
         return f"{{ {inside} }}" if inside else "{}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
-    if isinstance(value, str):  # JSON's escapes are TOML's, but for the character DEL
+    if isinstance(value, str):  # JSON's escapes are TOML's, except for the character DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     assert isinstance(value, int | float)  # the schema has no other values
     return repr(value)

@@ -1,5 +1,5 @@
 """The keys of the case file in a row, read off its tables, for command-line options; and what is wrong with a key, in
-one sentence: the key, its value, and what would do."""
+one sentence: the key, its value, and what is accepted."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ class CaseKey:
     help : one line.
     kinds : of the table that has the key, where not every kind has it.
     choices : the words that it may take, where it is a choice.
-    any_value : whether it may take values besides these words.
+    any_value : whether it may take values other than these words.
     """
 
     path: str

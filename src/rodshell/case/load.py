@@ -1,4 +1,4 @@
-"""From a name, a file, a text or a mapping, and what is set anew, to a complete case or one clear sentence."""
+"""From a name, a file, a text or a mapping, and changed keys, to a complete case or one clear sentence."""
 
 import tomllib
 import warnings
@@ -39,7 +39,7 @@ BUILT_IN: dict[str, Raw] = {
         "drawings": {"name": "pavilion"},
     },
 }
-"""The cases that need no file, but for one named like their target's kind; the tables' defaults give the rest.
+"""The cases that need no file, except one named like their target's kind; the tables' defaults give the rest.
 
 The pavilion is a shell to stand under: 12 m wide, of GFRP tubes as at the cathedral of Creteil.
 """
@@ -67,7 +67,7 @@ def load_case(
     *,
     otherwise: Mapping[str, Raw] | None = None,
 ) -> Case:
-    """The case of this name, in this file or with this content, with some keys set anew.
+    """The case of this name, in this file or with this content, with some keys changed.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def load_case(
 
 
 def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
-    """The same case with some keys set anew, as `load_case` does.
+    """The same case with some keys changed, as `load_case` does.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def flattened(changes: Mapping[str, object]) -> dict[str, object]:
 
 
 def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
-    """The case of tables as they were read, with some keys set anew."""
+    """The case of tables as they were read, with some keys changed."""
     _rename(raw, overrides)
     for path in case_tables():
         if not isinstance(_table(raw, path), dict):

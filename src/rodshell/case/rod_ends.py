@@ -130,7 +130,7 @@ def read_table(path: Path, unit: str | None) -> RodEnds:
 
 
 def _columns(path: Path, header: list[str]) -> tuple[str, ...]:
-    """The `COLUMNS` as the header has them: all bare, or all with _mm."""
+    """The `COLUMNS` as in the header: all bare, or all with _mm."""
     in_mm = tuple(f"{column}_mm" for column in COLUMNS)
     if set(in_mm) <= set(header):
         return in_mm
@@ -164,7 +164,7 @@ def _labels(path: Path, names: list[str]) -> list[str] | None:
         return None
     for k, name in enumerate(names):
         if not name or name in names[:k]:
-            fault = f'the id "{name}" stands twice' if name else f"rod {k + 1} has no id"
+            fault = f'the id "{name}" occurs twice' if name else f"rod {k + 1} has no id"
             raise InputError(f"{path}: {fault}: give each rod its own, or leave the column out")
     return names
 

@@ -115,7 +115,7 @@ class GivenTable(Table):
 
 class MaterialTable(Table):
     preset: PresetName | None = Field(
-        default=None, description="a named material; keys beside it replace its own values"
+        default=None, description="a named material; other keys of [rod.material] replace its values"
     )
     youngs_modulus: Stress | None = Field(default=None, description="Young's modulus")
     poisson_ratio: PoissonRatio | None = Field(default=None, description="Poisson's ratio; default 0.5")
@@ -212,7 +212,8 @@ class JointTable(Table):
         kinds = {"ball": joints.Ball, "pin": joints.Pin, "spring": joints.Spring, "rigid": joints.Rigid}
         given = self.model_dump(exclude={"kind"}, exclude_none=True)
         given = {name: inf if value == "rigid" else value for name, value in given.items()}
-        return (kinds | {"linker": joints.Linker})[self.kind](**given)  # type: ignore[attr-defined]
+        joint: Joint = (kinds | {"linker": joints.Linker})[self.kind](**given)  # type: ignore[attr-defined]
+        return joint
 
 
 class BallTable(JointTable):

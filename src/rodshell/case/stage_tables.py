@@ -83,7 +83,7 @@ class DrapeTable(Table):
     )
     C1: NodeStiffness | None = Field(default=None, description="of the springs between nodes; default from the rods")
     C2: AngleStiffness | None = Field(default=None, description="of the springs between twist angles; default as C1")
-    time_step: Duration | None = Field(default=None, description="of a fall; default 10 ms, or what springs bear")
+    time_step: Duration | None = Field(default=None, description="of a fall; default 10 ms, or the stability limit")
     duration: Duration | None = Field(default=None, description="longest fall; default 6 s at a size of 0.2 m")
     friction: Share = Field(default=0.0, description="Coulomb's coefficient between falling rods and target")
     drag: Share = Field(default=0.0, description="rate in 1/s at which falling rods lose velocity to the air")
@@ -94,8 +94,8 @@ class DrapeTable(Table):
     def _inside(cls, value: str | None) -> str | None:
         """A case from somebody else must not write to any place."""
         parts = PureWindowsPath("frames" if value is None else value).parts  # it knows both kinds of paths
-        if not parts or ".." in parts or any(one in part for part in parts for one in "/\\:"):
-            raise ValueError('frames are kept in the result\'s own folder: give a name in it such as "frames"')
+        if not parts or ".." in parts or any(letter in part for part in parts for letter in "/\\:"):
+            raise ValueError('frames are kept in the result\'s folder: give a name in it such as "frames"')
         return value
 
     @model_validator(mode="after")
@@ -180,7 +180,7 @@ class SeamsTable(Table):
             raise ValueError("seams.patches needs seams: give seams.lines or seams.file, or leave it out")
         return self
 
-    def own(self) -> "dict[str, PatchLayout]":
+    def patch_layouts(self) -> "dict[str, PatchLayout]":
         """What patches have of their own, by name.
 
         Raises
@@ -196,10 +196,8 @@ class SeamsTable(Table):
 
 class ChecksTable(Table):
     strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
-    stages: Whole = Field(default=8, description="equilibria of the way up from flat; 0: it is not followed")
-    shear_strength: Stress | None = Field(
-        default=None, description="in shear along the fibres; default: as von Mises has it"
-    )
+    stages: Whole = Field(default=8, description="equilibria of the deployment from flat; 0: it is not followed")
+    shear_strength: Stress | None = Field(default=None, description="in shear along the fibres; default: by von Mises")
 
 
 class FabricationTable(Table):

@@ -106,7 +106,7 @@ class PlacedTable(Table):
 class SurfaceTable(PlacedTable):
     unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
     object: str | None = Field(
-        default=None, description="name, of several; 3dm: or its layer; STEP: or a face's number"
+        default=None, description="object or layer name, if the file has several; STEP: face number"
     )
 
     def build(self) -> "Target":

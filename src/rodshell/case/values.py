@@ -117,11 +117,11 @@ def _parted(value: object) -> object:
     return items
 
 
-def _named(which: str, reader: Reader, item: object) -> float:
+def _named(ordinal: str, reader: Reader, item: object) -> float:
     try:
         return reader(item)
     except ValueError as reason:
-        raise ValueError(f"{which} value: {reason}") from None
+        raise ValueError(f"{ordinal} value: {reason}") from None
 
 
 def triple(kind: Kind) -> Callable[[object], tuple[float, ...]]:
@@ -131,7 +131,7 @@ def triple(kind: Kind) -> Callable[[object], tuple[float, ...]]:
         items = _parted(value)
         if not isinstance(items, list | tuple) or len(items) != 3:
             raise ValueError(f"needs three values, along or about x, y and z; each is {wanted(kind)}")
-        return tuple(_named(which, quantity(kind), item) for which, item in zip(_ORDER, items, strict=True))
+        return tuple(_named(ordinal, quantity(kind), item) for ordinal, item in zip(_ORDER, items, strict=True))
 
     return read
 

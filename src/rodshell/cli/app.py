@@ -91,7 +91,7 @@ def print_warnings() -> None:
 
 
 def failed(error: BaseException) -> int:
-    """Say what was wrong in one line; the exit code. Raises what is no user's error."""
+    """Say what was wrong in one line; the exit code. Raises errors that are not the user's."""
     if isinstance(error, OutOfTimeError):
         return _fail(f"{error}; nothing was found yet that could be written", error.exit_code)
     if isinstance(error, RodshellError):

@@ -12,7 +12,7 @@ PATIENCE = 3  # signals after which the process ends without cleaning up
 
 
 def end_at_once() -> None:
-    """Let signals end the process silently but for one line, as long as there is nothing to clean up."""
+    """Let signals end the process silently except for one line, as long as there is nothing to clean up."""
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell's background jobs ignore Ctrl-C
             signal.signal(number, _end)
@@ -45,8 +45,8 @@ class Interruption:
     def __enter__(self) -> Self:
         Interruption.current = self
         if threading.current_thread() is threading.main_thread():
-            wanted = [one for one in SIGNALS if signal.getsignal(one) not in (signal.SIG_IGN, None)]
-            self._before = {one: signal.signal(one, self._handle) for one in wanted}
+            wanted = [number for number in SIGNALS if signal.getsignal(number) not in (signal.SIG_IGN, None)]
+            self._before = {number: signal.signal(number, self._handle) for number in wanted}
         sys.unraisablehook = self._unraisable
         return self
 

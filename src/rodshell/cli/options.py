@@ -107,12 +107,12 @@ def overrides_of(values: Mapping[str, str | None]) -> dict[str, object]:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What commands that run a job are told of their output.
+    """Options of the commands that run a job, of their output.
 
     Parameters
     ----------
     out : folder for the results.
-    kinds : of files besides the archive; None: all that every installation can.
+    kinds : of files in addition to the archive; None: all that every installation can.
     limit : longest time for all but the files [s].
     """
 
@@ -130,7 +130,7 @@ FORCE = click.option(
     help="Replace files in DIR that rodshell did not write, or that were changed since, where it has to write.",
 )
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-ONLY = "Files besides the archive, such as dxf,csv; see rodshell export --help."
+ONLY = "Files in addition to the archive, such as dxf,csv; see rodshell export --help."
 TIME_LIMIT = 'Longest time such as "60 s" for all but the files; what was found until then is written.'
 
 

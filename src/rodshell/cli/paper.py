@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @FORCE
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, a line for each figure.")
 @QUIET
-@click.option("--seed", type=click.IntRange(min=0), help="genetic: search anew from this seed, or go on with that.")
+@click.option("--seed", type=click.IntRange(min=0), help="genetic: start from this seed, or continue its search.")
 @click.option("--target", metavar="NAME", help="genetic: this target only.")
 @click.option("--jobs", type=click.IntRange(min=1), help="genetic: processes of a search; default 1.")
 @click.option("--generations", type=click.IntRange(min=1), help="genetic: the most of a search; default 300.")
@@ -36,13 +36,13 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
     names = list(FIGURES) if figure == "all" else [figure]
     folders = [str(Path(out) / name) if out and figure == "all" else out for name in names]
     with ExitStack() as stack:
-        places = [
+        result_folders = [
             stack.enter_context(output_folder(folder, name, reserved(name), force=force))
             for name, folder in zip(names, folders, strict=True)
         ]
         announce_compilation(quiet=quiet)
         codes = []
-        for name, place in zip(names, places, strict=True):  # each is written as soon as it is made
+        for name, place in zip(names, result_folders, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:
                 made = figure_maker(name)(progress, **given)
             saved = partial(_save, made)

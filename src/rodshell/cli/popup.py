@@ -23,8 +23,8 @@ def command(source: str, unit: str | None, **values: Any) -> int:
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
     final_z0, final_x1, final_y1, final_z1 and, optionally, id; or with all coordinates in mm and _mm after each name,
-    as schedule/rods.csv has them. DIR is an earlier result, whose joints are kept; those of a table are balls. The rod
-    is the result's, or for a table one that is chosen to fit; each key of [rod] sets it anew. So do those of [checks],
+    as in schedule/rods.csv. DIR is an earlier result, whose joints are kept; those of a table are balls. The rod
+    is the result's, or for a table one that is chosen to fit; each key of [rod] replaces it. So do those of [checks],
     [fabrication] and [drawings] what is checked, made and drawn.
     """
     output = read_output_options(values)

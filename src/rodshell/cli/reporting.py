@@ -106,7 +106,7 @@ def announce_compilation(*, quiet: bool = False) -> None:
     if quiet:
         return
     if not kernels_are_kept():
-        click.echo(f"rodshell: compiling kernels anew, about 20 s: {UNKEPT}", err=True)
+        click.echo(f"rodshell: compiling kernels again, about 20 s: {UNKEPT}", err=True)
     elif not compiled_before():
         click.echo("rodshell: compiling kernels, once, about 20 s (rodshell warmup compiles all ahead)", err=True)
 
@@ -121,9 +121,9 @@ def compiled_before() -> bool:
     if numba.config.DISABLE_JIT:
         return True
     index = f"*.py{sys.version_info.major}{sys.version_info.minor}.nbi"
-    own = os.environ.get("NUMBA_CACHE_DIR")
-    places = [own] if own else [Path(rodshell.__file__).parent, user_cache_dir("numba", appauthor=False)]
-    return any(next(Path(place).rglob(index), None) for place in places)
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    folders = [given] if given else [Path(rodshell.__file__).parent, user_cache_dir("numba", appauthor=False)]
+    return any(next(Path(place).rglob(index), None) for place in folders)
 
 
 class Result(Protocol):
@@ -177,7 +177,7 @@ def run_and_deliver(
     Parameters
     ----------
     name : of the folder out/NAME.
-    names : patterns of the files that are written besides result.json, states.npz and those of the kinds.
+    names : patterns of the files that are written in addition to result.json, states.npz and those of the kinds.
     pictures : more files of the form, by name.
     """
     from rodshell.output.files import reserved
@@ -252,7 +252,7 @@ def deliver(
 
 
 def _saved(save: "Callable[[ResultFolder], object]", place: "ResultFolder") -> Path:
-    """Where a result was saved: beside its place, if somebody put files there while the job ran."""
+    """Where a result was saved: next to its place, if somebody put files there while the job ran."""
     from rodshell.results.folder import ForeignFileError, open_folder
 
     try:

@@ -45,8 +45,8 @@ def warm_up(progress: Progress) -> int:
     """Run all jobs; how many kernels were compiled for it. Each kernel is named on `progress`."""
     from numba.core import event
 
-    class Heard(event.Listener):
-        """Counts compilations, and tells of each as it begins; what a kernel calls is compiled within it."""
+    class Heard(event.Listener):  # type: ignore[misc, unused-ignore]
+        """Counts compilations, and reports each as it begins; what a kernel calls is compiled within it."""
 
         depth = count = 0
         stage = ""
@@ -137,8 +137,8 @@ def _single_rods() -> None:
     straight = np.linspace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 12)
     round_section, oval = rs.Circle(radius=2e-3), rs.Ellipse(a=3e-3, b=2e-3)
     for section, twist in ((round_section, False), (round_section, True), (oval, True)):
-        one = rs.Rod(section, rs.Material(youngs_modulus=1e7, density=1e3))
-        rod = rs.ElasticRod.of(straight, one, clamped=("start",), twist=twist)
+        kind = rs.Rod(section, rs.Material(youngs_modulus=1e7, density=1e3))
+        rod = rs.ElasticRod.of(straight, kind, clamped=("start",), twist=twist)
         rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0.0, 0.0, -1e-4)}))
         motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
         rs.simulate(motion, rod.state(), until=4e-3, step=1e-3)

@@ -27,12 +27,11 @@ from rodshell.layout.mesh import nodes_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import with_apron
+from rodshell.rods.elements import Stretch
 from rodshell.rods.section import GivenSection, Rod
-from rodshell.rods.stretch import Stretch
-from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
+from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, SolveReport, find_equilibrium
 from rodshell.solve.path import going_on
 from rodshell.solve.problem import Problem
-from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it

@@ -19,11 +19,10 @@ from rodshell.geometry.frames import dot
 from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.forces import Damping
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion
 from rodshell.solve.linear_stability import step_limit
 from rodshell.solve.newton_matrix import narrow_or_dissected
-from rodshell.solve.problem import Supports
+from rodshell.solve.problem import Damping, Supports
 from rodshell.solve.simulate import Sample, simulate
 from rodshell.validation import not_negative, positive
 

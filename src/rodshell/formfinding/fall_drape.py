@@ -23,11 +23,11 @@ from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.forces import Damping, GravityForce
+from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.solve.implicit_euler import ContactEuler, Motion
 from rodshell.solve.linear_stability import NO_NODES, REMEDY, ExplicitTies, step_limit
 from rodshell.solve.newton_matrix import narrow_or_dissected
-from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.problem import Damping, GravityForce
 from rodshell.solve.simulate import End, Sample, TimeSeries, simulate
 from rodshell.targets import Target
 

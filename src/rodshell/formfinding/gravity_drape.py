@@ -24,9 +24,8 @@ from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.model import Freedom, Shell
 from rodshell.nets import chebyshev_net
 from rodshell.rods.section import Rod
-from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
+from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target
 
 DEPTH = 1e-5  # of the size: deepest node inside the target

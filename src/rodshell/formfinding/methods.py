@@ -22,7 +22,7 @@ from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDo
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.nets import ChebyshevNet
 from rodshell.rods.section import Rod
-from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.validation import choice, instance, not_negative, positive
 

@@ -1,5 +1,5 @@
-"""Several simple gridshells joined at seams: a target is cut into patches, each patch is formed by itself, and on the
-seams the rod ends of both sides meet at common points [HQK 3.4, the outlook]."""
+"""Several simple gridshells joined at seams: a target is cut into patches, each is formed alone, and on the seams the
+rod ends of both sides share their places [HQK 3.4, the outlook]."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -15,7 +15,7 @@ from rodshell.formfinding.methods import Draped
 from rodshell.formfinding.pipeline import Agreement, PatchForm, find_stages
 from rodshell.formfinding.popup import ENDS, Ends, Start
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.seams import FEWEST, LaidPatch, Meeting, lay_patches, patches_of, transported_heading
+from rodshell.formfinding.seams import FEWEST, Meeting, PatchNet, lay_patches, patches_of, transported_heading
 from rodshell.formfinding.search import HEADINGS
 from rodshell.formfinding.section_limits import flat_warnings
 from rodshell.formfinding.trim import Boundary, Footprint, Trimmed, trim
@@ -23,7 +23,7 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout
 from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.rods.section import Rod
-from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.units import shown
@@ -75,8 +75,7 @@ class PatchedForm:
 
     Parameters
     ----------
-    overrides : settings of single patches, by name.
-    laid, found : of each patch by its name: its rods, and every stage of its form.
+    patch_nets, patches : of each patch by its name: its rods, and every stage of its form.
     meetings : where rods of two patches end at one point.
     moved : of each patch the largest distance between a rod end of its mesh and that point, to which it was moved [m].
     ends : the requested end conditions.
@@ -87,9 +86,9 @@ class PatchedForm:
     layout: GridLayout
     rod: Rod
     joint: Joint
-    overrides: Mapping[str, PatchLayout]
-    laid: dict[str, LaidPatch]
-    found: dict[str, PatchForm]
+    patch_layouts: Mapping[str, PatchLayout]
+    patch_nets: dict[str, PatchNet]
+    patches: dict[str, PatchForm]
     meetings: tuple[Meeting, ...]
     moved: dict[str, float]
     ends: tuple[Ends, ...]
@@ -97,23 +96,25 @@ class PatchedForm:
     @property
     def status(self) -> str:
         """ "converged", or which patch stopped and what to do."""
-        for name, form in self.found.items():
+        for name, form in self.patches.items():
             if form.status != "converged":
                 return form.status if "(patch " in form.status else f"{form.status} (patch {name})"
         return "converged"
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        whole = set(self.target.warnings)  # reported once; and a patch may be flat where the shell is not
-        whole.update(*(flat_warnings(form.trimmed.positions, self.rod) for form in self.found.values()))
-        words = [f"patch {k}: {word}" for k, form in self.found.items() for word in form.warnings if word not in whole]
+        whole = set(self.target.warnings)  # said once; and a patch may be flat where the shell is not
+        whole.update(*(flat_warnings(form.trimmed.positions, self.rod) for form in self.patches.values()))
+        words = [
+            f"patch {k}: {word}" for k, form in self.patches.items() for word in form.warnings if word not in whole
+        ]
         words += [
             f"patch {k}: rod ends were moved by up to {by:.3g} m to the points where they meet others: its net does "
             "not reach these points well; try another heading or anchor"
             for k, by in self.moved.items()
             if by > ASTRAY * self.target.size
         ]
-        share = left_out(self.laid)
+        share = left_out(self.patch_nets)
         if share > MANY:
             words.append(
                 f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
@@ -122,15 +123,15 @@ class PatchedForm:
         return (*flat_warnings(self.draped, self.rod), *self.target.warnings, *words)
 
     def parameters(self) -> dict[str, object]:
-        """Seams and the settings of single patches, as they are written in a case file."""
-        patches = [{"name": name, **_given(settings)} for name, settings in self.overrides.items()]
+        """Seams and what patches have of their patch_layouts, as they stand in a case file."""
+        patches = [{"name": name, **_given(overrides)} for name, overrides in self.patch_layouts.items()]
         return {"lines": [seam.points.tolist() for seam in self.seams], "patches": patches}
 
     @cached_property
     def flat(self) -> SideBySide:
         """The flat grids of all patches in a row."""
-        gap = GAP * max(max(patch.layout.spacing) for patch in self.laid.values())
-        return side_by_side({name: form.footprint.mesh for name, form in self.found.items()}, gap)
+        gap = GAP * max(max(net.layout.spacing) for net in self.patch_nets.values())
+        return side_by_side({name: form.footprint.mesh for name, form in self.patches.items()}, gap)
 
     @property
     def footprint(self) -> Footprint:
@@ -139,19 +140,19 @@ class PatchedForm:
     @cached_property
     def draped(self) -> Floats:
         """(n, 3) all patches on the target [m]."""
-        return np.concatenate([form.trimmed.positions for form in self.found.values()])
+        return np.concatenate([form.trimmed.positions for form in self.patches.values()])
 
     @cached_property
     def boundary(self) -> Boundary:
-        """The boundary of all patches, rod by rod."""
-        parts = [form.trimmed.boundary for form in self.found.values()]
+        """Of all patches, rod by rod."""
+        parts = [form.trimmed.boundary for form in self.patches.values()]
         points, tangents = (np.concatenate([getattr(part, what) for part in parts]) for what in ("points", "tangents"))
         return Boundary(points, tangents, self.draped)
 
     @cached_property
     def popped(self) -> dict[Ends, MergedPopUp]:
-        """The merged shells of all patches, for each end condition with which all of them were popped up."""
-        forms = list(self.found.values())
+        """The shells of all patches as one, for each kind of ends that all were popped up with."""
+        forms = list(self.patches.values())
         return {
             ends: MergedPopUp(
                 ends,
@@ -167,7 +168,7 @@ class PatchedForm:
 
     @property
     def agreement(self) -> dict[Ends, Agreement]:
-        forms = list(self.found.values())
+        forms = list(self.patches.values())
         return {
             ends: merged_agreement([form.agreement[ends] for form in forms])
             for ends in forms[0].agreement
@@ -179,8 +180,8 @@ class PatchedForm:
         """Rods that are not built, with the reason."""
         return tuple(
             (f"{name}-{rod}", why)
-            for name, form in self.found.items()
-            for rod, why in (*self.laid[name].dropped, *form.trimmed.dropped)
+            for name, form in self.patches.items()
+            for rod, why in (*self.patch_nets[name].dropped, *form.trimmed.dropped)
         )
 
 
@@ -190,7 +191,7 @@ def find_patched_stages(
     layout: GridLayout,
     rod: Rod,
     *,
-    overrides: Mapping[str, PatchLayout] | None = None,
+    patch_layouts: Mapping[str, PatchLayout] | None = None,
     joint: Joint | None = None,
     ends: Ends | Sequence[Ends] = ENDS,
     warm_start: PatchedForm | None = None,
@@ -206,15 +207,15 @@ def find_patched_stages(
     """
     ends = choices_of("ends", ends, ENDS)
     require_joint(joint)
-    overrides, joint = dict(overrides or {}), joint or Ball()
-    earlier = warm_start.found if warm_start is not None else {}
+    patch_layouts, joint = dict(patch_layouts or {}), joint or Ball()
+    earlier = warm_start.patches if warm_start is not None else {}
     if warm_start is not None and same_drape:
-        laid, meetings = warm_start.laid, warm_start.meetings
+        patch_nets, meetings = warm_start.patch_nets, warm_start.meetings
     else:
-        laid, meetings = _lay(target, seams, layout, overrides, joint.eccentricity, progress)
+        patch_nets, meetings = _lay(target, seams, layout, patch_layouts, joint.eccentricity, progress)
     found, moved = dict[str, PatchForm](), dict[str, float]()
-    for name, patch in laid.items():
-        end_points = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
+    for name, patch in patch_nets.items():
+        places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
 
         def patch_progress(stage: str, detail: str, residual: float, name: str = name) -> None:
             if stage == "net":
@@ -227,14 +228,16 @@ def find_patched_stages(
             name=name, cut=partial(cut_with_ends, end_points=end_points), progress=patch_progress,
         )  # fmt: skip
         moved[name] = _moved(found[name])
-    return PatchedForm(target, tuple(seams), layout, rod, joint, overrides, laid, found, meetings, moved, ends)
+    return PatchedForm(
+        target, tuple(seams), layout, rod, joint, patch_layouts, patch_nets, found, meetings, moved, ends
+    )
 
 
 def best_heading(
     target: Target,
     seams: Sequence[Seam],
     layout: GridLayout,
-    overrides: Mapping[str, PatchLayout],
+    patch_layouts: Mapping[str, PatchLayout],
     *,
     eccentricity: float = 0.0,
     progress: Progress = silent,
@@ -249,8 +252,8 @@ def best_heading(
     for heading in HEADINGS:
         progress("seams", f"trying {degrees(heading):.0f} deg", 0.0)
         try:
-            laid, _ = _lay(target, seams, replace(layout, rotate=heading), overrides, eccentricity, silent)
-            shares[heading] = left_out(laid)
+            patch_nets, _ = _lay(target, seams, replace(layout, rotate=heading), patch_layouts, eccentricity, silent)
+            shares[heading] = left_out(patch_nets)
         except RodshellError as reason:
             reasons.append(reason)
     if not shares:
@@ -258,39 +261,38 @@ def best_heading(
     return min(shares, key=lambda heading: round(shares[heading], 2))
 
 
-def left_out(laid: Mapping[str, LaidPatch]) -> float:
-    """The share of the rods that is left out because no rod of the next patch meets them at a seam."""
-    missing = sum(len(patch.layout.left_out) for patch in laid.values())
-    return missing / (missing + sum(len(patch.rods) for patch in laid.values()))
+def left_out(patch_nets: Mapping[str, PatchNet]) -> float:
+    """The share of the rods that is left out for want of another at a seam."""
+    missing = sum(len(net.layout.left_out) for net in patch_nets.values())
+    return missing / (missing + sum(len(net.rods) for net in patch_nets.values()))
 
 
 def _lay(
     target: Target,
     seams: Sequence[Seam],
     layout: GridLayout,
-    overrides: Mapping[str, PatchLayout],
+    patch_layouts: Mapping[str, PatchLayout],
     eccentricity: float,
     progress: Progress,
-) -> tuple[dict[str, LaidPatch], tuple[Meeting, ...]]:
+) -> tuple[dict[str, PatchNet], tuple[Meeting, ...]]:
     if layout.rods != "auto" or layout.length != "auto":
         raise InputError('a target cut by seams counts its rods itself: leave layout rods and length at "auto"')
     progress("seams", "cutting", 0.0)
     patches = patches_of(target, tuple(seams))
-    for name in overrides:
+    for name in patch_layouts:
         if name not in patches:
             raise InputError(f"there is no patch {shown(name)}: the seams make the patches {', '.join(patches)}")
     layouts = {
-        name: _patch_layout(patch, layout, overrides.get(name, PatchLayout())) for name, patch in patches.items()
+        name: _layout_of(patch, layout, patch_layouts.get(name, PatchLayout())) for name, patch in patches.items()
     }
-    anchors = {name: overrides[name].anchor if name in overrides else None for name in patches}
+    anchors = {name: patch_layouts[name].anchor if name in patch_layouts else None for name in patches}
     return lay_patches(patches, layouts, anchors, eccentricity=eccentricity, progress=progress)
 
 
-def _patch_layout(patch: Patch, layout: GridLayout, settings: PatchLayout) -> GridLayout:
-    """The layout of a patch: that of the whole target with the patch's own settings."""
-    spacing, rotate = settings.spacing or layout.spacing, settings.rotate
+def _layout_of(patch: Patch, layout: GridLayout, overrides: PatchLayout) -> GridLayout:
+    spacing, rotate = overrides.spacing or layout.spacing, overrides.rotate
     if rotate is None:
-        rotate = transported_heading(patch.whole, settings.anchor or patch.middle, layout.rotate)
+        rotate = transported_heading(patch.whole, overrides.anchor or patch.middle, layout.rotate)
     return replace(layout, spacing=spacing, edge=min(layout.edge, *spacing), rotate=rotate)
 
 
@@ -316,19 +318,19 @@ def cut_with_ends(draped: Draped, end_points: Mapping[tuple[str, int], Floats]) 
 
 
 def _moved(form: PatchForm) -> float:
-    """Largest distance by which rod ends of a patch were moved from their draped positions [m]."""
-    unmoved, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
+    """How far the ends of a patch's rods were moved from where its own drape has them, at most [m]."""
+    draped, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
     return float(
-        np.linalg.norm(unmoved.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0)
+        np.linalg.norm(draped.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0)
     )
 
 
-def _given(settings: PatchLayout) -> dict[str, object]:
-    return {key: value for key, value in asdict(settings).items() if value is not None}
+def _given(overrides: PatchLayout) -> dict[str, object]:
+    return {key: value for key, value in asdict(overrides).items() if value is not None}
 
 
 def merged_report(reports: Sequence[SolveReport]) -> SolveReport:
-    """The merged report of independent solves: sums of counts, and the worst status and residual."""
+    """Of solves that have nothing to do with each other."""
     worst = next((report.status for report in reports if not report.converged), Status.CONVERGED)
     total = replace(
         reports[0],
@@ -343,7 +345,7 @@ def merged_report(reports: Sequence[SolveReport]) -> SolveReport:
 
 
 def merged_agreement(parts: Sequence[Agreement]) -> Agreement:
-    """The merged agreement of several patches, weighted by their numbers of nodes."""
+    """Of several patches; each counts by its nodes."""
     worst = max(parts, key=lambda part: part.max)
     count = np.array([len(part.gaps) for part in parts])
     square = np.array([part.rms for part in parts]) ** 2

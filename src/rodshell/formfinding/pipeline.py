@@ -31,7 +31,7 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.rods.section import Rod
-from rodshell.solve.report import Status
+from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.validation import choices_of

@@ -25,10 +25,9 @@ from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
-from rodshell.solve.equilibrium import Equilibrium, find_stable
-from rodshell.solve.path import follow
+from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
+from rodshell.solve.path import MOST_STEPS, follow, relax
 from rodshell.solve.problem import Problem, half_width
-from rodshell.solve.report import SolveReport, Status
 from rodshell.units import length_text
 from rodshell.validation import choice, instance
 
@@ -217,9 +216,7 @@ class _Stages:
         )
         if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
             return shell, at_once
-        from rodshell.solve.relax import MOST_STEPS, relax  # rarely needed, and it imports the dynamics
-
-        relaxed = relax(
+        slid = relax(
             self.problem(shell),
             state,
             progress=lambda k, step: self.progress(

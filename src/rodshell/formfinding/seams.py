@@ -59,7 +59,7 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
 
 
 def transported_heading(target: Target, anchor: tuple[float, float], rotate: float) -> float:
-    """Angle against x, seen from above [rad], of the summit's heading `rotate`, transported to an anchor.
+    """Angle against x, seen from above [rad], of the summit's heading `rotate` where it is carried to an anchor.
 
     It is rotated as the surface's normal is from one point to the other: mirrored patches get mirrored headings.
     """
@@ -159,8 +159,8 @@ class Meeting:
 
 
 @dataclass(frozen=True)
-class LaidPatch:
-    """A patch with its rods; `dropped` names those that its layout leaves out, with the reason."""
+class PatchNet:
+    """A patch with its own rods; `dropped` names those that its layout leaves out, with the reason."""
 
     patch: Patch
     layout: GridLayout
@@ -192,8 +192,8 @@ def lay_patches(
     *,
     eccentricity: float = 0.0,
     progress: Progress = silent,
-) -> tuple[dict[str, LaidPatch], tuple[Meeting, ...]]:
-    """Choose the rods of each patch in turn, such that they meet the rods of the patches before it.
+) -> tuple[dict[str, PatchNet], tuple[Meeting, ...]]:
+    """The rods of each patch, in turn: each takes up the rods of those before it.
 
     Rods that meet no other at a seam are left out, and so are those that would swing without them.
 
@@ -202,27 +202,27 @@ def lay_patches(
     patches, layouts, anchors : by the patches' names; anchors x, y [m], default the patch's middle.
     eccentricity : see `chebyshev_net`; at a seam the points midway between the layers meet.
     """
-    laid, waiting, meetings = dict[str, LaidPatch](), list[_OpenEnd](), list[Meeting]()
+    patch_nets, waiting, meetings = dict[str, PatchNet](), list[_Open](), list[Meeting]()
     for name, patch in patches.items():
         progress("seams", f"laying patch {name}", 0.0)
         layout, anchor = layouts[name], anchors[name] or patch.middle
         to_meet = [end for end in waiting if end.beyond == patch.sides]
         try:
-            if to_meet:
-                goals = _end_goals(patch, to_meet, [before.patch for before in laid.values()])
-                found = match_net(patch, layout, anchor, goals, eccentricity=eccentricity)
-                laid[name] = LaidPatch(patch, found.layout, found.anchor, found.net)
+            if mine:
+                wanted = _wanted(patch, mine, [net.patch for net in patch_nets.values()])
+                found = match_net(patch, layout, anchor, wanted, eccentricity=eccentricity)
+                patch_nets[name] = PatchNet(patch, found.layout, found.anchor, found.net)
                 for met in found.matched:
                     other = to_meet[met.point]
                     meetings.append(Meeting(other.seam, other.point, (other.end, End(name, met.rod, met.side))))
             else:
                 net = chebyshev_net(patch, layout, anchor=anchor, eccentricity=eccentricity)
-                laid[name] = LaidPatch(patch, layout, anchor, net)
+                patch_nets[name] = PatchNet(patch, layout, anchor, net)
         except RodshellError as reason:
             raise type(reason)(f"patch {name}: {reason}") from None
         done = {end for meeting in meetings for end in meeting.ends}
-        waiting = [end for end in (*waiting, *_ends_on_seams(name, laid[name])) if end.end not in done]
-    return _without_unmatched(laid, {end.end for end in waiting}, meetings)
+        waiting = [end for end in (*waiting, *_ends_on_seams(name, patch_nets[name])) if end.end not in done]
+    return _without_lonely(patch_nets, {end.end for end in waiting}, meetings)
 
 
 def _end_goals(patch: Patch, ends: list[_OpenEnd], others: list[Patch]) -> EndGoals:
@@ -238,7 +238,7 @@ def _end_goals(patch: Patch, ends: list[_OpenEnd], others: list[Patch]) -> EndGo
 
 
 def _in_order(meetings: list[Meeting]) -> tuple[Meeting, ...]:
-    """The meetings seam by seam, in their order along each."""
+    """Seam by seam, along each."""
     seams, points = np.array([at.seam for at in meetings]), np.array([at.point for at in meetings])
     return tuple(meetings[k] for row in _rows(seams, points) for k in row.tolist())
 
@@ -270,51 +270,51 @@ def _cut_by(patch: Patch, points: Floats) -> Ints:
     return np.asarray(np.argmin(np.abs(off), axis=0) - 1)
 
 
-def _ends_on_seams(name: str, laid: LaidPatch) -> list[_OpenEnd]:
+def _ends_on_seams(name: str, grid: PatchNet) -> list[_Open]:
     """The ends of a patch's rods that a seam cuts off, at their points of the seam."""
-    patch, rods = laid.patch, laid.rods
-    points = rod_ends(laid.net, rods)
+    patch, rods = grid.patch, grid.rods
+    points = rod_ends(grid.net, rods)
     cut_by = _cut_by(patch, points)
     result = []
     for k in np.flatnonzero(cut_by >= 0).tolist():
         seam = int(cut_by[k])
         on_seam = patch.on_seam(points[k], seam)
-        rod, tiny = rods[k // 2], 0.1 * laid.layout.edge
+        rod, tiny = rods[k // 2], 0.1 * grid.layout.edge
         at = rod.end - tiny if k % 2 else rod.start + tiny
-        out = unit(points[k] - laid.net.positions(rod, np.array([at]))[0])
+        out = unit(points[k] - grid.net.positions(rod, np.array([at]))[0])
         across = patch.across(on_seam, seam)
         mirrored = out - 2 * (out @ across) * across
         result.append(_OpenEnd(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, mirrored))
     return result
 
 
-def _without_unmatched(
-    laid: dict[str, LaidPatch], unmatched: set[End], meetings: list[Meeting]
-) -> tuple[dict[str, LaidPatch], tuple[Meeting, ...]]:
-    """Leave out rods with an unmatched end, rods that would swing, and the rods that these meet, until none is left."""
-    out = {(end.patch, end.rod): ALONE for end in sorted(unmatched)}
+def _without_lonely(
+    patch_nets: dict[str, PatchNet], lonely: set[End], meetings: list[Meeting]
+) -> tuple[dict[str, PatchNet], tuple[Meeting, ...]]:
+    """Leave out rods with a lonely end, rods that would swing, and those that they met, until all is in order."""
+    out = {(end.patch, end.rod): ALONE for end in sorted(lonely)}
     while True:
         before = len(out)
-        for name, rods in laid.items():
-            out |= {(name, rod): SWINGS for rod in _swinging(name, rods, [rod for patch, rod in out if patch == name])}
+        for name, net in patch_nets.items():
+            out |= {(name, rod): SWINGS for rod in _swinging(name, net, [rod for patch, rod in out if patch == name])}
         for meeting in meetings:
             for end, other in (meeting.ends, meeting.ends[::-1]):
                 if (end.patch, end.rod) in out and (other.patch, other.rod) not in out:
                     out[other.patch, other.rod] = f"it meets {end.patch}-{end.rod}, which is left out"
         if len(out) == before:
             break
-    for name, rods in laid.items():
+    for name, net in patch_nets.items():
         dropped = tuple((rod, why) for (patch, rod), why in out.items() if patch == name)
-        laid[name] = replace(
-            rods, layout=replace(rods.layout, left_out=tuple(rod for rod, _ in dropped)), dropped=dropped
+        patch_nets[name] = replace(
+            net, layout=replace(net.layout, left_out=tuple(rod for rod, _ in dropped)), dropped=dropped
         )
-    return laid, _in_order([at for at in meetings if not any((end.patch, end.rod) in out for end in at.ends)])
+    return patch_nets, _in_order([at for at in meetings if not any((end.patch, end.rod) in out for end in at.ends)])
 
 
-def _swinging(name: str, laid: LaidPatch, out: list[str]) -> list[str]:
-    """Names of the rods that would have too few joints without the rods `out`."""
-    rods = [rod for rod in laid.rods if rod.name not in out]
+def _swinging(name: str, grid: PatchNet, out: list[str]) -> list[str]:
+    """Names of the rods that would have too few joints without those that are out."""
+    rods = [rod for rod in grid.rods if rod.name not in out]
     if not rods:
         raise InputError(f"no rod of patch {name} meets others at its seams: {REMEDY}")
-    margin = NEAREST_JOINT * min(laid.layout.spacing)
+    margin = NEAREST_JOINT * min(grid.layout.spacing)
     return FlatGrid.of(rods, margin=margin).without(lambda grid: grid.joint_counts() < FEWEST)[1]

@@ -50,7 +50,7 @@ from rodshell.results.records import (
 from rodshell.results.results import Results, plain
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod as RodModel
-from rodshell.solve.report import SolveReport
+from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
 
 States = dict[str, NDArray[Any]]
@@ -132,7 +132,7 @@ def table_states(table: PatchForm) -> States:
 
 def patches_results(form: PatchedForm) -> Results:
     """The results of a form in patches, before it is checked: those of one shell, with `patches` and `seams`."""
-    nets = [laid.net for laid in form.laid.values()]
+    nets = [laid.net for laid in form.patch_nets.values()]
     tightest = min(nets, key=lambda net: net.min_angle)
     return Results(
         **_head(form.target.name, form.status, form.warnings),
@@ -140,13 +140,13 @@ def patches_results(form: PatchedForm) -> Results:
         layout=Layout.model_validate(form.layout.parameters()),
         rod=rod_type(form.rod),
         joint=_joint(form.joint),
-        patches=tuple(_patch(form, name) for name in form.found),
+        patches=tuple(_patch(form, name) for name in form.patches),
         seams=tuple(_seam(form, k) for k in range(len(form.seams))),
         net=_net(tightest).changed(error_estimate=max(net.error_estimate for net in nets)),
         **_grid(form.footprint, form.boundary.points, form.dropped),
         end_tangents=form.boundary.tangents.tolist(),
         agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
-        drape=_drape_of_all([_drape(found.draped) for found in form.found.values()]),
+        drape=_drape_of_all([_drape(found.draped) for found in form.patches.values()]),
         pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
     )
 
@@ -334,7 +334,7 @@ def _agreement(gap: FoundAgreement) -> Agreement:
 
 
 def _patch(form: PatchedForm, name: str) -> Patch:
-    laid, found = form.laid[name], form.found[name]
+    laid, found = form.patch_nets[name], form.patches[name]
     return Patch(
         id=name,
         status=found.status,
