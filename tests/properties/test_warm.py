@@ -167,7 +167,7 @@ def test_a_warm_start_that_would_be_ignored_is_refused(last):
     popped, boundary = last.popped["pinned"], last.trimmed.boundary
     with pytest.raises(rs.InputError, match="has pinned ends, not clamped"):
         rs.pop_up(last.footprint, boundary, ROD, ends="clamped", warm_start=popped)
-    with pytest.raises(rs.InputError, match='first guess for start="draped" alone'):
+    with pytest.raises(rs.InputError, match='can only be used with start="draped"'):
         rs.pop_up(last.footprint, boundary, ROD, ends="pinned", start="flat", warm_start=popped)
 
 
