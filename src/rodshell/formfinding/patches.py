@@ -1,5 +1,5 @@
 """Several simple gridshells joined at seams: a target is cut into patches, each is formed alone, and on the seams the
-rod ends of both sides share their places [HQK 3.4, the outlook]."""
+rod ends of both sides meet at common points [HQK 3.4, the outlook]."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -202,7 +202,7 @@ def find_patched_stages(
 
     Parameters
     ----------
-    overrides : settings of single patches, by name.
+    patch_layouts : settings of single patches, by name.
     warm_start, same_drape : as in `find_stages`; patches are matched by their names.
     """
     ends = choices_of("ends", ends, ENDS)
@@ -215,7 +215,7 @@ def find_patched_stages(
         patch_nets, meetings = _lay(target, seams, layout, patch_layouts, joint.eccentricity, progress)
     found, moved = dict[str, PatchForm](), dict[str, float]()
     for name, patch in patch_nets.items():
-        places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
+        end_points = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
 
         def patch_progress(stage: str, detail: str, residual: float, name: str = name) -> None:
             if stage == "net":
@@ -262,7 +262,7 @@ def best_heading(
 
 
 def left_out(patch_nets: Mapping[str, PatchNet]) -> float:
-    """The share of the rods that is left out for want of another at a seam."""
+    """The share of the rods that is left out because no rod of the next patch meets them at a seam."""
     missing = sum(len(net.layout.left_out) for net in patch_nets.values())
     return missing / (missing + sum(len(net.rods) for net in patch_nets.values()))
 
@@ -318,7 +318,7 @@ def cut_with_ends(draped: Draped, end_points: Mapping[tuple[str, int], Floats]) 
 
 
 def _moved(form: PatchForm) -> float:
-    """How far the ends of a patch's rods were moved from where its own drape has them, at most [m]."""
+    """Largest distance by which rod ends of a patch were moved from their draped positions [m]."""
     draped, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
     return float(
         np.linalg.norm(draped.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0)

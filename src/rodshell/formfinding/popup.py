@@ -216,7 +216,7 @@ class _Stages:
         )
         if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
             return shell, at_once
-        slid = relax(
+        relaxed = relax(
             self.problem(shell),
             state,
             progress=lambda k, step: self.progress(

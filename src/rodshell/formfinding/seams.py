@@ -160,7 +160,7 @@ class Meeting:
 
 @dataclass(frozen=True)
 class PatchNet:
-    """A patch with its own rods; `dropped` names those that its layout leaves out, with the reason."""
+    """A patch with its rods; `dropped` names those that its layout leaves out, with the reason."""
 
     patch: Patch
     layout: GridLayout
@@ -202,14 +202,14 @@ def lay_patches(
     patches, layouts, anchors : by the patches' names; anchors x, y [m], default the patch's middle.
     eccentricity : see `chebyshev_net`; at a seam the points midway between the layers meet.
     """
-    patch_nets, waiting, meetings = dict[str, PatchNet](), list[_Open](), list[Meeting]()
+    patch_nets, waiting, meetings = dict[str, PatchNet](), list[_OpenEnd](), list[Meeting]()
     for name, patch in patches.items():
         progress("seams", f"laying patch {name}", 0.0)
         layout, anchor = layouts[name], anchors[name] or patch.middle
         to_meet = [end for end in waiting if end.beyond == patch.sides]
         try:
-            if mine:
-                wanted = _wanted(patch, mine, [net.patch for net in patch_nets.values()])
+            if to_meet:
+                wanted = _end_goals(patch, to_meet, [net.patch for net in patch_nets.values()])
                 found = match_net(patch, layout, anchor, wanted, eccentricity=eccentricity)
                 patch_nets[name] = PatchNet(patch, found.layout, found.anchor, found.net)
                 for met in found.matched:
@@ -222,7 +222,7 @@ def lay_patches(
             raise type(reason)(f"patch {name}: {reason}") from None
         done = {end for meeting in meetings for end in meeting.ends}
         waiting = [end for end in (*waiting, *_ends_on_seams(name, patch_nets[name])) if end.end not in done]
-    return _without_lonely(patch_nets, {end.end for end in waiting}, meetings)
+    return _without_unmatched(patch_nets, {end.end for end in waiting}, meetings)
 
 
 def _end_goals(patch: Patch, ends: list[_OpenEnd], others: list[Patch]) -> EndGoals:
@@ -270,7 +270,7 @@ def _cut_by(patch: Patch, points: Floats) -> Ints:
     return np.asarray(np.argmin(np.abs(off), axis=0) - 1)
 
 
-def _ends_on_seams(name: str, grid: PatchNet) -> list[_Open]:
+def _ends_on_seams(name: str, grid: PatchNet) -> list[_OpenEnd]:
     """The ends of a patch's rods that a seam cuts off, at their points of the seam."""
     patch, rods = grid.patch, grid.rods
     points = rod_ends(grid.net, rods)
@@ -288,11 +288,11 @@ def _ends_on_seams(name: str, grid: PatchNet) -> list[_Open]:
     return result
 
 
-def _without_lonely(
-    patch_nets: dict[str, PatchNet], lonely: set[End], meetings: list[Meeting]
+def _without_unmatched(
+    patch_nets: dict[str, PatchNet], unmatched: set[End], meetings: list[Meeting]
 ) -> tuple[dict[str, PatchNet], tuple[Meeting, ...]]:
-    """Leave out rods with a lonely end, rods that would swing, and those that they met, until all is in order."""
-    out = {(end.patch, end.rod): ALONE for end in sorted(lonely)}
+    """Leave out rods with a unmatched end, rods that would swing, and those that they met, until all is in order."""
+    out = {(end.patch, end.rod): ALONE for end in sorted(unmatched)}
     while True:
         before = len(out)
         for name, net in patch_nets.items():
