@@ -15,7 +15,7 @@ import rodshell as rs
 from rodshell.cli import main
 from rodshell.formfinding import pipeline
 from tests.acceptance.rows import Row
-from tests.properties.altered import with_report
+from tests.formfinding.altered import with_report
 
 CODES = {"good": 0, "check": 0, "unbuildable": 4}
 

@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from shells import ROD, dome, wave
 
 import rodshell as rs
 from rodshell.checks import Deployment, check, curvatures, deploy
@@ -17,6 +16,7 @@ from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.path import relax
 from rodshell.solve.problem import Problem, Supports
 from tests.acceptance.targets_random import random_case
+from tests.checks.shells import ROD, dome, wave
 
 
 def deployed(form: rs.Form, stages: int = 4) -> Deployment:

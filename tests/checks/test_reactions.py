@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shells import ROD, dome
 
 import rodshell as rs
 from rodshell.checks import Reactions, reactions
 from rodshell.formfinding.popup import Ends, PopUp
 from rodshell.formfinding.trim import Boundary
+from tests.checks.shells import ROD, dome
 
 
 def popped(ends: Ends, boundary: Boundary) -> PopUp:

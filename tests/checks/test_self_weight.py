@@ -1,4 +1,4 @@
-"""What share of its own weight a shell bears, and what is said of it. Figures: `parity/test_loaded_shells.py`."""
+"""What share of its own weight a shell bears, and what is said of it. Figures: `checks/test_loaded_shells.py`."""
 
 import numpy as np
 import pytest

@@ -17,7 +17,7 @@ from rodshell.output.pictures import TOWARDS
 from rodshell.paper import drapes
 from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
 from rodshell.paper.figure import Case, standing
-from tests.paper.falls import HEMISPHERE
+from tests.formfinding.falls import HEMISPHERE
 
 pytestmark = pytest.mark.slow
 
