@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rodshell.case import Case, load_case
 from rodshell.case.case import built
 from rodshell.case.from_objects import case_of, case_of_rod_ends
-from rodshell.case.load import changed_case, flattened
+from rodshell.case.load import changed_case, flattened, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
 from rodshell.errors import InputError
 from rodshell.form import Form
@@ -29,6 +29,7 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output.options import OutputOptions
 from rodshell.results.folder import reading
+from rodshell.results.inputs import read_inputs
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run
 from rodshell.targets import Target
@@ -70,9 +71,10 @@ class Job:
     InputError : a value is of the wrong kind; a target too is missing.
     """
 
-    __slots__ = ("_case", "_target")
+    __slots__ = ("_case", "_inputs", "_target")
     _case: Case
-    _target: Target | None
+    _target: Target | None  # as it was given
+    _inputs: Mapping[str, bytes] | None  # what its files held then: they may change on disk
 
     def __init__(
         self,
@@ -108,7 +110,7 @@ class Job:
             objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
             seams=seams, patches=patches or {}, options=options or OutputOptions(),
         )  # fmt: skip
-        self._set(case, target)
+        self._set(case, target, read_inputs(case.text()))
 
     @classmethod
     def load(
@@ -168,7 +170,9 @@ class Job:
         require_joint(joint)
         if rod is not None:
             instance("rod", rod, Rod)
-        ends, case = _ends_and_case(source, unit, flattened({**(overrides or {}), **more}))
+        changes = flattened({**(overrides or {}), **more})
+        require_keys_of_rods(changes)
+        ends, case = _ends_and_case(source, unit, changes)
         given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
         return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))
@@ -183,7 +187,7 @@ class Job:
         changes = flattened({**(overrides or {}), **more})
         job = type(self).of_case(changed_case(self._case, changes))
         if job._case.target == self._case.target:
-            job._set(job._case, self._target)
+            job._set(job._case, self._target, self._inputs)
         return job
 
     @property
@@ -239,7 +243,8 @@ class Job:
         if warm_start is not None:
             instance("warm_start", warm_start, Form, FOUND)
         choice("until", until, ("pop-up", "fabrication"))
-        run = Run(self._case, self._target, warm_start, limited(progress, time_limit), announce, Path(frames_in))
+        limit = limited(progress, time_limit)
+        run = Run(self._case, self._target, self._inputs, warm_start, limit, announce, Path(frames_in))
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
         with entered:
             form = run.table_form() if self._case.of_table else run.form()
@@ -274,9 +279,10 @@ class Job:
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Job is a value: use job.changed(...) in place of setting {name}")
 
-    def _set(self, case: Case, target: Target | None) -> None:
+    def _set(self, case: Case, target: Target | None, inputs: Mapping[str, bytes] | None = None) -> None:
         object.__setattr__(self, "_case", case)
         object.__setattr__(self, "_target", target)
+        object.__setattr__(self, "_inputs", inputs)
 
 
 def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
