@@ -254,7 +254,7 @@ class Form:
 
     def __repr__(self) -> str:
         rods, pieces = len(self.footprint.rods), len(self.patches)
-        name = "a table of rods" if self.from_table else self.target.name
+        name = "a table of rods" if self.from_table else self.case.drawings.name or self.target.name
         parts = f" in {pieces} patches" if pieces > 1 else ""
         found = f"popped up {' and '.join(self.popped)}" if self.popped else "not popped up"
         return f"<rodshell.Form of {name}{parts}: {rods} rods, {found}, {self.status}>"

@@ -12,7 +12,7 @@ from typing import Literal, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rodshell.case import Case, load_case
+from rodshell.case import Case, case_keys, load_case
 from rodshell.case.case import built
 from rodshell.case.from_objects import case_of, case_of_rod_ends
 from rodshell.case.load import changed_case, flattened
@@ -39,6 +39,8 @@ Auto = Literal["auto"]
 AskedEnds = Literal["pinned", "clamped", "both"]
 
 FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
+OF_TABLE = ("rod", "joint", "checks", "fabrication", "drawings")
+"""Tables of the case that a job of a table of rods uses."""
 OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
 
 
@@ -57,7 +59,7 @@ class Job:
         target's highest point.
     rotate : heading in place of the layout's [rad]; "auto": the best found.
     objective : what an "auto" anchor or heading makes smallest, see `search`.
-    joint : what the rods do to each other where they cross, see `pop_up`; default: ball joints.
+    joint : the joints where rods cross, see `pop_up`; default: ball joints.
     ends : end conditions of the pop-up: "pinned", "clamped", or "both"; also in a tuple, which may be empty.
     seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches; each
         continues straight past its ends, unless it is closed. Rods and length of the layout are then "auto"; its
@@ -156,7 +158,7 @@ class Job:
         Parameters
         ----------
         source : a CSV table; the folder of an earlier result; or the ends themselves.
-        overrides, more : as of `load`, of the tables rod, checks, fabrication and drawings.
+        overrides, more : as of `load`, of the tables rod, joint, checks, fabrication and drawings.
         unit : of the coordinates in a table, unless its columns end in _mm.
         rod : section and material; default: those of the result, or a rod that is chosen to fit.
         joint : where rods cross, without eccentricity; default: that of the result, or ball joints.
@@ -168,7 +170,9 @@ class Job:
         require_joint(joint)
         if rod is not None:
             instance("rod", rod, Rod)
-        ends, case = _ends_and_case(source, unit, flattened({**(overrides or {}), **more}))
+        changes = flattened({**(overrides or {}), **more})
+        _require_of_table(changes)
+        ends, case = _ends_and_case(source, unit, changes)
         given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
         return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))
@@ -178,9 +182,12 @@ class Job:
 
         Raises
         ------
-        InputError : as of `load`; also a key of a table that was made from an object which no key describes.
+        InputError : as of `load`; also a key of a table that was made from an object which no key describes, and one
+            that a table of rods does not use.
         """
         changes = flattened({**(overrides or {}), **more})
+        if self._case.of_table:
+            _require_of_table(changes)
         job = type(self).of_case(changed_case(self._case, changes))
         if job._case.target == self._case.target:
             job._set(job._case, self._target)
@@ -222,8 +229,8 @@ class Job:
             shell that has several equilibria stays in its own.
         progress : called as progress(stage, detail, residual) at every iteration.
         time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
-        announce : called with a sentence for each thing that the job decided itself, before the form is searched.
-        until : the last stage that is run now; the checks and all after them are else run when they are asked for.
+        announce : called with a sentence for each value that the job chose itself, before the form is computed.
+        until : the last stage that is run now. With "pop-up", checks and fabrication are made when first asked for.
         frames_in : folder in which a fall's folder of frames (drape.frames) is made; default: the current one.
 
         Returns
@@ -253,7 +260,8 @@ class Job:
         what = case.drawings.name or target
         source = getattr(case.target, "file", None)
         spacing = "auto" if case.layout.spacing == "auto" else " x ".join(map(length_text, case.layout.spacing))
-        seams = f", {len(case.seams.lines)} seams" if case.seams.lines else ""
+        cuts = len(case.seams.lines)
+        seams = f", {cuts} seam{'s' if cuts > 1 else ''}" if cuts else ""
         return (
             f"<rodshell.Job: {what}{f' {source}' if source else ''}, spacing {spacing}{seams}, "
             f"{case.drape.method} drape, {case.joint.kind} joints, ends {' and '.join(case.ends) or 'none'}>"
@@ -283,6 +291,16 @@ def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
     """The end conditions asked for, in their order."""
     words = choices_of("ends", given, ("pinned", "clamped", "both"))
     return ENDS if "both" in words else tuple(end for word in words for end in ENDS if end == word)
+
+
+def _require_of_table(changes: Mapping[str, object]) -> None:
+    """InputError for a key that a table of rods does not use; unknown keys are left to the case."""
+    for path, value in changes.items():
+        if path in case_keys() and path.partition(".")[0] not in OF_TABLE:
+            raise InputError(
+                f"{path} = {shown(value)}: a table of rods does not use this key: leave it out, or change one of "
+                f"{', '.join(f'[{name}]' for name in OF_TABLE)}"
+            )
 
 
 def _ends_and_case(
@@ -320,7 +338,7 @@ def find_form(
     progress: Progress = silent,
     time_limit: float | None = None,
 ) -> Form:
-    """From a target to the flat grid that pops up into it, with the proof: a `Job` of these objects, run.
+    """Find the flat grid that pops up into a target: a `Job` of these objects, run.
 
     Checks and fabrication are made when they are first asked for.
 

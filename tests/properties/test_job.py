@@ -142,7 +142,7 @@ def test_a_job_is_read_only_and_says_what_it_is_in_one_line() -> None:
     with pytest.raises(AttributeError, match=r"use job.changed\(...\)"):
         job.case = None  # type: ignore[misc]
     assert repr(job) == (
-        "<rodshell.Job: hemisphere, spacing 60 mm x 60 mm, 1 seams, bound drape, ball joints, ends pinned and clamped>"
+        "<rodshell.Job: hemisphere, spacing 60 mm x 60 mm, 1 seam, bound drape, ball joints, ends pinned and clamped>"
     )
 
 
@@ -317,6 +317,11 @@ def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
     job = rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job == rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job != rs.Job.of_table(folder, rod__section__radius="1 mm", checks__stages=1)
+    for key, value in {"layout.rotate": 0.1, "pop_up.ends": "clamped", "target.radius": 1.0}.items():
+        with pytest.raises(InputError, match=f"{key} = .*: a table of rods does not use this key"):
+            job.changed({key: value})
+        with pytest.raises(InputError, match="does not use this key"):
+            rs.Job.of_table(folder, {key: value})
     form = job.run()
     assert form.from_table
     assert form.agreement == {}
@@ -374,6 +379,12 @@ def test_a_notebook_shows_the_shell_and_its_verdict(earlier: rs.Form) -> None:
     assert "<svg" in shown
     assert f"<b>{earlier.verdict.level}</b>" in shown
     assert "&lt;rodshell.Form of hemisphere" in shown
+
+
+def test_a_form_is_shown_by_the_name_of_its_case(earlier: rs.Form) -> None:
+    assert repr(rs.Job.of_case(earlier.case).changed(drawings__name="my dome").run(warm_start=earlier)).startswith(
+        "<rodshell.Form of my dome: "
+    )
 
 
 def test_the_ready_progress_says_the_stages(capsys: pytest.CaptureFixture[str]) -> None:
