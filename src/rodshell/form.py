@@ -33,6 +33,7 @@ from rodshell.results.from_checks import checked_results, checked_states, final_
 from rodshell.results.from_form import results_of, states_of, with_seam_forces
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
+from rodshell.validation import instance
 
 Stages = PatchForm | PatchedForm
 
@@ -199,6 +200,7 @@ class Form:
 
     def with_options(self, options: OutputOptions) -> "Form":
         """The same stages, to be checked, fabricated and drawn with other options."""
+        instance("options", options, OutputOptions)
         same = options.stages == self.options.stages and self._weight(options) == self._weight(self.options)
         known = self.known_checks if same else None
         return replace(self, options=options, _known_checks=known, _known_fabrication=None)

@@ -5,6 +5,7 @@ The command line, a studio, a sweep or a script load or make a `Job`, change it,
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Literal, Self, get_args
@@ -33,7 +34,7 @@ from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run
 from rodshell.targets import Target
 from rodshell.units import length_text, shown
-from rodshell.validation import choice, choices_of, instance, point
+from rodshell.validation import choice, choices_of, file_path, instance, point
 
 Auto = Literal["auto"]
 AskedEnds = Literal["pinned", "clamped", "both"]
@@ -137,6 +138,7 @@ class Job:
     @classmethod
     def of_case(cls, case: Case) -> Self:
         """The job of a case that was loaded before; of an earlier form: `Job.of_case(form.case)`."""
+        instance("case", case, Case, "the case of a form or of a job; to load one by its name use rodshell.Job.load")
         job = cls.__new__(cls)
         job._set(case, None)
         return job
@@ -246,6 +248,8 @@ class Job:
         if warm_start is not None:
             instance("warm_start", warm_start, Form, FOUND)
         choice("until", until, ("pop-up", "fabrication"))
+        if time_limit is not None:
+            instance("time_limit", time_limit, Real, "a number in s")
         run = Run(self._case, self._target, warm_start, limited(progress, time_limit), announce, Path(frames_in))
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
         with entered:
@@ -309,7 +313,7 @@ def _ends_and_case(
     """The rods of a table or a result; and the result's case, or an empty one, with `overrides`."""
     if isinstance(source, RodEnds):
         return source, load_case(None, overrides)
-    path = Path(source)
+    path = file_path("source", source)
     if path.is_dir():
         if unit is not None:
             raise InputError(f"unit = {shown(unit)}: {path} is a result, which is in SI: leave it out")

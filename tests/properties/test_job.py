@@ -1,6 +1,7 @@
 """A job is a value: the same however it is written; run again from an earlier form, only what changed is run."""
 
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -379,6 +380,28 @@ def test_a_notebook_shows_the_shell_and_its_verdict(earlier: rs.Form) -> None:
     assert "<svg" in shown
     assert f"<b>{earlier.verdict.level}</b>" in shown
     assert "&lt;rodshell.Form of hemisphere" in shown
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda job: job.changed(layout=3), r"layout = 3: must be a table; \[layout\] has rods"),
+        (lambda job: job.changed({3: 4}), "words such as target.radius, not 3"),
+        (lambda job: job.run(time_limit="60 s"), 'time_limit must be a number in s, not "60 s"'),
+        (lambda _: rs.Job.load(""), "the name of the case is empty"),
+        (lambda _: rs.Job.load(3), "the case must be the name of a built-in case"),
+        (lambda _: rs.Job.of_case("pavilion"), "case must be the case of a form"),
+        (lambda _: rs.Job.of_table(3), "source must be the path of a file, not 3"),
+    ],
+)
+def test_arguments_of_a_wrong_kind_are_one_sentence(call: Callable[[rs.Job], object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call(dome())
+
+
+def test_a_form_refuses_options_of_a_wrong_kind(earlier: rs.Form) -> None:
+    with pytest.raises(InputError, match="options must be a rodshell OutputOptions, not 3"):
+        earlier.archive(options=3)  # type: ignore[arg-type]
 
 
 def test_a_form_is_shown_by_the_name_of_its_case(earlier: rs.Form) -> None:
