@@ -65,7 +65,7 @@ MODULES = {
     "calming": "rest_advice",
     "carried": "warm_start",
     "given": "validation",
-    "sharing": "subtree_scheduling",
+    "sharing": "symbolic",
     "tiles": "simd_kernels",
     "takeaway": "output options",
     "utils": "what it does",

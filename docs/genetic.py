@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from rodshell.cli.reporting import Progress
-from rodshell.paper.cases import CASES
+from rodshell.paper.figure import CASES
 from rodshell.paper.genetic import SEARCHES, SEED, find
 
 DATA = Path(__file__).parents[1] / "src" / "rodshell" / "paper" / "data"

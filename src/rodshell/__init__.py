@@ -71,10 +71,9 @@ if TYPE_CHECKING:
     from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.materials import Material
     from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
-    from rodshell.solve.forces import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.implicit_euler import ImplicitEuler, Motion
-    from rodshell.solve.rod_statics import RodShape, solve_rod
-    from rodshell.solve.rod_supports import RodLoads, RodSupports
+    from rodshell.solve.problem import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
+    from rodshell.solve.rod_statics import RodLoads, RodShape, RodSupports, solve_rod
     from rodshell.solve.simulate import Sample, TimeSeries, simulate
     from rodshell.targets import (
         Cap,
@@ -118,10 +117,9 @@ _HOMES = {
     "rodshell.results": ("Archive", "Results", "Verdict", "read"),
     "rodshell.rods.materials": ("Material",),
     "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
-    "rodshell.solve.forces": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
+    "rodshell.solve.problem": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
-    "rodshell.solve.rod_statics": ("RodShape", "solve_rod"),
-    "rodshell.solve.rod_supports": ("RodLoads", "RodSupports"),
+    "rodshell.solve.rod_statics": ("RodLoads", "RodShape", "RodSupports", "solve_rod"),
     "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",

@@ -13,8 +13,8 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.case import Case
 from rodshell.checks import Checks, check
+from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
-from rodshell.checks.merge import merged_checks
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed

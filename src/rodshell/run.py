@@ -14,8 +14,8 @@ from rodshell.formfinding import Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
 from rodshell.formfinding.progress import Progress
 from rodshell.formfinding.search import Search, search
+from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
-from rodshell.results.inputs import read_inputs
 from rodshell.results.summary import chosen, rod_text
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target

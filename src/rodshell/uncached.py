@@ -1,6 +1,6 @@
 """Compiled kernels where no folder for Numba's cache is writable.
 
-Numba refuses to declare a cached kernel there. With `allow_uncached` it is compiled again in each run instead.
+Numba refuses to declare a cached kernel there. After `allow_uncached` it is compiled in each run instead.
 """
 
 import os

@@ -53,7 +53,7 @@ def _factors(*groups: str) -> dict[str, Decimal]:
     return {spelling: Decimal(factor) for factor, *spellings in rows for spelling in spellings}
 
 
-FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is one in degrees without its unit
+FULL_TURN = 6.3  # rad, rounded up: a larger plain angle is probably in degrees, its unit forgotten
 _DEGREE = Decimal("3.14159265358979323846264338327950288") / 180
 
 _KINDS: dict[Kind, _Units] = {
@@ -119,8 +119,8 @@ def parse_quantity(value: object, kind: Kind, key: str) -> float:
     Parameters
     ----------
     value : number in SI, or text such as "30 mm", "1 g/cm3", "1.5e-3" (SI without a unit).
-    kind : the kind of quantity that is wanted.
-    key : how the user knows the value, for the error message.
+    kind : the expected kind of quantity.
+    key : the user's name for the value, for the error message.
 
     Raises
     ------

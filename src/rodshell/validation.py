@@ -1,6 +1,6 @@
-"""Checks of arguments: kind, sign, shape and spelling; and how values are shown, in messages and as frozen records.
+"""Checks of arguments: kind, sign, shape and spelling; and the texts that show values in messages and records.
 
-Every check raises InputError with one sentence, in which the argument is called by its `name`.
+Every check raises InputError with one sentence, which calls the argument by its `name`.
 """
 
 from collections.abc import Sequence

@@ -7,12 +7,12 @@ from math import radians
 import numpy as np
 
 import rodshell as rs
-from rodshell.paper.two_rods import Demonstration, run_in_time, run_statics
+from rodshell.paper.fig4 import Demonstration, run_in_time, run_statics
 from rodshell.solve.linear_stability import step_limit
 from tests.acceptance.rows import Row, print_table
-from tests.analytic import coupling_problems as couplings
-from tests.analytic import joint_problems as joints
-from tests.analytic.rod_problems import order
+from tests.joints import coupling_problems as couplings
+from tests.joints import joint_problems as joints
+from tests.solve.rod_problems import order
 
 STEPS = np.array([200, 400, 800, 1600])
 SOME = {"pin": rs.Pin(), "rigid": rs.Rigid(), "spring": rs.Spring(0.002, 0.01, 0.01)}

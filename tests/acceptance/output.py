@@ -23,10 +23,8 @@ from rodshell.output.files import DEFAULT
 from rodshell.results import Archive, Results
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
 from tests.acceptance.rows import Row, print_table
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "files"))  # the readers and samples of the tests of files
-from dxf_reader import read_dxf, rods_of_dxf
-from sample_archive import sample_archive, with_deployment
+from tests.output.dxf_reader import read_dxf, rods_of_dxf
+from tests.output.sample_archive import sample_archive, with_deployment
 
 TARGETS = {
     "hemisphere": (HEMISPHERE, {"rods": (17, 17)}),

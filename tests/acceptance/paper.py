@@ -21,7 +21,7 @@ from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, 
 from rodshell.nets import sphere_net_end
 from rodshell.paper import fig8, genetic
 from tests.acceptance.rows import Row, print_table
-from tests.paper.falls import TARGETS, Particles
+from tests.formfinding.falls import TARGETS, Particles
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(1e6, 1e3))
 COUNTS = {"hemisphere": (17, 17), "paraboloid": (15, 15), "ellipsoid": (11, 15)}

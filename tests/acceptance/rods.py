@@ -9,8 +9,8 @@ import numpy as np
 
 from rodshell.rods.bend_twist import BendTwist
 from tests.acceptance.rows import Row, print_table
-from tests.analytic import rod_problems as exact
-from tests.derivatives import test_elements as elements
+from tests.rods import test_elements as elements
+from tests.solve import rod_problems as exact
 
 MESHES = (40, 80, 160)
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.rod_scaling import KINDS, measure
 from tests.acceptance.rows import Row, print_table
-from tests.analytic import rod_motions as motions
-from tests.analytic.rod_problems import order
+from tests.solve import rod_motions as motions
+from tests.solve.rod_problems import order
 
 
 def frequency_rows() -> Iterator[Row]:

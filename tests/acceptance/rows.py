@@ -10,7 +10,7 @@ import numpy as np
 import rodshell as rs
 from rodshell.nets import sphere_net_end
 from tests.acceptance.cases import AUTO, BEYOND, FURTHER, PAPER, ROD, SHARP, AcceptanceCase
-from tests.analytic.goursat import goursat_ends
+from tests.nets.goursat import goursat_ends
 
 FOLDER = Path(__file__).parents[2] / "accept"
 

@@ -4,7 +4,6 @@ import csv
 import io
 import re
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator
 from functools import cache
@@ -16,20 +15,17 @@ import numpy as np
 import rodshell as rs
 from rodshell.cli import main
 from rodshell.output import export
-from rodshell.output.drawing import Drawing
+from rodshell.output.drawing import CAPITAL, Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.files import KINDS
-from rodshell.output.fonts import CAPITAL
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive, read
 from rodshell.results.wording import rounding_of
 from tests.acceptance.cases import HEMISPHERE, ROD
 from tests.acceptance.rows import Row
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "files"))  # the samples of the tests of files
-from hostile import hostile_archive
-from live_cells import live_cells
+from tests.output.hostile import hostile_archive
+from tests.output.live_cells import live_cells
 
 FOUND = (0, 4)  # exit codes of a form that converged
 LABELS = (

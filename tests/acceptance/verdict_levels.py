@@ -15,7 +15,7 @@ import rodshell as rs
 from rodshell.cli import main
 from rodshell.formfinding import pipeline
 from tests.acceptance.rows import Row
-from tests.properties.altered import with_report
+from tests.formfinding.altered import with_report
 
 CODES = {"good": 0, "check": 0, "unbuildable": 4}
 
@@ -58,7 +58,7 @@ CASES: dict[str, tuple[str, list[str], str]] = {  # level, words of the command 
     "20 mm rods on the hemisphere": ("unbuildable", ["hemisphere", "--rod.section.radius", "10 mm"], "touch"),
     "strength exceeded": ("unbuildable", ["hemisphere", "--checks.strength", "1 kPa"], "would break"),
     "unstable": ("unbuildable", ["hemisphere"], "unstable (2 buckling modes)"),
-    "the README's pavilion": ("good", ["pavilion"], "is stable and bears at least"),
+    "the README's pavilion": ("good", ["pavilion"], "is stable and carries at least"),
     "the paper's hemisphere": ("check", ["hemisphere"], "its own weight"),
 }
 

@@ -7,12 +7,12 @@ import numpy as np
 import rodshell as rs
 from rodshell.checks import Deployment, OtherShapes, check, deploy, other_shapes
 from rodshell.solve.equilibrium import find_stable
+from rodshell.solve.path import relax
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.relax import relax
 from tests.acceptance.cases import AUTO
 from tests.acceptance.rows import Row, form_of
 from tests.acceptance.targets_random import REASONS, ROD, random_case
-from tests.properties.elastic_twins import ElasticTwin
+from tests.formfinding.elastic_twins import ElasticTwin
 
 TARGETS = 60
 FINE = 200  # steps of the path forwards that nothing of the deployment's own is used for

@@ -1,9 +1,7 @@
 """Stress with torsion, strain beyond thin rods, strength exceeded and contact, against the tests' independent code."""
 
-import sys
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -11,10 +9,7 @@ import numpy as np
 import rodshell as rs
 from rodshell.checks import Checks, bending_of, check, contact_of
 from tests.acceptance.rows import Row
-
-sys.path.append(str(Path(__file__).parents[1] / "checks"))  # its tests' twin of the stress
-
-from stress_twin import distance, stresses, twisted_shells
+from tests.checks.stress_twin import distance, stresses, twisted_shells
 
 R = 0.2
 THIN = 0.05  # the theory of thin rods, as the checks have it

@@ -11,9 +11,9 @@ from rodshell.output import export
 from tests.acceptance.rows import Row
 from tests.acceptance.targets_broken import WRITERS
 from tests.acceptance.verdict_levels import said_of
-from tests.files.browser import open_report, wrong_legends
-from tests.files.forms import TARGETS, archive, breaking
-from tests.files.sample_archive import table_archive
+from tests.output.browser import open_report, wrong_legends
+from tests.output.forms import TARGETS, archive, breaking
+from tests.output.sample_archive import table_archive
 from tests.targets.meshes import Mesh, capped_sphere, equilateral, left_out, sheet
 
 GFRP = rs.Rod(rs.Circle(0.01), rs.Material.preset("gfrp"))

@@ -9,7 +9,7 @@ from rodshell.checks import Reactions, SelfWeight, reactions, self_weight
 from tests.acceptance.cases import HEMISPHERE, ROD
 from tests.acceptance.rows import Row
 from tests.acceptance.targets_random import random_case
-from tests.parity.loaded_twin import LoadedTwin
+from tests.checks.loaded_twin import LoadedTwin
 
 STEEL = rs.Rod(rs.Circle(radius=5e-4), rs.Material(210e9, 7850, 0.3))
 TUBE = rs.Rod(rs.Tube(radius=0.0417 / 2, thickness=0.0035), rs.Material(25e9, 1900, 0.3))

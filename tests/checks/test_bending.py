@@ -5,8 +5,8 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks import bending, bending_of, curvatures
+from rodshell.checks.bending import fibre_distance, fibre_strain
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
-from rodshell.rods.section_stress import fibre_distance, fibre_strain
 
 RADIUS = 0.2
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))

@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from shells import ROD, dome, wave
 
 import rodshell as rs
 from rodshell.checks import Deployment, check, curvatures, deploy
@@ -14,9 +13,10 @@ from rodshell.formfinding.popup import laid_below
 from rodshell.formfinding.trim import Boundary
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.path import relax
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.relax import relax
 from tests.acceptance.targets_random import random_case
+from tests.checks.shells import ROD, dome, wave
 
 
 def deployed(form: rs.Form, stages: int = 4) -> Deployment:
@@ -156,7 +156,7 @@ def test_snaps_are_said_to_go_on_to_the_final_shape() -> None:
     _, way = snapping()
     (words,) = way.warnings
     assert words.startswith("on its way from flat the shell snaps forward by itself, at 99 % of the way, by up to ")
-    assert words.endswith(" mm, and goes on to its final shape")
+    assert words.endswith(" mm, and continues to its final shape")
 
 
 def test_every_stage_of_a_path_forwards_is_a_stable_equilibrium_with_its_ends_on_their_lines() -> None:

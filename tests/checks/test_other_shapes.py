@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.linalg import eigh
-from shells import ROD, dome
 
 import rodshell as rs
 from rodshell.checks import OtherShape, OtherShapes, check, deploy, other_shapes
@@ -16,7 +15,8 @@ from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.newton_step import NewtonStep
 from rodshell.solve.problem import Problem, Supports
 from tests.acceptance.targets_random import random_case
-from tests.properties.elastic_twins import ElasticTwin
+from tests.checks.shells import ROD, dome
+from tests.formfinding.elastic_twins import ElasticTwin
 
 
 @cache

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shells import ROD, dome
 
 import rodshell as rs
 from rodshell.checks import Reactions, reactions
 from rodshell.formfinding.popup import Ends, PopUp
 from rodshell.formfinding.trim import Boundary
+from tests.checks.shells import ROD, dome
 
 
 def popped(ends: Ends, boundary: Boundary) -> PopUp:
@@ -76,7 +76,7 @@ def test_a_clamp_moment_is_the_energy_gained_where_it_turns() -> None:
 
 def test_out_of_equilibrium_nothing_balances() -> None:
     """The sums test the state: a shell that is not in equilibrium does not pass."""
-    from rodshell.checks.support_and_joint_loads import reactions
+    from rodshell.checks.loads import reactions
     from rodshell.solve.equilibrium import Problem, find_equilibrium
     from rodshell.solve.problem import Supports
 

@@ -5,9 +5,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from shells import dome
-from stress_twin import distance
-from test_bending import rods_of_length
 
 import rodshell as rs
 from rodshell.checks import Contact, check, contact_of
@@ -22,6 +19,9 @@ from rodshell.checks.contact import (
 )
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.mesh import side_by_side as side_by_side_meshes
+from tests.checks.shells import dome
+from tests.checks.stress_twin import distance
+from tests.checks.test_bending import rods_of_length
 
 MATERIAL = rs.Material(youngs_modulus=1e9, density=1e3)
 

@@ -1,11 +1,11 @@
-"""What share of its own weight a shell bears, and what is said of it. Figures: `parity/test_loaded_shells.py`."""
+"""What share of its own weight a shell bears, and what is said of it. Figures: `checks/test_loaded_shells.py`."""
 
 import numpy as np
 import pytest
 
 import rodshell as rs
 from rodshell.checks import SelfWeight, self_weight
-from rodshell.checks.self_weight import weakest
+from rodshell.checks.loads import weakest
 from rodshell.model import Shell
 from tests.checks.shells import ROD, dome
 
@@ -49,7 +49,7 @@ def test_rods_without_a_mass_are_said_to_have_none():
         "limit": "no mass",
     }
     assert any("no mass was given" in word for word in archive.results.plain()["warnings"])
-    assert "own weight borne: unknown: no mass was given" in archive.summary()
+    assert "own weight carried: unknown: no mass was given" in archive.summary()
 
 
 @pytest.mark.parametrize("eccentricity", [0.0, 1e-3])
@@ -82,7 +82,7 @@ def test_summary_and_result_say_both_kinds_of_ends():
     archive = dome().archive()
     for ends, said in archive.results.plain()["self_weight"].items():
         assert said["limit"] == "bifurcation"
-        assert f"weight    {ends:<8}own weight borne: {100 * said['load_factor']:.2g} %" in archive.summary()
+        assert f"weight    {ends:<8}own weight carried: {100 * said['load_factor']:.2g} %" in archive.summary()
     assert "stable, unloaded" in archive.summary()
 
 

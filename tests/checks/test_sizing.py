@@ -110,7 +110,7 @@ def test_what_is_given_is_kept_and_only_the_rest_is_chosen() -> None:
     assert isinstance(wall, rs.Tube)
     assert wall.thickness == 0.002
     with pytest.raises(
-        InputError, match=r"a wall of 50 mm: tubes that bear .* at most 50 mm thick: give a thinner wall"
+        InputError, match=r"a wall of 50 mm: tubes that withstand .* at most 50 mm thick: give a thinner wall"
     ):
         roof(**{"rod.section.kind": "tube", "rod.section.thickness": "50 mm"}).build()
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from shells import dome
-from stress_twin import largest, shear_field, stresses, twisted_shells
-from test_bending import ROD, laid, rods_of_length
 
 import rodshell as rs
 from rodshell.checks import bending, bending_of
+from rodshell.checks.bending import VON_MISES, largest_stress, torsion_stress
 from rodshell.joints import Joint
-from rodshell.rods.section_stress import VON_MISES, largest_stress, torsion_stress
+from tests.checks.shells import dome
+from tests.checks.stress_twin import largest, shear_field, stresses, twisted_shells
+from tests.checks.test_bending import ROD, laid, rods_of_length
 
 STEEL = rs.Material(youngs_modulus=2e11, density=7850, poisson_ratio=0.3)
 SECTIONS = (

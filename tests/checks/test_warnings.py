@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_bending import on_circle, rods_of_length
 
 import rodshell as rs
 from rodshell.checks import Bending, Checks, bending
@@ -14,6 +13,7 @@ from rodshell.results import Results
 from rodshell.results.from_checks import checked_results
 from rodshell.results.records import PopUp, Rod
 from rodshell.results.verdict import verdict
+from tests.checks.test_bending import on_circle, rods_of_length
 
 E = 1e9
 THICKNESS = 2e-3  # radius of the rod [m]

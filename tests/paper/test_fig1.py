@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rodshell.paper import fig1
-from rodshell.paper.cases import Case
+from rodshell.paper.figure import Case
 from rodshell.targets import Hemisphere
-from tests.paper.falls import RADIUS
+from tests.formfinding.falls import RADIUS
 
 CASE = Case("a", Hemisphere(RADIUS), (9, 9), spacing=0.04, edge=0.01)
 

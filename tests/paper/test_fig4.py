@@ -11,9 +11,8 @@ import pytest
 
 import rodshell as rs
 from rodshell.paper import reserved
-from rodshell.paper.cases import ROD
-from rodshell.paper.fig4 import make
-from rodshell.paper.two_rods import LENGTH, RATE, STEP, run_in_time, run_statics
+from rodshell.paper.fig4 import LENGTH, RATE, STEP, make, run_in_time, run_statics
+from rodshell.paper.figure import ROD
 
 JOINTS = {"linker": rs.Linker(), "pin": rs.Pin(), "ball": rs.Ball(), "shear spring": rs.Spring(1e-3)}
 COUPLINGS = {"shared": rs.SharedDofs(), "implicit": rs.ImplicitPenalty(), "explicit": rs.ExplicitPenalty()}

@@ -13,12 +13,11 @@ from scipy.interpolate import CubicSpline
 
 from rodshell.formfinding.methods import Fall
 from rodshell.nets import sphere_net_end
-from rodshell.output.view import TOWARDS
+from rodshell.output.pictures import TOWARDS
 from rodshell.paper import drapes
-from rodshell.paper.cases import Case
 from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
-from rodshell.paper.plotting import standing
-from tests.paper.falls import HEMISPHERE
+from rodshell.paper.figure import Case, standing
+from tests.formfinding.falls import HEMISPHERE
 
 pytestmark = pytest.mark.slow
 

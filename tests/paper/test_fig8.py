@@ -9,9 +9,9 @@ import pytest
 
 from rodshell.joints import ExplicitPenalty
 from rodshell.paper import fig8
-from rodshell.paper.cases import Case
 from rodshell.paper.fig8 import BareSolves
-from tests.paper.falls import HEMISPHERE
+from rodshell.paper.figure import Case
+from tests.formfinding.falls import HEMISPHERE
 
 CASE = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)
 

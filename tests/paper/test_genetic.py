@@ -18,10 +18,10 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Footprint, PatchForm, find_stages
 from rodshell.formfinding.progress import silent
 from rodshell.paper import genetic, genetic_search
-from rodshell.paper.cases import CASES, Case
+from rodshell.paper.figure import CASES, Case
 from rodshell.paper.genetic_records import GAIN, WINDOW, Generation, History, gain, stored, stored_footprint
 from rodshell.paper.genetic_search import Design
-from tests.paper.falls import HEMISPHERE, PAPER_ROD
+from tests.formfinding.falls import HEMISPHERE, PAPER_ROD
 
 SMALL = Case("a", HEMISPHERE, (5, 5), spacing=0.06, edge=0.03)
 POPULATION, MOST, SEED = 6, 3, 3

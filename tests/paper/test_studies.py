@@ -10,7 +10,7 @@ import pytest
 
 from rodshell.paper import studies
 from rodshell.paper.studies import Line, Studies
-from tests.paper.falls import coarse_layout
+from tests.formfinding.falls import coarse_layout
 
 pytestmark = pytest.mark.slow
 

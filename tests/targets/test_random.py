@@ -5,7 +5,7 @@ import pytest
 
 import rodshell as rs
 from tests.acceptance.targets_random import ROD, outcome, random_case, unbalanced
-from tests.properties.altered import at_positions
+from tests.formfinding.altered import at_positions
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def test_what_has_no_net_is_shown_as_none_and_never_chosen():
     lines = found.table().splitlines()
     assert "none" in lines[2]
     assert lines[3].endswith("*")
-    with pytest.raises(rs.InputError, match="none of 1 anchors and headings will do"):
+    with pytest.raises(rs.InputError, match="none of 1 anchors and headings works"):
         search(cap, GRID, ROD, anchors=[(0.1, 0.0)], headings=[0.0])
     with pytest.raises(rs.InputError, match='objective must be "shear", "curvature" or "gap", not "size"'):
         search(cap, GRID, ROD, objective="size")  # type: ignore[arg-type]

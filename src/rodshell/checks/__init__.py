@@ -4,9 +4,8 @@ from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check
 from rodshell.checks.contact import Contact, contact_of
 from rodshell.checks.deployment import Deployment, Elsewhere, deploy
+from rodshell.checks.loads import JointLoads, Reactions, SelfWeight, joint_loads, reactions, self_weight
 from rodshell.checks.other_shapes import OtherShape, OtherShapes, other_shapes
-from rodshell.checks.self_weight import SelfWeight, self_weight
-from rodshell.checks.support_and_joint_loads import JointLoads, Reactions, joint_loads, reactions
 
 __all__ = [
     "Bending",

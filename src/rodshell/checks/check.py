@@ -1,26 +1,33 @@
-"""All checks of a popped-up shell in one call."""
+"""All checks of a shell, and the checks of several patches merged into those of one shell."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from math import inf
 from typing import Any
 
 import numpy as np
 
-from rodshell.checks.bending import Bending, bending, bending_of, shell_normals
-from rodshell.checks.contact import Contact, contact, contact_of
+from rodshell.checks.bending import VON_MISES, Bending, bending, bending_of, shell_normals
+from rodshell.checks.contact import Contact, contact, contact_of, worst_contact
 from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
+from rodshell.checks.loads import (
+    JointLoads,
+    Reactions,
+    SelfWeight,
+    joint_loads,
+    reactions,
+    self_weight,
+    unknown_weights,
+    weakest,
+)
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
-from rodshell.checks.self_weight import SelfWeight, self_weight, unknown_weights
-from rodshell.checks.support_and_joint_loads import JointLoads, Reactions, joint_loads, reactions
 from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
-from rodshell.rods.section_stress import VON_MISES
 from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.units import length_text, stress_text
@@ -149,7 +156,7 @@ class Checks:
             return ()
         return (
             f"torsion shears the rods by up to {stress_text(sheared)}, counted by von Mises as in isotropic "
-            "materials; timber and fibre composites bear less along their fibres: give checks.shear_strength",
+            "materials; timber and fibre composites withstand less shear along the fibres: give checks.shear_strength",
         )
 
 
@@ -164,7 +171,7 @@ def check(
     popped : the shells of one footprint by their end condition.
     rod : of which they are made.
     stages : of the deployment from flat of the pinned shell; 0: none.
-    shear_weight : strength over shear strength, by which torsion is added to bending, see `rods.section_stress`.
+    shear_weight : strength over shear strength, by which torsion is added to bending, see `checks.bending`.
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks that take long, and what
         was found until then is returned.
     """
@@ -196,7 +203,7 @@ def check(
 
 
 def _settled(shape: PopUp) -> PopUp:
-    """Settled once more from where the pop-up has ended: the order of equal figures depends on the last bits."""
+    """Solved again from where the pop-up ended: the order of equal figures depends on the last bits."""
     last = shape.equilibrium
     found = find_equilibrium(last.problem, last.state, last.forces)
     return replace(shape, shell=shape.shell.with_elements(found.elements), equilibrium=found)
@@ -282,4 +289,122 @@ def _deployed(last: PopUp, stages: int, progress: Progress) -> Deployment:
         last.equilibrium,
         stages=stages,
         progress=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+    )
+
+
+@dataclass(frozen=True)
+class MergedChecks(Checks):
+    """The checks of all patches together; `patches` holds those of each by its name."""
+
+    patches: Mapping[str, Checks] = field(kw_only=True)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        words = [
+            f"patch {name}: {word}"
+            for name, checks in self.patches.items()
+            for word in checks.warnings
+            if word not in (checks.out_of_time, *checks.tight)
+        ]
+        late = (self.out_of_time,) if self.out_of_time else ()
+        return (*late, *words, *self.tight)
+
+
+def merged_checks(patches: Mapping[str, Checks], contacts: Mapping[Ends, Contact]) -> MergedChecks:
+    """Checks of patches that share no rod: the results that all of them have, one patch after the other.
+
+    The deployment has the stages that every patch was followed through. Each patch carries its own weight by itself,
+    its seams being held as supports are: the smallest factor counts.
+
+    Parameters
+    ----------
+    patches : checks of each patch by its name, in the order of their meshes.
+    contacts : of all final shapes together, by end condition; during the deployment each patch is looked at by itself.
+    """
+    parts = list(patches.values())
+    ends = [end for end in parts[0].bending if all(end in part.bending for part in parts)]
+
+    def stacked(table: str) -> dict[Ends, Any]:
+        return {end: _stacked([getattr(part, table)[end] for part in parts]) for end in ends}
+
+    def known(table: str) -> list[Ends]:
+        return [end for end in ends if all(end in getattr(part, table) for part in parts)]
+
+    deployed = all(part.deployment is not None for part in parts)
+    return MergedChecks(
+        bending=stacked("bending"),
+        reactions=stacked("reactions"),
+        joints=stacked("joints"),
+        self_weight={end: weakest([part.self_weight[end] for part in parts]) for end in known("self_weight")},
+        contact={end: contacts[end] for end in ends},
+        other_shapes={end: _searched([part.other_shapes[end] for part in parts]) for end in known("other_shapes")},
+        stopped=next((part.stopped for part in parts if part.stopped), ""),
+        # the last patch lacks the most
+        missing=tuple(dict.fromkeys(word for part in reversed(parts) for word in part.missing)),
+        patches=patches,
+        **(_merged_deployment(patches) if deployed else {}),
+    )
+
+
+def _merged_deployment(patches: Mapping[str, Checks]) -> dict[str, Any]:
+    """What the checks of the deployment say, by field, at the shares that all patches reached."""
+    parts = list(patches.values())
+    ways = [part.deployment for part in parts if part.deployment is not None]
+    shares = [share for share in ways[0].share.tolist() if all(share in way.share for way in ways)]
+    rows = [[way.share.tolist().index(share) for share in shares] for way in ways]
+    contacts = {
+        name: [part.deployment_contact[row] for row in of_patch]
+        for (name, part), of_patch in zip(patches.items(), rows, strict=True)
+    }
+    return {
+        "deployment": _merged_stages(ways, rows),
+        "deployment_bending": tuple(
+            _stacked([part.deployment_bending[of_patch[k]] for part, of_patch in zip(parts, rows, strict=True)])
+            for k in range(len(shares))
+        ),
+        "deployment_contact": tuple(
+            worst_contact({name: stages[k] for name, stages in contacts.items()}) for k in range(len(shares))
+        ),
+        "clamped_from_flat": _all([part.clamped_from_flat for part in parts]),
+    }
+
+
+def _merged_stages(ways: Sequence[Deployment], rows: Sequence[list[int]]) -> Deployment:
+    """The deployments of several patches at the shares that all reached, their `rows`."""
+    lost = [way.lost_at for way in ways if way.lost_at is not None]
+    elsewhere = [way.elsewhere for way in ways if way.elsewhere is not None]
+    return Deployment(
+        share=ways[0].share[rows[0]],
+        positions=np.concatenate([way.positions[row] for way, row in zip(ways, rows, strict=True)], axis=1),
+        shells=(),
+        snaps=tuple(sorted({snap for way in ways for snap in way.snaps}, key=lambda snap: snap.start)),
+        lost_at=max(lost, default=None),
+        reached_from_flat=_all([way.reached_from_flat for way in ways]),
+        elsewhere=max(elsewhere, key=lambda shape: shape.distance, default=None),
+        guided=max((way.guided for way in ways if way.guided is not None), default=None),
+        factorizations=sum(way.factorizations for way in ways),
+    )
+
+
+def _all(answers: Sequence[bool | None]) -> bool | None:
+    """Whether all are true; None where that is not known."""
+    return False if False in answers else None if None in answers else True
+
+
+def _searched(parts: Sequence[OtherShapes]) -> OtherShapes:
+    """The searches of several patches as one: each found the other shapes of its own shell."""
+    return OtherShapes(
+        tried=sum(part.tried for part in parts),
+        popped_through=any(part.popped_through for part in parts),
+        largest_kick=max(part.largest_kick for part in parts),
+        found=tuple(shape for part in parts for shape in part.found),
+        factorizations=sum(part.factorizations for part in parts),
+    )
+
+
+def _stacked(parts: Sequence[Any]) -> Any:
+    """Records of arrays, joined array by array; None where one part has none."""
+    columns = [[getattr(part, field.name) for part in parts] for field in fields(parts[0])]
+    return type(parts[0])(
+        *(None if any(array is None for array in column) else np.concatenate(column) for column in columns)
     )

@@ -75,8 +75,8 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
         return Contact()
     sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
     parts = [_crossing_lines(mesh.grid.rods[a:b], outline) for a, b in pairwise(sizes)]
-    places = np.concatenate([state[shell.node_blocks] for shell, state in patches])
-    ends = places[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
+    positions = np.concatenate([state[shell.node_blocks] for shell, state in patches])
+    ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
     together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
     patch = np.repeat(np.arange(len(patches)), 2 * np.diff(sizes))
     together = together[patch[together[:, 0]] != patch[together[:, 1]]]
@@ -88,17 +88,17 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
     frames = [(shell, rod_frames(shell), state) for shell, state in patches]
     turned = [edge_directors(shell, frame, state) for shell, frame, state in frames if frame is not None]
     directors = np.concatenate(turned) if len(turned) == len(patches) else None
-    return contact(mesh, places, rod, directors=directors, crossings=crossings)
+    return contact(mesh, positions, rod, directors=directors, crossings=crossings)
 
 
 def contact(
-    mesh: GridMesh, places: Floats, rod: Rod, *, directors: Floats | None = None, crossings: Crossings | None = None
+    mesh: GridMesh, positions: Floats, rod: Rod, *, directors: Floats | None = None, crossings: Crossings | None = None
 ) -> Contact:
     """Contact of the rods of `mesh`.
 
     Parameters
     ----------
-    places : (k, 3) of each entry of `rod_nodes` [m].
+    positions : (k, 3) of each entry of `rod_nodes` [m].
     directors : (e, 3) first material director of each edge; without, the normal of the shell.
     crossings : where rods meet by design; without, wherever their lines cross in the flat grid.
     """
@@ -106,7 +106,7 @@ def contact(
     if outline is None:
         return Contact()
     by_design = _crossing_lines(mesh.grid.rods, outline) if crossings is None else crossings
-    edges = _Edges(mesh, places, outline, directors, by_design)
+    edges = _Edges(mesh, positions, outline, directors, by_design)
     first, second, p, q, limit = edges.near()
     gap = edges.gaps(first, second, q - p)
     counted = gap <= limit
@@ -179,7 +179,7 @@ class _Edges:
     """All edges of a shape as prisms."""
 
     def __init__(
-        self, mesh: GridMesh, places: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings
+        self, mesh: GridMesh, positions: Floats, outline: _Outline, directors: Floats | None, crossings: Crossings
     ) -> None:
         self.mesh, self.outline = mesh, outline
         rods = np.sort(crossings.rods, axis=1)
@@ -190,14 +190,14 @@ class _Edges:
         kept = (np.arange(len(rod_of)) - mesh.rod_start[rod_of]) % together == 0
         kept[mesh.rod_stop - 1] = True
         entries = np.flatnonzero(kept)
-        own = rod_of[entries[1:]] == rod_of[entries[:-1]]
-        begins, ends = entries[:-1][own], entries[1:][own]
-        self.rods, self.start, self.stop = rod_of[begins], places[begins], places[ends]
+        same_rod = rod_of[entries[1:]] == rod_of[entries[:-1]]
+        begins, ends = entries[:-1][same_rod], entries[1:][same_rod]
+        self.rods, self.start, self.stop = rod_of[begins], positions[begins], positions[ends]
         self.station = 0.5 * (mesh.stations[begins] + mesh.stations[ends])  # of the middles
         self.lengths = mesh.stations[ends] - mesh.stations[begins]
         self.tangent = unit(self.stop - self.start)
         self._directors = None if directors is None else directors[begins - self.rods]
-        self._places, self._begins = places, begins
+        self._positions, self._begins = positions, begins
 
     @cached_property
     def across(self) -> tuple[Floats, Floats]:
@@ -206,31 +206,31 @@ class _Edges:
             m1 = adapted(self._directors, self.tangent)
         else:
             nodes = np.zeros((self.mesh.node_count, 3))
-            nodes[self.mesh.rod_nodes] = self._places
+            nodes[self.mesh.rod_nodes] = self._positions
             normals = shell_normals(self.mesh, nodes)
             upright = np.broadcast_to(UP, self.start.shape)
             m1 = adapted(upright if normals is None else normals[self._begins], self.tangent)
         return m1, cross(self.tangent, m1)
 
     def candidates(self) -> tuple[Ints, Ints, Floats]:
-        """Pairs of edges that may be near, but for those that meet by design: first, second, and the gap from which
+        """Pairs of edges that may be near, except those that meet by design: first, second, and the gap from which
         they count as near [m]; crossing rods, and parts of one rod, only when they touch away from there."""
         reach = self.outline.reach
         radius = np.linalg.norm(self.stop - self.start, axis=1).max() + 2 * reach + self.outline.near
         found = cKDTree(0.5 * (self.start + self.stop)).query_pairs(radius, output_type="ndarray")
         first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
         rods = self.rods[first], self.rods[second]
-        own = rods[0] == rods[1]
-        cut = np.zeros(len(own), dtype=bool)
-        apart = np.abs(self.station[first] - self.station[second])[own]
-        between = 0.5 * (self.lengths[first] + self.lengths[second])[own]
-        cut[own] = apart - between <= np.pi * reach
-        meeting = np.zeros(len(own), dtype=bool)
+        same_rod = rods[0] == rods[1]
+        cut = np.zeros(len(same_rod), dtype=bool)
+        apart = np.abs(self.station[first] - self.station[second])[same_rod]
+        between = 0.5 * (self.lengths[first] + self.lengths[second])[same_rod]
+        cut[same_rod] = apart - between <= np.pi * reach
+        meeting = np.zeros(len(same_rod), dtype=bool)
         for pairs, crossings in self._met(*rods):
             meeting[pairs] = True
             cut[pairs] |= self._overlap(first[pairs], second[pairs], crossings)
         kept = ~cut
-        limit = np.where(meeting, -2 * SLACK * reach, np.where(own, 0.0, self.outline.near))
+        limit = np.where(meeting, -2 * SLACK * reach, np.where(same_rod, 0.0, self.outline.near))
         return first[kept], second[kept], limit[kept]
 
     def _met(self, low: Ints, high: Ints) -> Iterator[tuple[Ints, Ints]]:
@@ -278,7 +278,7 @@ class _Edges:
             (low_a, high_a), (low_b, high_b) = ((np.minimum(*pair), np.maximum(*pair)) for pair in ends)
             apart = np.maximum(low_b - high_a, low_a - high_b)
             apart -= self._half_width(first[seen], n) + self._half_width(second[seen], n)
-            # prisms that overlap are not pulled apart along their axes: rods go on past their edges
+            # prisms that overlap are not pulled apart along their axes: rods continue past their edges
             along = np.maximum(np.abs(dot(n, ta[seen])), np.abs(dot(n, tb[seen])))
             counts = (apart > 0) | (along < ACROSS) | (number == 0)
             widest[seen] = np.maximum(widest[seen], np.where(counts, apart, -np.inf))

@@ -1,6 +1,6 @@
 """Deployment: the equilibria through which a pinned shell comes from the flat grid to its final shape.
 
-The path is first followed backwards, from the popped-up shell, whose ends go on straight lines to where they lie in
+The path is first followed backwards, from the popped-up shell, whose ends move in straight lines to where they lie in
 the flat grid. So it ends in this very shell, needs no guess of the side to which the flat grid buckles, and every
 stage of it is an equilibrium of the elastic grid: nothing is interpolated between shapes. A path without a gap is the
 same in both directions. Where it has a gap, because a branch of stable equilibria ends, the directions differ, and
@@ -24,7 +24,7 @@ from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
-from rodshell.solve.path import EASY, Snap, Trace, follow, trace, unaccounted
+from rodshell.solve.path import EASY, Snap, Trace, follow, relax, trace, unaccounted
 from rodshell.solve.problem import Problem, half_width
 from rodshell.units import length_text, percent_text
 
@@ -95,11 +95,11 @@ class Deployment:
         """Sentences that a user should read."""
         words = list[str]()
         if self.snaps:
-            places = ", ".join(percent_text(snap.start) for snap in self.snaps)
-            goes_on = ", and goes on to its final shape" if self.reached_from_flat else ""
+            shares = ", ".join(percent_text(snap.start) for snap in self.snaps)
+            continues = ", and continues to its final shape" if self.reached_from_flat else ""
             words.append(
-                f"on its way from flat the shell snaps forward by itself, at {places} of the way, by up to "
-                f"{length_text(max(snap.moved for snap in self.snaps))}{goes_on}"
+                f"on its way from flat the shell snaps forward by itself, at {shares} of the way, by up to "
+                f"{length_text(max(snap.moved for snap in self.snaps))}{continues}"
             )
         if self.reached_from_flat is False:
             where = "" if self.elsewhere is None else f", {self.elsewhere.words}"
@@ -127,8 +127,8 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
     ----------
     shell : with pinned ends, its source frames being at the equilibrium.
     found : its equilibrium without loads.
-    stages : number of equilibria above the flat grid. They crowd near it, where the rise goes with the root of the
-        way.
+    stages : number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root of
+        the way.
     progress : called with each share of the way that is looked for.
 
     Returns
@@ -240,7 +240,7 @@ class _Path:
 
     def lifted(self, like: Stage, share: float) -> Equilibrium:
         """The equilibrium at a small share that is next to the flat grid lifted towards the shape of a stage, whose
-        height goes with the root of the way."""
+        height is proportional to the root of the way."""
         part, state = share / like[0], like[1].state.copy()
         way = state[self._nodes] - self._flat_nodes
         state[self._nodes] = self._flat_nodes + way * np.array([part, part, np.sqrt(part)])
@@ -250,8 +250,6 @@ class _Path:
         )
         if found.report.stable:
             return found
-        from rodshell.solve.relax import relax  # rarely wanted: imported with the dynamics only then
-
         return self._counted(relax(problem, state))
 
     def _down(self, here: Equilibrium, start: float, stop: float) -> Equilibrium | None:
@@ -286,7 +284,7 @@ class _Path:
         Shapes on a smooth path are nearly polynomials in the root of the way: Newton's method then needs about half
         of the steps that it takes from the last shape.
         """
-        last = list(takewhile(lambda one: one[1].report.iterations <= EASY, reversed(found[-DEGREE - 1 :])))
+        last = list(takewhile(lambda stage: stage[1].report.iterations <= EASY, reversed(found[-DEGREE - 1 :])))
         if len(last) < 2 or not self._smooth:
             return None
         roots, root = [np.sqrt(stage[0]) for stage in last], np.sqrt(share)
@@ -312,7 +310,7 @@ def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
 
     Returns
     -------
-    None where that could not be followed. The path goes on after a snap.
+    None where that could not be followed. The path continues after a snap.
     """
     shell, mesh = clamped.shell, clamped.footprint.mesh
     now, outward = end_directions(mesh, pinned.positions), clamped.boundary.tangents

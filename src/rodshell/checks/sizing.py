@@ -1,4 +1,4 @@
-"""A rod that fits its target: the section whose bends on the target's net a material bears."""
+"""A rod that fits its target: the section that withstands the bends of the target's net in a given material."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
+from rodshell.checks.bending import fibre_strain
 from rodshell.errors import InputError, NetLimitError
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, Tube, scaled, size_text
-from rodshell.rods.section_stress import fibre_strain
 from rodshell.targets import Target
 from rodshell.units import length_text, rounded_down
 
@@ -98,7 +98,7 @@ class Fit:
 
     @property
     def preset(self) -> PresetName:
-        """The material where none is given: of those that shells of metres are built of the one that bears the sharpest
+        """The material where none is given: of those used for shells of metres the one that withstands the sharpest
         bends; below a metre the plastic of printers."""
         return "gfrp" if self.width > WIDE else "petg"
 
@@ -125,7 +125,8 @@ class Fit:
             return Tube(self.slender, shape.thickness) if isinstance(shape, Tube) else Circle(self.slender)
         bends, allowed = self.bends(), AIM * strength / material.youngs_modulus
         stock = _sold(material, shape)
-        fitting = [one for one in stock if one.depth <= self.thickest and largest_strain(one, bends) <= allowed]
+        thin = [section for section in stock if section.depth <= self.thickest]
+        fitting = [section for section in thin if largest_strain(section, bends) <= allowed]
         if fitting:
             return fitting[-1]
         like = shape or (stock[0] if stock else Circle(self.slender))
@@ -216,7 +217,7 @@ def _of_depth(section: Section, deep: float, *, wall_stays: bool) -> Section:
         return scaled(section, deep / section.depth)
     if deep < 2 * section.thickness:
         raise InputError(
-            f"a wall of {length_text(section.thickness)}: tubes that bear the bends of this target are at most "
+            f"a wall of {length_text(section.thickness)}: tubes that withstand the bends of this target are at most "
             f"{length_text(deep)} thick: give a thinner wall, or the radius too"
         )
     return Tube(deep / 2, section.thickness)

@@ -32,7 +32,7 @@ def command(name: str, **values: Any) -> int:
     """
     output = read_output_options(values)
     case = load_case(name, overrides_of(values))
-    from rodshell.results.inputs import kept_case, read_inputs
+    from rodshell.results.archive import kept_case, read_inputs
 
     copies = kept_case(case.to_toml(), read_inputs(case.to_toml()), Path())[1]
     names = [*copies, *([SEARCH] if case.undecided else []), *_frames(case)]
@@ -54,7 +54,7 @@ def _pictures(form: "Form") -> dict[str, str]:
     """The picture of the search, if there was one."""
     if form.search is None:
         return {}
-    from rodshell.output.searchmap import search_svg
+    from rodshell.output.colour_scale import search_svg
 
     title = f"{form.search.title} by anchor and heading"
     return {SEARCH: search_svg(title, form.search.trials, form.search.best)}

@@ -48,7 +48,7 @@ class Touching:
     stuck : (k,) bool; nodes that friction holds at their position in the plane.
     """
 
-    supports: Any  # a solver's `Constraint`, which is defined above this floor
+    supports: Any  # a solver's `Constraint`; its type is defined in a package that imports this one
     free: Freedom
     nodes: Ints
     points: Floats
@@ -59,7 +59,7 @@ class Touching:
 
     @staticmethod
     def none(supports: Any, state: Floats) -> "Touching":
-        """Nothing touches.
+        """The constraint where nothing touches.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Touching:
         return self._turned[0]
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
-        """That of the supports: the planes have none."""
+        """The curvature of the supports: planes have none."""
         return np.asarray(self.supports.curvature(state, gradient))
 
     def remaining(self, state: Floats) -> Floats | None:
@@ -87,7 +87,7 @@ class Touching:
         return result
 
     def retract(self, state: Floats) -> Floats:
-        """The same: planes need no retraction."""
+        """The state itself: planes need no retraction."""
         return state
 
     @cached_property
@@ -151,7 +151,7 @@ class ModifiedMass:
         return self.stopped == "all" and not self.friction
 
     def touching(self, supports: Any, state: Floats) -> Touching:
-        """The constraint to start a step with: nothing touches, whatever touched in the step before.
+        """The constraint at the start of a step: nothing touches, whatever touched in the step before.
 
         Parameters
         ----------
@@ -163,8 +163,8 @@ class ModifiedMass:
     def below(self, state: Floats, touching: Touching) -> Touching | None:
         """The constraint with all nodes that are newly below the surface at `state`; None if there are none [HQK Eq 8].
 
-        Nodes that touch already are not tested again: above a concave surface a node on its plane is below it by the
-        square of its slide, and elsewhere by round-off (ERRATA to Algorithm 1, which could loop on them).
+        Nodes that touch already are not tested again: above a concave surface a node on its plane is below it by an
+        amount quadratic in its slide, and elsewhere by round-off (ERRATA to Algorithm 1, which could loop on them).
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class ModifiedMass:
         )
 
     def released(self, touching: Touching, reactions: Floats) -> tuple[Touching, Floats] | None:
-        """The constraint without the nodes on which friction does not suffice; None where it suffices on all.
+        """The constraint without the nodes that friction cannot hold; None where it holds all.
 
         Parameters
         ----------

@@ -71,7 +71,7 @@ class BoundToTarget:
 
 
 class _LatestSurface:
-    """Normals and curvature of a target at the latest state: a solver asks for them several times at each."""
+    """Normals and curvature of a target at the latest state: a solver needs them several times at each state."""
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -95,7 +95,7 @@ class UnilateralContact:
     target : its body, closed by the wall below its rim.
     blocks : (m, 1) nodes.
     stiffness : (m,) k [N/m].
-    multipliers : (m,) p [N]: the contact force at the solution, updated from outside.
+    multipliers : (m,) p [N]: the contact force at the solution, updated by the caller.
     """
 
     target: Target
@@ -131,7 +131,7 @@ class UnilateralContact:
         return float(np.sum((force**2 - self.multipliers**2) / (2 * self.stiffness)))
 
     def refreshed(self, state: Floats) -> Self:
-        """The same: there are no source frames."""
+        """The contact itself: there are no source frames."""
         return self
 
 

@@ -50,8 +50,8 @@ def diagonals(rods: ArrayLike, at: ArrayLike, flat: Floats, final: Floats) -> li
 def _cells(rods: Sequence[Sequence[int]], at: Floats) -> list[tuple[int, int, int, int]]:
     """The four joints of each cell, in their order around it."""
     along: dict[int, list[tuple[float, int]]] = {}
-    for joint, (pair, places) in enumerate(zip(rods, at.tolist(), strict=True)):
-        for rod, place in zip(pair, places, strict=True):
+    for joint, (pair, positions) in enumerate(zip(rods, at.tolist(), strict=True)):
+        for rod, place in zip(pair, positions, strict=True):
             along.setdefault(rod, []).append((place, joint))
     next_to: dict[tuple[int, int], list[int]] = {}  # the joints next to a joint on a rod
     for rod, on_rod in along.items():
@@ -157,8 +157,8 @@ def fabricate(
             made, pieces, nesting = longer, others, tried
     bracing: tuple[Diagonal, ...] = ()
     if final is not None:
-        places = (mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1))
-        bracing = tuple(diagonals(crossings.rods, crossings.at, *places))
+        corners = (mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1))
+        bracing = tuple(diagonals(crossings.rods, crossings.at, *corners))
     return Fabricated(
         options, cut, cut * rod.mass_per_length, layers(len(rods), crossings.rods.tolist()),
         made, pieces, nesting, bracing, warnings,

@@ -1,9 +1,9 @@
 """The bound drape: march the net, then bind the elastic grid to the target (docs/theory.md, The bound drape).
 
-Every node slides on the target without friction, rods do not stretch, and bending alone decides what the net
+Every node slides on the target without friction, rods do not stretch, and bending alone determines what the net
 leaves open: the shape of each span between its joints. No load and no stretch stiffness enter, so that the
 result does not depend on scale or material. The axes and the anchor are held, as the net holds them. The solve starts
-from the net's lines with their ends corrected, near to where the rods will lie.
+from the net's lines with their ends corrected, close to the final rods.
 """
 
 from collections.abc import Callable
@@ -27,19 +27,18 @@ from rodshell.layout.mesh import nodes_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
 from rodshell.nets.net_ends import with_apron
+from rodshell.rods.elements import Stretch
 from rodshell.rods.section import GivenSection, Rod
-from rodshell.rods.stretch import Stretch
-from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, find_equilibrium
+from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, SolveReport, find_equilibrium
 from rodshell.solve.path import going_on
 from rodshell.solve.problem import Problem
-from rodshell.solve.report import SolveReport
 from rodshell.targets import Target
 
 CLEARANCE = 0.2  # edges between a rod's end and the next joint past it
 WARN_ANGLE = 25.0  # degrees
 MOST_SOLVES = 3  # of a drape in layers; the second leaves strains of 1e-8
-PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces settle by 0.05 a step at 200 rods
-STEEP = 0.5  # rad that a line turns in its last span: from there beam theory does not hold, the rod stays on its line
+PENALTY, LEAST_PENALTY = 8e4, 4e5 / 0.15**3  # forces converge by a factor of 0.05 a step at 200 rods
+STEEP = 0.5  # rad: where a line turns by more in its last span, beam theory does not hold and its rod stays on it
 
 
 def bound_drape(
@@ -57,8 +56,8 @@ def bound_drape(
     Parameters
     ----------
     anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
-    warm_start : a grid draped before, near whose net the new one is looked for.
-    joint : whose eccentricity lays the rods in two layers, and which may hold rods against rolling.
+    warm_start : a grid draped before, whose net is the first guess of the new net.
+    joint : its eccentricity places the rods in two layers, and it may hold rods against rolling.
 
     Raises
     ------
@@ -142,15 +141,15 @@ def bound_drape(
 def _within_surface(rod: Rod) -> Rod:
     """The rod with EI2 in all directions.
 
-    Out of the surface the rods bend as it bends; free is only the bend within it, towards m2, the first director being
-    the normal. So the twist angles are left out, as for a round rod.
+    Out of the surface the rods follow its curvature; only their bending within it is free, towards m2, the first
+    director being the normal. So the twist angles are left out, as for a round rod.
     """
     within = rod.bend_stiffnesses[1]
     return Rod(GivenSection(rod.stretch_stiffness, within, within, rod.twist_stiffness))
 
 
 def _penalty(stretch: Stretch, rod: Rod, target: Target) -> Stretch:
-    """Edges whose stiffness only has to outweigh bending, which grows with the square of the size over the edge."""
+    """Edges as a penalty: stiff enough to outweigh bending, which grows with the square of the size over the edge."""
     weight = max(LEAST_PENALTY, PENALTY * (target.size / float(np.median(stretch.rest_lengths))) ** 2)
     stiffness = weight * rod.bend_stiffness / target.size**2
     return Stretch.elastic(stretch.blocks, stretch.rest_lengths, np.full(len(stretch.blocks), stiffness))
@@ -166,7 +165,7 @@ def _in_layers(
 ) -> Equilibrium:
     """Equilibrium on the target of rods that keep their lengths in their own layers.
 
-    Solved again where sideways motion turned edges towards another curvature, which changes their lengths there.
+    It is solved again where edges moved sideways to places of another curvature, which changes their lengths.
     """
     state, forces, reports = start, np.zeros(len(mesh.edges)), list[SolveReport]()
     while True:
@@ -187,7 +186,7 @@ def _in_layers(
 def _between_layers(target: Target, mesh: GridMesh, positions: Floats, eccentricity: float) -> Floats:
     """(e,) rest lengths on the target of edges whose rods lie in two layers, near `positions` (n, 3) [m].
 
-    By how much the layers' chords are longer or shorter depends on the target's curvature along them.
+    The difference in length between the layers' chords depends on the target's curvature along them.
     """
     above = 0.5 * eccentricity * np.array([1.0 if rod.family == "v" else -1.0 for rod in mesh.grid.rods])
     normal, (a, b) = target.on_surface(positions).normal, mesh.edges.T
@@ -269,7 +268,7 @@ def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
     """(n, 3) the nodes, moved sideways on the target to where rods would lie, to first order [m].
 
     A line of the net is curved up to its end, while a rod's bending moment vanishes there (the natural boundary
-    condition). The joints hardly move for it: so between them each rod differs from its line by a cubic spline that
+    condition). This hardly moves the joints: between them each rod differs from its line by a cubic spline that
     vanishes at the joints, and whose end moments cancel the line's geodesic curvature. By beam theory, to first order;
     the correction decays by the factor 2 - sqrt(3) = 0.27 from joint to joint, as cubic splines do (docs/theory.md, The
     bound drape). The axes stay: they are geodesics, and the drape holds them on their lines.

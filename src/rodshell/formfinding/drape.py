@@ -29,18 +29,18 @@ def drape(
 
     Parameters
     ----------
-    layout : the flat grid asked for.
+    layout : the flat grid.
     rod : section and material of every rod.
-    target : the surface, with its end.
+    target : the surface, and where it ends.
     method : `Bound()` marches the inextensible net and binds the grid to it; `Gravity()` lets the rods hang on the
         target (static equilibrium, frictionless unilateral contact), from flat; `Fall()` lets them fall on it in
         time, as the paper does.
     anchor : x, y of the point of the target under the layout's middle [m]; default: the target's highest point.
-    joint : what the rods do to each other where they cross; ball joints by default. With `Bound()`, whose net is a
-        matter of geometry, only its eccentricity is of effect: it lays the rods in two layers.
-    warm_start : a grid draped before. `Bound()` starts its net from the earlier one, which changes nothing but the
-        time. The others always start from flat: without friction a grid that starts where another lay may turn and
-        end elsewhere.
+    joint : the connection of rods where they cross; ball joints by default. `Bound()`, whose net is purely geometric,
+        uses its eccentricity, which places the rods in two layers, and whether it holds the rods against rolling.
+    warm_start : a grid draped before. `Bound()` starts its net from the earlier one, which saves time and gives
+        the same result. The others always start from flat: without friction a grid that starts from an earlier result
+        may turn and come to rest elsewhere.
     progress : called as progress(stage, detail, residual) at every iteration.
 
     Raises

@@ -1,6 +1,6 @@
 """The paper's pop-up: the rod ends move from G0 to G in time, and the grid comes to rest [HQK 2.2, 3.2].
 
-Implicit Euler with the coupling that is asked for, drag, and no load. Pinned ends only: the paper moves nodes.
+Implicit Euler with the chosen coupling, with drag, without load. Pinned ends only: the paper moves nodes.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,16 +19,15 @@ from rodshell.geometry.frames import dot
 from rodshell.joints import Coupling, Joint, SharedDofs
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.forces import Damping
 from rodshell.solve.implicit_euler import ImplicitEuler, Motion
 from rodshell.solve.linear_stability import step_limit
 from rodshell.solve.newton_matrix import narrow_or_dissected
-from rodshell.solve.problem import Supports
+from rodshell.solve.problem import Damping, Supports
 from rodshell.solve.simulate import Sample, simulate
 from rodshell.validation import not_negative, positive
 
-BALANCED = 1e-3  # out-of-balance force on a node, of EI over the square of the shell's half-width
-STILL = 1e-6  # kinetic energy, of the elastic energy
+BALANCED = 1e-3  # of EI over the square of the shell's half-width: out-of-balance force on a node
+STILL = 1e-6  # of the elastic energy: kinetic energy
 OF_LIMIT = 0.9  # share of the stability limit of explicit ties that is taken as time step
 CHECKS = 10  # steps between two checks whether it is at rest
 
@@ -39,11 +38,11 @@ class DynamicPopUpSettings:
 
     Parameters
     ----------
-    coupling : how the rods hold together: shared DOFs, implicit or explicit penalty [HQK 2.2].
+    coupling : of rods at their joints: shared DOFs, implicit or explicit penalty [HQK 2.2].
     time_step : [s]; with explicit ties at most nine tenths of their stability limit.
-    moving_time : in which the ends reach the boundary, on straight paths, starting and stopping smoothly [s].
+    moving_time : time in which the ends reach the boundary, on straight paths, starting and stopping smoothly [s].
     duration : longest simulated time [s]; the motion ends earlier when the grid is at rest.
-    drags : rates at which velocities decay [1/s], while the ends move and after. With less drag at the start a grid
+    drags : rates at which velocities decay [1/s], while the ends move and afterwards. With less drag at first a grid
         can swing through its plane and pop up to the other side.
 
     Raises
@@ -92,15 +91,15 @@ def dynamic_pop_up(
 ) -> DynamicPopUp:
     """Move the rod ends from the footprint to the boundary in time, pinned, from (nearly) flat.
 
-    A flat grid stays flat, in unstable equilibrium: as in `pop_up`, the start is a low arch with its ends a
-    twentieth of their way on.
+    A flat grid stays flat, in unstable equilibrium: as in `pop_up`, the motion starts from a low arch, with the ends
+    moved by a twentieth of their path.
 
     Parameters
     ----------
     footprint, boundary : where the m rods' ends are and where they go.
-    joint : what the rods do to each other where they cross; ball joints by default.
+    joint : the connection of rods where they cross; ball joints by default.
     settings : coupling, time stepping and drag.
-    progress : called as progress(stage, detail, residual), each ten steps.
+    progress : called as progress(stage, detail, residual) every ten steps.
 
     Raises
     ------
@@ -116,8 +115,8 @@ def dynamic_pop_up(
     state = shell.state(arched(footprint, flat, flat[ends], boundary))
 
     def supports(time: float) -> Supports:
-        progressed = min(1.0, time / settings.moving_time)
-        share = FIRST_RISE + (1 - FIRST_RISE) * progressed * progressed * (3 - 2 * progressed)
+        elapsed = min(1.0, time / settings.moving_time)
+        share = FIRST_RISE + (1 - FIRST_RISE) * elapsed * elapsed * (3 - 2 * elapsed)
         return Supports(shell.held_ends(), shell.ends, (1 - share) * flat[ends] + share * boundary.points)
 
     motion = Motion.of(shell, constraint=supports)
@@ -145,28 +144,28 @@ def dynamic_pop_up(
     return DynamicPopUp(shell.positions(last.state), rest)
 
 
-def _activity(shell: Shell, moment: Sample) -> tuple[float, float]:
+def _activity(shell: Shell, sample: Sample) -> tuple[float, float]:
     """Kinetic energy [J] and largest out-of-balance force on a free node [N]."""
-    force = out_of_balance(moment.motion, moment.state, np.zeros_like(moment.state))
+    force = out_of_balance(sample.motion, sample.state, np.zeros_like(sample.state))
     free = np.delete(np.arange(shell.node_count), shell.ends)
-    return moment.motion.kinetic_energy(moment.velocity), float(np.sqrt(dot(force[free], force[free]).max()))
+    return sample.motion.kinetic_energy(sample.velocity), float(np.sqrt(dot(force[free], force[free]).max()))
 
 
-def _rests(moment: Sample, energy: float, force: float, least: float) -> bool:
-    return force < least and energy < STILL * moment.motion.elastic_energy(moment.state)
+def _rests(sample: Sample, energy: float, force: float, least: float) -> bool:
+    return force < least and energy < STILL * sample.motion.elastic_energy(sample.state)
 
 
 def _stop_check(shell: Shell, moving_time: float, least: float, progress: Progress) -> Callable[[Sample], bool]:
-    """Called after each step: reports progress, and from time to time checks whether the grid is at rest."""
+    """Called after each step: reports progress, and every ten steps checks whether the grid is at rest."""
     count = 0
 
-    def stop(moment: Sample) -> bool:
+    def stop(sample: Sample) -> bool:
         nonlocal count
         count += 1
         if count % CHECKS:
             return False
-        energy, force = _activity(shell, moment)
-        progress("pop-up", f"rising, t = {moment.time:.3f} s, kinetic energy {energy:.1e} J", force)
-        return moment.time >= moving_time and _rests(moment, energy, force, least)
+        energy, force = _activity(shell, sample)
+        progress("pop-up", f"rising, t = {sample.time:.3f} s, kinetic energy {energy:.1e} J", force)
+        return sample.time >= moving_time and _rests(sample, energy, force, least)
 
     return stop

@@ -1,8 +1,8 @@
 """End matching: choose the rods of a patch such that they end where the rods of its neighbours do, at a seam.
 
 The net of a patch says which two lines run through every point of its surface. Through each point where a
-neighbour's rod ends, one of the two becomes a rod: that point's coordinate in the net is the rod's offset. Which one is
-chosen by spacing, see `choose_families`. Then the net is marched with these lines and their offsets are
+neighbour's rod ends, one of the two becomes a rod: that point's coordinate in the net is the rod's offset. Which of the
+two depends on the spacing, see `choose_families`. Then the net is marched with these lines and their offsets are
 corrected, until the rods end at their points.
 """
 
@@ -24,17 +24,17 @@ Point = tuple[float, float]
 OnSeam = Callable[[Floats], Bools]  # whether points (k, 3) of the end lie on a seam whose rods are given
 
 FAMILIES: tuple[Family, Family] = ("u", "v")
-ROUNDS = 4  # three settle
-SETTLED = 1e-7  # of the size: what a round moves a rod
-SAME = 0.03  # spacings between the offsets of two points: one rod may join them, and misses both by half
+ROUNDS = 4  # of corrections; three are enough
+SETTLED = 1e-7  # of the size: largest move of a rod in the last round
+SAME = 0.03  # spacings between the offsets of two points: a single rod may join them, and misses both by half
 CLOSE = 0.03  # spacings: an axis of the net is moved onto a rod that is closer
 ROOM = 0.7  # spacings: an axis of the net that no rod comes closer to is a rod itself
-NEAR = 0.5  # spacings between a rod's end and its point before offsets are corrected, at most
-THERE = 0.05  # spacings between them in the end, at most
-UNLIKE = 0.6  # what it costs where a rod is at right angles to the mirror image of the one that it meets
-LEAVE_OUT = 1.5  # what it costs to leave a rod out: as much as rods at 0.3 spacings, or at 3.4
-APART = 4.0  # spacings along the seam that count as one between rods: past them, rods do not crowd
-KEPT = 200  # ways of choosing that are followed at a time
+NEAR = 0.5  # spacings: largest distance between a rod's end and its point before offsets are corrected
+THERE = 0.05  # spacings: largest distance between them in the end
+UNLIKE = 0.6  # cost where a rod is at right angles to the mirror image of the one that it meets
+LEAVE_OUT = 1.5  # cost of leaving a rod out: that of rods 0.3 spacings apart, or 3.4
+APART = 4.0  # spacings along the seam that are equivalent to one spacing across rods: further apart, none crowd
+KEPT = 200  # partial choices that are kept from point to point
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class _Line:
 def match_net(
     target: Target, layout: GridLayout, anchor: Point, goals: EndGoals, *, eccentricity: float = 0.0
 ) -> MatchedNet:
-    """Choose the lines of a layout such that its rods end at the goals, one at each; some goals may stay without.
+    """Choose the lines of a layout such that its rods end at the goals, one at each; goals may remain without a rod.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _shift_onto_lines(lines: list[_Line], spacing: tuple[float, float]) -> Float
 
 
 def _filled(lines: list[_Line], family: int, spacing: tuple[float, float]) -> tuple[float, ...]:
-    """Ascending offsets of the lines of a family [m], with evenly spread ones in gaps that are too wide."""
+    """Ascending offsets of the lines of a family [m], with evenly spread offsets in gaps that are too wide."""
     offsets = sorted({line.offset for line in lines if line.family == family})
     if not offsets:
         return ()
@@ -236,7 +236,7 @@ def _filled(lines: list[_Line], family: int, spacing: tuple[float, float]) -> tu
 
 
 def _corrected(net: ChebyshevNet, lines: list[_Line], points: Floats) -> tuple[list[MatchedEnd], float]:
-    """Move the lines such that they end at the points: the rod ends before that, and the largest move [m]."""
+    """Move the lines such that they end at the points; return the rod ends before that, and the largest move [m]."""
     matched, most = list[MatchedEnd](), 0.0
     for line in lines:
         family = FAMILIES[line.family]
@@ -263,20 +263,25 @@ def rod_ends(net: ChebyshevNet, rods: Sequence[FlatRod]) -> Floats:
     return np.concatenate([np.empty((0, 3)), *ends])
 
 
-def choose_families(place: Floats, points: Floats, price: Floats, spacing: tuple[float, float]) -> Ints:
+def choose_families(coordinates: Floats, points: Floats, price: Floats, spacing: tuple[float, float]) -> Ints:
     """(n,) family of the rod at each of the points (n, 3) along a seam: 0 u, 1 v, -1 none.
 
     Rods of one family should lie neither crowded nor far apart, so the sum of the squared logarithms of the distances
-    between neighbours over the spacing is made smallest, together with the prices (n, 2) of u and v at each point: from
-    point to point, by the last rod of either family.
+    between neighbours over the spacing is minimised, plus the price of the choice at each point: by dynamic programming
+    along the seam, whose state is the last rod of either family.
 
-    place : (n, 2) u, v of the points [m]. The offset of a rod of family u is its v.
+    Parameters
+    ----------
+    coordinates : (n, 2) u, v of the points in the net [m]; the offset of a rod of family u is its v.
+    points : (n, 3) along the seam [m].
+    price : (n, 2) cost of family u and of family v at each point [-].
+    spacing : of families u and v [m].
     """
-    offset = place[:, ::-1] / np.array(spacing)
+    offset = coordinates[:, ::-1] / np.array(spacing)
     winding = _running(np.abs(np.diff(offset, axis=0)))
     run = _running(np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None])[:, 0] / (APART * max(spacing))
     best: dict[tuple[int, int], tuple[float, tuple[int, ...]]] = {(-1, -1): (0.0, ())}
-    for k in range(len(place)):
+    for k in range(len(coordinates)):
         ahead: dict[tuple[int, int], tuple[float, tuple[int, ...]]] = {}
         for last, (cost, chosen) in best.items():
             for family in (0, 1, -1):
@@ -290,7 +295,7 @@ def choose_families(place: Floats, points: Floats, price: Floats, spacing: tuple
                         more += float(np.log(apart) ** 2)
                 if cost + more < ahead.get(state, (np.inf,))[0]:
                     ahead[state] = (cost + more, (*chosen, family))
-        best = dict(sorted(ahead.items(), key=lambda one: one[1][0])[:KEPT])
+        best = dict(sorted(ahead.items(), key=lambda state: state[1][0])[:KEPT])
     return np.array(min(best.values())[1], dtype=np.intp)
 
 

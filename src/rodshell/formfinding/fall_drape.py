@@ -1,8 +1,8 @@
-"""The fall drape, which is the paper's: the grid falls on the target in time and comes to rest there [HQK section 3].
+"""The fall drape, the paper's method: the grid falls on the target in time and comes to rest there [HQK section 3].
 
 Implicit Euler, the rods tied by the coupling, contact by modified masses (`contact.modified_mass`). Nothing is
 anchored: without friction the draped state is unstable sideways, and it is reached because the fall is symmetric, or
-because touching nodes that are stopped at each step creep. How fast it would slide off is part of the result.
+because touching nodes that are stopped at each step creep. How fast it would slide away is part of the result.
 """
 
 from collections.abc import Callable
@@ -23,23 +23,23 @@ from rodshell.joints import Joint
 from rodshell.layout import GridLayout, mesh_grid
 from rodshell.model import Shell
 from rodshell.rods.section import Rod
-from rodshell.solve.forces import Damping, GravityForce
+from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.solve.implicit_euler import ContactEuler, Motion
 from rodshell.solve.linear_stability import NO_NODES, REMEDY, ExplicitTies, step_limit
 from rodshell.solve.newton_matrix import narrow_or_dissected
-from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.problem import Damping, GravityForce
 from rodshell.solve.simulate import End, Sample, TimeSeries, simulate
 from rodshell.targets import Target
 
-STILL = 1e-7  # kinetic energy, of weight times size
-BALANCED = 1e-3  # out-of-balance force on a node, of the weight of the heaviest
-USUAL_STEP = 0.01  # [s] on a target of 0.2 m; times go with the square root of lengths
+STILL = 1e-7  # of weight times size: kinetic energy
+BALANCED = 1e-3  # of the weight of the heaviest node: out-of-balance force on a node
+USUAL_STEP = 0.01  # [s] on a target of 0.2 m; times are proportional to the square root of lengths
 USUAL_DURATION = 6.0
 USUAL_SIZE = 0.2  # [m]
-OF_LIMIT = 0.9  # share of the stability limit of explicit ties, whatever touches, that is taken as time step
+OF_LIMIT = 0.9  # share of the stability limit of explicit ties, whichever nodes touch, that is taken as time step
 UNSTABLE = -1e-3  # [1/s2]: the free turn about the vertical has 0 up to round-off
 CHECKS = 10  # steps between two checks whether it is at rest
-LIMITS = 4  # such checks between two of the step limit
+LIMITS = 4  # checks for rest between two checks of the step limit
 
 
 def fall_drape(
@@ -63,7 +63,7 @@ def fall_drape(
     ------
     InputError : the anchor lies outside the target.
     StabilityError : the time step is beyond the stability limit of explicit ties, at the start or after landing.
-    ConvergenceError : the first step fails, however small. A later one ends the fall, which is then not at rest.
+    ConvergenceError : the first step fails, however small. Where a later step fails, the fall ends, not at rest.
     """
     top = anchor_point(target, anchor)
     grid = initial_grid(target, layout, anchor)
@@ -105,8 +105,8 @@ class _FallSimulation:
 
     def __init__(self, target: Target, shell: Shell, fall: Fall, progress: Progress) -> None:
         massive = np.flatnonzero(shell.like < shell.mesh.node_count)  # also the linkers' nodes, which fall and land
-        every = len(massive) == len(shell.like)  # a slice is faster
-        pull = GravityForce(slice(None) if every else massive, (0.0, 0.0, -fall.acceleration))
+        all_massive = len(massive) == len(shell.like)  # then a slice, which is faster
+        pull = GravityForce(slice(None) if all_massive else massive, (0.0, 0.0, -fall.acceleration))
         self.motion = Motion.of(shell, forces=(pull, Damping(rate=fall.drag)))
         self.target, self.shell, self.fall, self._progress = target, shell, fall, progress
         self.load = pull.held(0.0, np.zeros_like(shell.mass), np.zeros_like(shell.mass), shell.mass)
@@ -145,7 +145,7 @@ class _FallSimulation:
             return error.report  # type: ignore[return-value]
 
     def _safe_step(self, state: Floats) -> float:
-        """A step [s] below the stability limit of explicit ties, whatever touches: without rods, all nodes stopped.
+        """A step [s] below the stability limit of explicit ties, whichever nodes touch: no rods, all nodes stopped.
 
         Rods under compression, whose stiffness is negative, can lower the limit temporarily: the margin allows for it.
         """
@@ -156,33 +156,33 @@ class _FallSimulation:
         """The touching nodes that lose their whole velocity at each step."""
         return touching if self._law.stops_all else NO_NODES
 
-    def _refuse_unstable(self, moment: Sample) -> None:
+    def _refuse_unstable(self, sample: Sample) -> None:
         """Raise StabilityError where the step is beyond the limit of explicit ties with the nodes that touch now."""
-        free = self.touching.freedom(moment.state)
+        free = self.touching.freedom(sample.state)
         if self._ties is None:
-            self._ties = ExplicitTies(moment.motion, free)
-        self._ties.look(moment.motion, moment.state, free, self._stopped(self.touching.nodes))
+            self._ties = ExplicitTies(sample.motion, free)
+        self._ties.look(sample.motion, sample.state, free, self._stopped(self.touching.nodes))
         if self._ties.grows(self._step):
             raise StabilityError(
                 f"explicit ties are unstable at a time step of {self._step:.4g} s once the grid has landed: at t = "
-                f"{moment.time:.3g} s, {len(self.touching.nodes)} nodes touching, the limit is "
+                f"{sample.time:.3g} s, {len(self.touching.nodes)} nodes touching, the limit is "
                 f"{self._ties.limit():.4g} s: {REMEDY}"
             )
 
     def _stop_check(self) -> Callable[[Sample], bool]:
-        """Called after each step: reports progress, and from time to time checks whether the grid is at rest."""
+        """Called after each step: reports progress, and every ten steps checks whether the grid is at rest."""
         count = 0
 
-        def stop(moment: Sample) -> bool:
+        def stop(sample: Sample) -> bool:
             nonlocal count
             count += 1
             if count % CHECKS:
                 return False
-            if self.fall.time_step and moment.motion.explicit and count % (LIMITS * CHECKS) == 0:
-                self._refuse_unstable(moment)
-            energy, force = self.activity(moment)
-            self._energies.append((moment.time, energy))
-            where = f"falling, {100 * moment.time / self._duration:.0f} % of {self._duration:.3g} s"
+            if self.fall.time_step and sample.motion.explicit and count % (LIMITS * CHECKS) == 0:
+                self._refuse_unstable(sample)
+            energy, force = self.activity(sample)
+            self._energies.append((sample.time, energy))
+            where = f"falling, {100 * sample.time / self._duration:.0f} % of {self._duration:.3g} s"
             try:
                 self._progress("drape", f"{where}, kinetic energy {energy:.1e} J", force)
             except OutOfTimeError as error:
@@ -197,10 +197,10 @@ class _FallSimulation:
         assert self.stepper.last is not None
         return self.stepper.last  # type: ignore[return-value]
 
-    def activity(self, moment: Sample) -> tuple[float, float]:
+    def activity(self, sample: Sample) -> tuple[float, float]:
         """Kinetic energy [J] and largest out-of-balance force [N]."""
-        energy = moment.motion.kinetic_energy(moment.velocity)
-        return energy, unbalanced_force(moment.motion, moment.state, self.load, self.touching)
+        energy = sample.motion.kinetic_energy(sample.velocity)
+        return energy, unbalanced_force(sample.motion, sample.state, self.load, self.touching)
 
     def rests(self, energy: float, force: float) -> bool:
         """Whether this kinetic energy [J] and out-of-balance force [N] count as rest."""
@@ -258,6 +258,6 @@ def _warnings(rest: Rest, series: TimeSeries, simulation: _FallSimulation) -> tu
         count = sum(s < UNSTABLE for s in rest.growth)
         return (
             f"at rest, but without friction unstable sideways: {count} modes or more grow, the fastest as "
-            f"exp({rest.fastest_growth:.2g} t / s); it was reached by symmetry, or by the stopping of touching nodes",
+            f"exp({rest.fastest_growth:.2g} t / s); it was reached by symmetry, or because touching nodes are stopped",
         )
     return ()

@@ -1,11 +1,11 @@
 """The gravity drape: static equilibrium of the user's rods under their weight, in unilateral contact.
 
 From the flat grid, on nested meshes. One joint, the anchor, is held in x and y, and a neighbour keeps its heading:
-otherwise the draped grid would slide or turn off at once without friction. Even so the state may be a saddle; the
-negative modes of its exact Hessian show it. Stretch makes its footprint fall short of the inextensible net: that is
-physics, and grows with the weight over the stretch stiffness (docs/theory.md, The gravity drape).
+otherwise the draped grid would at once slide or turn away without friction. Even so the state may be a saddle; the
+negative modes of its exact Hessian show it. As the rods stretch, the footprint is smaller than that of the inextensible
+net: a physical effect, which grows with the weight over the stretch stiffness (docs/theory.md, The gravity drape).
 
-The initial placement, the flat grid over the target, and the test whether it stays there serve the fall drape, too.
+The fall drape uses the initial placement, the flat grid over the target, and the test whether it stays there, too.
 """
 
 from collections.abc import Callable
@@ -24,17 +24,16 @@ from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.model import Freedom, Shell
 from rodshell.nets import chebyshev_net
 from rodshell.rods.section import Rod
-from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
+from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
-from rodshell.solve.report import SolveReport, Status
 from rodshell.targets import Target
 
 DEPTH = 1e-5  # of the size: deepest node inside the target
 CONTACT_UPDATES = 12
 REFINE = 3.0  # edge length from level to level
-MOST_COLD, MOST_WARM = 300, 80
-OVERHANG = 4.0  # spacings that a rod of automatic length hangs over the target's end
-SLIPPED = 0.2  # of the size: distance of the heading's axis from its vertical plane at which the grid is lost
+MOST_COLD, MOST_WARM = 300, 80  # iterations from the flat grid, and from the coarser level
+OVERHANG = 4.0  # spacings by which a rod of automatic length extends past the target's end
+SLIPPED = 0.2  # of the size: distance of the heading's axis from its vertical plane at which the grid has lost contact
 
 
 def gravity_drape(
@@ -47,7 +46,7 @@ def gravity_drape(
     joint: Joint | None = None,
     progress: Progress = silent,
 ) -> Draped:
-    """Hang a layout on a target at rest; see `drape`.
+    """Drape a layout over a target in static equilibrium under its weight; see `drape`.
 
     Parameters
     ----------
@@ -88,7 +87,7 @@ def gravity_drape(
     if levels[-1].status is Status.CONVERGED and levels[-1].negative_modes:
         warnings.append(
             f"the draped state is a saddle or near one ({levels[-1].negative_modes} negative modes): without friction "
-            'the grid would slide off; the drape by method "bound" does not depend on this'
+            'the grid would slide away; the drape by method "bound" does not depend on this'
         )
     figures = DrapeFigures(
         max_gap=float(max(0.0, -target.contact(state).distance.min())),
@@ -221,7 +220,8 @@ def anchor_point(target: Target, anchor: tuple[float, float] | None) -> Floats:
 
 
 def initial_grid(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> FlatGrid:
-    """The layout's flat grid; rods "auto" are the lines that the net finds on the target, lengths "auto" hang over.
+    """The layout's flat grid; rods "auto" are the lines that the net finds on the target, lengths "auto" extend past
+    the target's end.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def placed_over(mesh: GridMesh, layout: GridLayout, top: Floats) -> Floats:
 
 
 def lost_contact(mesh: GridMesh, state: Floats, layout: GridLayout, top: Floats, target: Target) -> bool:
-    """Whether the grid leaves its place on the target: the rod nearest the heading's axis left its vertical plane.
+    """Whether the grid slid from its place on the target: the rod nearest the heading's axis left its vertical plane.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ from rodshell.rods.section import Circle, Ellipse, GivenSection, Rod, Tube
 from rodshell.targets import Target
 from rodshell.units import length_text
 
-THICK = 0.015  # relative difference of the layers' lengths, or
-CLOSE = 0.1  # thickness over the spacing: above either of them a warning is given
+THICK = 0.015  # relative difference of the layers' lengths above which a warning is given
+CLOSE = 0.1  # thickness over the spacing above which a warning is given
 
 
 def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
@@ -115,7 +115,7 @@ def rod_thickness(rod: Rod) -> float:
 def thickness_warnings(
     target: Target, mesh: GridMesh, positions: Floats, edges: Bools, rod: Rod, spacing: float
 ) -> tuple[str, ...]:
-    """A warning where thick rods, laid one above the other, would have other lengths than those of one surface.
+    """A warning where thick rods, laid one above the other, would differ in length from lines on one surface.
 
     Parameters
     ----------

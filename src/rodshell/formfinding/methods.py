@@ -2,7 +2,7 @@
 
 Bound     the inextensible net, to which the grid is bound: no load, no scale, no material
 Gravity   static equilibrium under the rods' weight, in frictionless unilateral contact
-Fall      the paper's: the grid falls on the target in time and comes to rest there [HQK 3]
+Fall      the paper's method: the grid falls on the target in time and comes to rest there [HQK 3]
 """
 
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDo
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.nets import ChebyshevNet
 from rodshell.rods.section import Rod
-from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.validation import choice, instance, not_negative, positive
 
@@ -38,14 +38,14 @@ METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
 @dataclass(frozen=True)
 class Bound:
-    """The grid slides on the target without friction; bending alone decides what the net leaves open."""
+    """The grid slides on the target without friction; bending alone determines what the net leaves open."""
 
     name: ClassVar[MethodName] = "bound"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gravity:
-    """The grid hangs on the target at rest, under its weight.
+    """The grid rests on the target in static equilibrium, under its weight.
 
     Parameters
     ----------
@@ -72,14 +72,14 @@ class Fall:
     ----------
     acceleration : of gravity [m/s2].
     height : of the flat grid above the target's highest point [m].
-    coupling : how the rods hold together: shared DOFs, implicit or explicit penalty [HQK 2.2].
-    time_step : [s]; default: 10 ms on a target of 0.2 m, and as the square root of its size; with explicit ties at
-        most nine tenths of their stability limit, whatever touches.
-    duration : longest simulated time [s]; default: 6 s on a target of 0.2 m, and as the square root of its size.
-    stopped : what an impact takes of a node's velocity, see `ModifiedMass`.
+    coupling : of rods at their joints: shared DOFs, implicit or explicit penalty [HQK 2.2].
+    time_step : [s]; default: 10 ms on a target of 0.2 m, in proportion to the square root of its size; with explicit
+        ties at most nine tenths of their stability limit, whichever nodes touch.
+    duration : longest simulated time [s]; default: 6 s on a target of 0.2 m, in proportion to the root of its size.
+    stopped : the part of a node's velocity that an impact removes, see `ModifiedMass`.
     friction : Coulomb's coefficient between rods and target [-].
     drag : rate at which all velocities decay [1/s].
-    stream : folder for the frames, which holds none yet, read with `TimeSeries.load`; None keeps none.
+    stream : folder for the frames, which must not contain any yet, read with `TimeSeries.load`; None keeps none.
     every : number of steps from one frame to the next.
     settle : end as soon as the grid is at rest; otherwise at the end of the duration.
 
@@ -121,7 +121,7 @@ class Fall:
 
 
 Method = Bound | Gravity | Fall
-"""One of the three."""
+"""A method of draping."""
 
 
 def require_method(value: object) -> None:
@@ -157,9 +157,9 @@ class DrapeFigures:
     contact_pulls : number of nodes on the target that it would have to pull to hold them.
     min_angle : smallest angle between two rods at a joint on the target [rad].
     min_angle_at : x, y, z of that joint [m].
-    net_deviation : (k, 2) how far past its ends in the flat grid each of the `rods` would end by this drape alone, at
-        start and end, along the rod [m]; None where both are the same.
-    strong_bending : of rods with a strong axis whose joints keep them from rolling (`Bound`); else None.
+    net_deviation : (k, 2) how far past its ends in the flat grid each of the `rods` would end if this drape placed
+        them, at start and end, along the rod [m]; None where the drape does place them.
+    strong_bending : bending of rods with a strong axis whose joints keep them from rolling (`Bound`); else None.
     """
 
     max_gap: float
@@ -182,10 +182,10 @@ class Draped:
     mesh : the whole mesh, with the lines and tails that are cut off later.
     positions : (n, 3) of its nodes [m]; of rods in two layers, of the surface between the layers.
     rods : the k rods to be built, each from end to end of the target (`Bound`), or whole (`Gravity`, `Fall`).
-    levels : report of the solve on each level of refinement, the last at the layout's own edge length.
+    levels : report of the solve on each level of refinement, the last at the layout's edge length.
     figures : how well the grid lies on the target.
     net : the net that the drape started from; None where it started from the flat grid.
-    rest : how it came to rest, where it moved in time (`Fall`); else None.
+    rest : how the motion ended (`Fall`); else None.
     warnings : sentences for the user.
     """
 
@@ -211,7 +211,7 @@ class Draped:
 
     @property
     def report(self) -> SolveReport:
-        """Of the solve at the layout's own edge length."""
+        """The report of the solve at the layout's edge length."""
         return self.levels[-1]
 
     @property
@@ -226,7 +226,7 @@ def smallest_joint_angle(mesh: GridMesh, positions: Floats, inside: Bools) -> tu
     Parameters
     ----------
     positions : (n, 3) of the mesh's nodes [m].
-    inside : (n,) which nodes' joints count.
+    inside : (n,) nodes whose joints are considered.
     """
     tangents = joint_tangents(mesh, positions)
     angle = np.arctan2(

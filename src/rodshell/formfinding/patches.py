@@ -1,5 +1,5 @@
 """Several simple gridshells joined at seams: a target is cut into patches, each is formed alone, and on the seams the
-rod ends of both sides share their places [HQK 3.4, the outlook]."""
+rod ends of both sides meet at common points [HQK 3.4, the outlook]."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -23,26 +23,26 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import GridLayout
 from rodshell.layout.mesh import SideBySide, side_by_side
 from rodshell.rods.section import Rod
-from rodshell.solve.report import SolveReport, Status
+from rodshell.solve.equilibrium import SolveReport, Status
 from rodshell.targets import Target
 from rodshell.targets.patch import Patch, Seam
 from rodshell.units import shown
 from rodshell.validation import choices_of
 
-MANY = 0.1  # of the rods: a share left out that is worth a word
-ASTRAY = 0.005  # of the size: ends that are moved further are worth a word
+MANY = 0.1  # of the rods: a larger share left out gives a warning
+ASTRAY = 0.005  # of the size: rod ends that are moved further give a warning
 GAP = 2.0  # spacings between the flat grids of neighbouring patches
 
 
 @dataclass(frozen=True)
 class PatchLayout:
-    """What a patch has of its own; None: as the others.
+    """Settings of one patch that replace those of the layout; None: as in the layout.
 
     Parameters
     ----------
     anchor : x, y of the point where its axes cross [m]; default: its middle.
-    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the whole's heading at its
-        summit, carried to the anchor.
+    rotate : angle of family u against x at the anchor, seen from above [rad]; default: the layout's heading at
+        the target's summit, transported to the anchor.
     spacing : between its rods, of families u and v [m].
     """
 
@@ -53,12 +53,12 @@ class PatchLayout:
 
 @dataclass(frozen=True)
 class MergedPopUp:
-    """The popped-up shells of all patches as one; the mechanical model is each patch's own.
+    """The popped-up shells of all patches, merged; the mechanical models stay separate.
 
     Parameters
     ----------
     positions : (n, 3) of the nodes of all patches, one after the other [m].
-    report : the figures of all solves together.
+    report : the merged report of all solves.
     """
 
     ends: Ends
@@ -77,8 +77,8 @@ class PatchedForm:
     ----------
     patch_nets, patches : of each patch by its name: its rods, and every stage of its form.
     meetings : where rods of two patches end at one point.
-    moved : of each patch how far rod ends were moved to these points [m]: what its mesh missed them by.
-    ends : the end conditions asked for.
+    moved : of each patch the largest distance between a rod end of its mesh and that point, to which it was moved [m].
+    ends : the requested end conditions.
     """
 
     target: Target
@@ -109,8 +109,8 @@ class PatchedForm:
             f"patch {k}: {word}" for k, form in self.patches.items() for word in form.warnings if word not in whole
         ]
         words += [
-            f"patch {k}: rod ends were moved by up to {by:.3g} m to where they meet others: its net does not hold them "
-            "well there, another heading or anchor may"
+            f"patch {k}: rod ends were moved by up to {by:.3g} m to the points where they meet others: its net does "
+            "not reach these points well; try another heading or anchor"
             for k, by in self.moved.items()
             if by > ASTRAY * self.target.size
         ]
@@ -118,7 +118,7 @@ class PatchedForm:
         if share > MANY:
             words.append(
                 f"{100 * share:.0f} % of the rods are left out, because no rod of the next patch can meet them at a "
-                "seam: another heading may leave out fewer (layout.rotate, or seams.patches for one patch alone)"
+                "seam: another heading may leave out fewer (layout.rotate, or seams.patches for a single patch)"
             )
         return (*flat_warnings(self.draped, self.rod), *self.target.warnings, *words)
 
@@ -200,7 +200,10 @@ def find_patched_stages(
 ) -> PatchedForm:
     """Cut a target into patches, lay their rods such that they meet, and form each; see `rodshell.find_form`.
 
-    warm_start, same_drape : as of `find_stages`, patches being matched by their names.
+    Parameters
+    ----------
+    patch_layouts : settings of single patches, by name.
+    warm_start, same_drape : as in `find_stages`; patches are matched by their names.
     """
     ends = choices_of("ends", ends, ENDS)
     require_joint(joint)
@@ -212,17 +215,17 @@ def find_patched_stages(
         patch_nets, meetings = _lay(target, seams, layout, patch_layouts, joint.eccentricity, progress)
     found, moved = dict[str, PatchForm](), dict[str, float]()
     for name, patch in patch_nets.items():
-        places = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
+        end_points = {(end.rod, end.side): at.point for at in meetings for end in at.ends if end.patch == name}
 
         def patch_progress(stage: str, detail: str, residual: float, name: str = name) -> None:
             if stage == "net":
-                return  # which was laid: marched again, it is no reason to lose what is finished
+                return  # the net is known and only marched again: no reason to discard what is finished
             progress(stage, f"patch {name}, {detail}", residual)
 
         found[name] = find_stages(
             patch.patch, patch.layout, rod,
             anchor=patch.anchor, joint=joint, ends=ends, warm_start=earlier.get(name), same_drape=same_drape,
-            name=name, cut=partial(cut_with_ends, places=places), progress=patch_progress,
+            name=name, cut=partial(cut_with_ends, end_points=end_points), progress=patch_progress,
         )  # fmt: skip
         moved[name] = _moved(found[name])
     return PatchedForm(
@@ -239,11 +242,11 @@ def best_heading(
     eccentricity: float = 0.0,
     progress: Progress = silent,
 ) -> float:
-    """The heading at the target's summit [rad] that leaves out the smallest share of the rods, of a few tried.
+    """The heading at the target's summit [rad] that leaves out the smallest share of the rods; a few are tried.
 
     Raises
     ------
-    RodshellError : none will do; the reason is the first one's.
+    RodshellError : every heading fails; the error is that of the first heading.
     """
     shares, reasons = dict[float, float](), list[RodshellError]()
     for heading in HEADINGS:
@@ -259,7 +262,7 @@ def best_heading(
 
 
 def left_out(patch_nets: Mapping[str, PatchNet]) -> float:
-    """The share of the rods that is left out for want of another at a seam."""
+    """The share of the rods that is left out because no rod of the next patch meets them at a seam."""
     missing = sum(len(net.layout.left_out) for net in patch_nets.values())
     return missing / (missing + sum(len(net.rods) for net in patch_nets.values()))
 
@@ -293,23 +296,29 @@ def _layout_of(patch: Patch, layout: GridLayout, overrides: PatchLayout) -> Grid
     return replace(layout, spacing=spacing, edge=min(layout.edge, *spacing), rotate=rotate)
 
 
-def cut_with_ends(draped: Draped, places: Mapping[tuple[str, int], Floats]) -> Trimmed:
-    """The trimmed shell, some rod ends, by rod and side, put where their seams have them; ends of rods in layers over
-    or under these points."""
+def cut_with_ends(draped: Draped, end_points: Mapping[tuple[str, int], Floats]) -> Trimmed:
+    """Trim a draped grid, and move the rod ends at seams to the points where they meet others.
+
+    Parameters
+    ----------
+    draped : a grid on its patch.
+    end_points : (3,) the point of each of these ends, by rod and side [m]; the ends of rods in layers are put above or
+        below it.
+    """
     trimmed = trim(draped, fewest=FEWEST)
     mesh, positions = trimmed.mesh, trimmed.positions.copy()
     for k, rod in enumerate(mesh.grid.rods):
         for side in (0, 1):
-            if (rod.name, side) in places:
-                node, place = mesh.ends[k, side], places[rod.name, side]
-                lift = mesh.heights[node] * draped.target.on_surface(place[None]).normal[0] if mesh.layered else 0.0
-                positions[node] = place + lift
+            if (rod.name, side) in end_points:
+                node, point = mesh.ends[k, side], end_points[rod.name, side]
+                lift = mesh.heights[node] * draped.target.on_surface(point[None]).normal[0] if mesh.layered else 0.0
+                positions[node] = point + lift
     boundary = replace(trimmed.boundary, points=positions[mesh.ends.ravel()], draped=positions)
     return replace(trimmed, positions=positions, boundary=boundary)
 
 
 def _moved(form: PatchForm) -> float:
-    """How far the ends of a patch's rods were moved from where its own drape has them, at most [m]."""
+    """Largest distance by which rod ends of a patch were moved from their draped positions [m]."""
     draped, mesh = trim(form.draped, fewest=FEWEST), form.trimmed.mesh
     return float(
         np.linalg.norm(draped.positions[mesh.ends] - form.trimmed.positions[mesh.ends], axis=2).max(initial=0.0)

@@ -31,13 +31,13 @@ from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
 from rodshell.rods.section import Rod
-from rodshell.solve.report import Status
+from rodshell.solve.equilibrium import Status
 from rodshell.targets import Target
 from rodshell.units import length_text
 from rodshell.validation import choices_of
 
-STRETCHED = 0.01  # strain under the rods' weight from which the footprint is no longer that of the target
-ROLLED = pi / 4  # rad: a lath that turns by more bends about its other axis rather than its own
+STRETCHED = 0.01  # strain under the rods' weight above which a warning is given: rods are cut too short
+ROLLED = pi / 4  # rad: a lath that rotates by more bends mostly about its other axis
 LONG_TAIL = 3.0  # spacings past a rod's last joint
 
 
@@ -103,12 +103,12 @@ class PatchForm:
     Parameters
     ----------
     name : of the patch; "" where it is the only one.
-    rod, joint, ends : as they were given; `ends` are the end conditions asked for.
+    rod, joint, ends : as they were given; `ends` are the requested end conditions.
     footprint : the flat grid, ready to be cut.
     boundary : where its rod ends go.
-    popped, agreement : by end condition. What was not reached, because a stage before did not converge, is missing.
+    popped, agreement : by end condition; missing where an earlier stage did not converge.
     dropped : rods that are not built, with the reason.
-    lying : the draped grid that was cut to its target; None of a table of rods.
+    lying : the draped grid, cut to its target; None for a table of rods.
     """
 
     name: str
@@ -124,7 +124,7 @@ class PatchForm:
 
     @property
     def from_table(self) -> bool:
-        """Whether it is a table of rods, which has no target."""
+        """Whether the form is that of a table of rods, which has no target."""
         return self.lying is None
 
     @property
@@ -141,17 +141,17 @@ class PatchForm:
 
     @property
     def draped(self) -> Draped:
-        """The grid on its target, as `trimmed`."""
+        """The grid on its target; raises as `trimmed` does."""
         return self.trimmed.draped
 
     @property
     def target(self) -> Target:
-        """The shape wanted, of a patch with seams as its end; as `trimmed`."""
+        """The target, which for a patch ends at its seams; raises as `trimmed` does."""
         return self.draped.target
 
     @property
     def layout(self) -> GridLayout:
-        """The flat grid asked for, as `trimmed`."""
+        """The layout of the flat grid; raises as `trimmed` does."""
         return self.draped.layout
 
     @property
@@ -160,9 +160,9 @@ class PatchForm:
         return self.lying is not None and self.draped.report.status is Status.OUT_OF_TIME
 
     def finished_pop_ups(self, ends: Sequence[Ends]) -> dict[Ends, PopUp]:
-        """Those of the pop-ups with these ends that no time limit stopped."""
-        there = [end for end in ends if end in self.popped]
-        return {end: self.popped[end] for end in there if self.popped[end].report.status is not Status.OUT_OF_TIME}
+        """The pop-ups with these ends that were not stopped by a time limit."""
+        found = [end for end in ends if end in self.popped]
+        return {end: self.popped[end] for end in found if self.popped[end].report.status is not Status.OUT_OF_TIME}
 
     @property
     def status(self) -> str:
@@ -172,7 +172,7 @@ class PatchForm:
         if self.lying is not None and not self.draped.converged:
             sentence = self.draped.report.status.sentence
             weighed = not isinstance(self.draped.method, Bound) and "bound" not in sentence
-            other = ', or use method = "bound", which asks for no weight' if weighed else ""
+            other = ', or use method = "bound", which needs no weight' if weighed else ""
             return f"drape {sentence}{other}"
         for ends, shell in self.popped.items():
             if not shell.report.converged:
@@ -211,7 +211,7 @@ def find_stages(
     name : of the patch.
     warm_start : stages found before, from whose net and shells the new ones start.
     same_drape : whether nothing that the drape depends on has changed since: then drape and footprint of `warm_start`
-        are taken over, and so are its pop-ups with the same ends, but for what a time limit had stopped.
+        are taken over, and so are its pop-ups with the same ends, except those that a time limit stopped.
     cut : how the draped shell is trimmed.
     """
     ends = choices_of("ends", ends, ENDS)
@@ -256,12 +256,12 @@ def pop_up_stages(
     edge: float | None = None,
     progress: Progress = silent,
 ) -> PatchForm:
-    """Pop up rods given by their flat lines and the final places of their ends.
+    """Pop up rods given by their flat lines and the final positions of their ends.
 
     Parameters
     ----------
     finals : (m, 2, 3) where the two ends of each rod of `grid` go [m].
-    joint : where rods cross, without eccentricity; ball joints without.
+    joint : the connection of rods where they cross, without eccentricity; ball joints by default.
     edge : longest edge of the mesh [m]; default: a sixth of the usual distance between joints.
 
     Raises
@@ -302,7 +302,7 @@ def _spans(grid: FlatGrid) -> float:
 
 
 def _stretched(draped: Draped) -> tuple[str, ...]:
-    """Rods that hang stretch by weight over stiffness, in which their section's area cancels out."""
+    """A warning where rods stretch under their weight; in weight over stiffness the section's area cancels out."""
     strain = draped.report.max_strain
     if isinstance(draped.method, Bound) or not draped.converged or strain <= STRETCHED:
         return ()
@@ -313,7 +313,7 @@ def _stretched(draped: Draped) -> tuple[str, ...]:
 
 
 def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
-    """Rods that run far past their last joint, since crossings there lie too near to an end."""
+    """A warning where rods run far past their last joint, since crossings there lie too near to an end."""
     grid = trimmed.mesh.grid
     ends = np.array([(rod.start, rod.end) for rod in grid.rods])
     first, last = ends[:, 1].copy(), ends[:, 0].copy()
@@ -335,14 +335,14 @@ def _long_tails(trimmed: Trimmed) -> tuple[str, ...]:
 
 
 def _rolled(popped: dict[Ends, PopUp]) -> tuple[str, ...]:
-    """Laths that stand on edge on the target lie down where joints do not hold them, and are then bent the easy way."""
+    """A warning where laths on edge lie down, as joints do not hold them, and then bend about their weak axes."""
     for ends, shell in popped.items():
         angles = section_rotation(shell.shell, shell.state) if shell.report.converged else None
         if angles is not None and np.count_nonzero(angles > ROLLED) > 0.5 * len(angles):
             return (
                 f"most rods turn by more than {degrees(ROLLED):.0f} degrees about their own axes, up to "
-                f"{degrees(angles.max()):.0f} ({ends} ends), and bend the easy way, since nothing holds them: bolted "
-                'laths stay as they are laid and are stressed more; set joint.kind = "pin", or swap the width and the '
-                "height of the section",
+                f"{degrees(angles.max()):.0f} ({ends} ends), and bend about their weak axes, since nothing holds them: "
+                'bolted laths keep their orientation, with larger stresses; set joint.kind = "pin", or swap the '
+                "width and the height of the section",
             )
     return ()

@@ -25,10 +25,9 @@ from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
-from rodshell.solve.equilibrium import Equilibrium, find_stable
-from rodshell.solve.path import follow
+from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
+from rodshell.solve.path import MOST_STEPS, follow, relax
 from rodshell.solve.problem import Problem, half_width
-from rodshell.solve.report import SolveReport, Status
 from rodshell.units import length_text
 from rodshell.validation import choice, instance
 
@@ -37,18 +36,18 @@ Start = Literal["draped", "flat"]
 ENDS: tuple[Ends, ...] = get_args(Ends)
 STARTS: tuple[Start, ...] = get_args(Start)
 
-FIRST_RISE = 0.05  # share of the way that the ends go in the step that leaves the plane
-CLAMP_STEP = 0.25
-MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70, and down the energy it is a longer way
-MOST_AGAIN = 8  # iterations from the last form before starting afresh
+FIRST_RISE = 0.05  # share of the ends' paths in the step that leaves the plane
+CLAMP_STEP = 0.25  # share of the clamps' rotation in the first step
+MOST_AT_ONCE = 120  # iterations: shells that snap far take up to 70; to descend the energy takes longer
+MOST_AGAIN = 8  # iterations from an earlier pop-up, before starting from the draped state
 MODES_PER_JOINT = 0.5  # negative modes: laths end 2 to 17 % off the target from more, other shells have less than 0.2
-NEARBY = 0.1  # of the length: a state further from the guess may be another one
+NEARBY = 0.1  # of the length: a state further from the guess may be another equilibrium
 SAME_LINE = 0.25  # spacings
 
 
 @dataclass(frozen=True, eq=False)
 class PopUp:
-    """The popped-up shell, and how it was reached.
+    """The popped-up shell, and how it was found.
 
     Parameters
     ----------
@@ -107,10 +106,10 @@ def pop_up(
         directions to that of +z), then turns the clamps.
     warm_start : a shell popped up before with the same ends, for start="draped": the displacements and axial forces
         that it had on the same rods are the first guess. Where that does not lead to a stable state nearby, the
-        draped state does.
-    joint : what the rods do to each other where they cross: one for all, or one for each crossing; ball joints
-        without. Eccentric ones lay the rods in two layers: each rod begins on its own line, half of their distance
-        above or below the draped surface, and the boundary's ends lie there.
+        draped state is used.
+    joint : the connection of rods where they cross: one joint for all crossings, or a sequence with one for each;
+        ball joints by default. Eccentric joints place the rods in two layers: each rod starts on its own line, half
+        of their distance above or below the draped surface, and the boundary's ends lie there.
 
     Raises
     ------
@@ -122,7 +121,7 @@ def pop_up(
     if warm_start is not None:
         instance("warm_start", warm_start, PopUp, "what an earlier rodshell.pop_up returned")
     if warm_start is not None and start != "draped":
-        raise InputError('an earlier pop-up is a first guess for start="draped" alone: leave out warm_start, or start')
+        raise InputError('an earlier pop-up can only be used with start="draped": leave out warm_start, or start')
     if warm_start is not None and warm_start.ends != ends:
         raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {ends}: give one with the same ends")
     require_joint(joint)
@@ -131,9 +130,9 @@ def pop_up(
     apart = max((joint.eccentricity for joint in joints), default=0.0)
     if apart and not footprint.mesh.layered:
         footprint, boundary = in_layers(footprint, boundary, apart)
-    elif footprint.mesh.layered and apart != (lie := 2 * float(np.abs(footprint.mesh.heights).max(initial=0.0))):
+    elif footprint.mesh.layered and apart != (distance := 2 * float(np.abs(footprint.mesh.heights).max(initial=0.0))):
         raise InputError(
-            f"the grid's rods lie in two layers {length_text(lie)} apart, and its joints hold them "
+            f"the grid's rods lie in two layers {length_text(distance)} apart, and its joints hold them "
             f"{length_text(apart)} apart: drape it with the same joint"
         )
     stages = _Stages(footprint, boundary, rod, joint, progress)
@@ -150,7 +149,7 @@ def pop_up(
 
 @dataclass(frozen=True)
 class _Stages:
-    """The solves that a pop-up is made of."""
+    """The solves of a pop-up."""
 
     footprint: Footprint
     boundary: Boundary
@@ -183,22 +182,23 @@ class _Stages:
         return int(MODES_PER_JOINT * len(self.footprint.mesh.grid.crossings))
 
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
-        """Ends (and ghosts) held, or on their way to `goals`."""
+        """The shell with its ends (and ghost nodes) held at the boundary, or at `goals`."""
         return Problem.of_shell(shell, self.boundary.points, goals=goals)
 
     def upright(
         self, shell: Shell, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None
     ) -> Floats:
         """The state at these node positions (n, 3), the rods' first directors along the normals of the surface: those
-        (n, 3) given, or what the crossings of the rods tell of them."""
+        (n, 3) given, or those computed at the rods' crossings."""
         if normals is None and shell.angles:
             normals = node_normals(self.footprint.mesh, positions)
         return shell.state(positions, tangents, normals)
 
     def release(self, ends: Ends) -> tuple[Shell, Equilibrium]:
-        """Let go of the draped state: the ends stay, the target's forces vanish. At once, or down the energy.
+        """Release the draped state: the ends stay, the target's forces vanish.
 
-        Given up where it has more negative modes than `most_modes`.
+        In one solve, or, where that fails, by descending the energy. Abandoned where the state has more negative modes
+        than `most_modes`.
         """
         if self.boundary.draped is None:
             raise InputError('this boundary has no draped state to start from: use start="flat"')
@@ -216,21 +216,19 @@ class _Stages:
         )
         if at_once.report.stable or at_once.report.status in (Status.BUCKLED, Status.OUT_OF_TIME):
             return shell, at_once
-        from rodshell.solve.relax import MOST_STEPS, relax  # rarely wanted: imported with the dynamics only then
-
-        slid = relax(
+        relaxed = relax(
             self.problem(shell),
             state,
             progress=lambda k, step: self.progress(
-                "pop-up", f"{ends}, sliding down, step {k} of at most {MOST_STEPS}", step
+                "pop-up", f"{ends}, descending, step {k} of at most {MOST_STEPS}", step
             ),
         )
-        return shell, replace(slid, report=slid.report.after(at_once.report))
+        return shell, replace(relaxed, report=relaxed.report.after(at_once.report))
 
     def again(self, warm_start: PopUp) -> tuple[Shell, Equilibrium] | None:
-        """From the displacements that an earlier pop-up has; None where that does not lead to a stable state nearby.
+        """Start from the displacements of an earlier pop-up; None where that does not lead to a stable state nearby.
 
-        Not for rods with twist angles: these are not carried over, and without them the draped state is a better guess.
+        Not for rods with twist angles: these are not transferred, and without them the draped state is a better guess.
         """
         here, there = self.boundary.draped, warm_start.boundary.draped
         if here is None or there is None or warm_start.shell.angles:
@@ -253,7 +251,7 @@ class _Stages:
         return None if strayed or not found.report.stable else (shell, found)
 
     def rise(self) -> tuple[Shell, Equilibrium]:
-        """Pinned, from the flat grid: the ends go straight to the boundary while the grid rises."""
+        """Pop up pinned, from the flat grid: the ends move straight to the boundary while the grid rises."""
         mesh, boundary = self.footprint.mesh, self.boundary
         shell = self.shell("pinned")
         flat = laid_below(mesh, boundary.points, float(boundary.points.mean(axis=0)[2]))
@@ -268,7 +266,7 @@ class _Stages:
         return shell, found
 
     def turn_clamps(self, free: Shell, pinned: Equilibrium) -> tuple[Shell, Equilibrium]:
-        """From the pinned state, turn the end directions to those of the boundary."""
+        """Turn the end directions of the pinned state to those of the boundary."""
         mesh, outward = self.footprint.mesh, self.boundary.tangents
         shell, positions = self.shell("clamped"), free.positions(pinned.state)
         now = end_directions(mesh, positions)
@@ -304,7 +302,7 @@ def turned(now: Floats, goal: Floats, t: float) -> Floats:
 
 
 def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
-    """The flat grid turned and moved in its plane so that its rods' ends have the shortest ways to go, in the
+    """The flat grid turned and moved in its plane so that its rods' ends have the shortest paths, in the
     least-squares sense: Procrustes' problem in the plane [Schönemann 1966].
 
     Parameters
@@ -331,7 +329,7 @@ def laid_below(mesh: GridMesh, points: Floats, height: float) -> Floats:
 def arched(footprint: Footprint, flat: Floats, first: Floats, boundary: Boundary) -> Floats:
     """The flat grid raised to arches of about the rods' lengths over their ends at the first step.
 
-    A flat grid under compression is in equilibrium, only not a stable one: the arch chooses the side. A rod
+    A flat grid under compression is in unstable equilibrium: the arch chooses the side. A rod
     whose ends are to rise outwards sags; without directions all rods rise.
     """
     mesh = footprint.mesh
@@ -434,6 +432,6 @@ def _middles(shares: Floats) -> Floats:
 
 
 def _interpolated(now: Floats, before: Floats, values: Floats) -> Floats:
-    """(n, d) values at `now` (n,) by local cubics from those (m, d) at `before` (m,): by straight pieces a rod would
-    have kinks."""
+    """(n, d) values at `now` (n,) by local cubics from those (m, d) at `before` (m,): linear interpolation would
+    give rods kinks."""
     return on_curve(before, values, np.clip(now, before[0], before[-1]))

@@ -1,6 +1,6 @@
-"""How long work says where it is: stage, detail and residual, at every iteration; and how it is ended there.
+"""Progress of long work: a function that is called with stage, detail and residual at every iteration.
 
-A progress may raise: KeyboardInterrupt ends the job; OutOfTimeError ends the stage, which hands out what it has.
+It may raise: KeyboardInterrupt ends the job; OutOfTimeError ends the stage, which returns its partial result.
 """
 
 import sys
@@ -17,11 +17,11 @@ Progress = Callable[[str, str, float], None]
 
 
 def silent(stage: str, detail: str, residual: float) -> None:
-    """Says nothing."""
+    """Report nothing."""
 
 
 class Bar:
-    """A progress for scripts and notebooks: one live line on a terminal, elsewhere a line for each stage.
+    """Progress for scripts and notebooks: one live line on a terminal, elsewhere a line for each stage.
 
     `Job.run` and `find_form` enter and leave it as a context manager; without that it prints the stages.
     """
@@ -57,7 +57,7 @@ bar = Bar()
 
 
 class TimeLimit:
-    """A progress that tells another one, and raises OutOfTimeError from the first call after `seconds` on."""
+    """Progress that calls another, and raises OutOfTimeError at every call later than `seconds` [s] from now."""
 
     def __init__(self, progress: Progress, seconds: float) -> None:
         if not seconds > 0:
@@ -73,5 +73,5 @@ class TimeLimit:
 
 
 def limited(progress: Progress, seconds: float | None) -> Progress:
-    """`progress` with a time limit from now on; None: without."""
+    """`progress` with a time limit of `seconds` [s] from now; None: no limit."""
     return progress if seconds is None else TimeLimit(progress, seconds)

@@ -1,4 +1,4 @@
-"""Whether a motion has come to rest, how stable it is there, and what would bring it to rest if it has not."""
+"""Whether a motion has come to rest, how stable it is there, and what would bring it to rest otherwise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,9 +14,9 @@ from rodshell.solve.linear_stability import slowest_modes
 from rodshell.targets import Target
 
 MODES = 4
-LONGEST = 5.0  # usual durations: where a drag is enough, a fall that is longer than this is not proposed
+LONGEST = 5.0  # usual durations: a longer fall is not proposed
 CALM = 0.5  # of the usual duration, in which the proposed drag brings the grid to rest
-SPARE = 1.5  # times as long as the observed decay asks for: the slowest oscillation matters last
+SPARE = 1.5  # of the duration that the observed decay predicts: the slowest oscillation decays last
 
 Energies = Sequence[tuple[float, float]]  # times [s] and kinetic energies [J]
 
@@ -31,10 +31,10 @@ class Rest:
     time : simulated [s].
     kinetic_energy : [J].
     force_residual : largest out-of-balance force on a node, along its free directions [N].
-    joint_gap : largest distance between two rods at a joint, where a penalty lets them part [m].
+    joint_gap : largest distance between two rods at a joint, where a penalty lets them separate [m].
     growth : (k,) lowest s of K x = s M x [1/s2] with the touching nodes free in their tangent planes: a negative one
         grows as exp(sqrt(-s) t) without friction. Empty where the motion is not at rest.
-    steps, refused_steps : number of time steps taken, and of those that failed and were taken again, shorter.
+    steps, refused_steps : number of time steps taken, and of those that failed and were repeated with a shorter step.
     """
 
     at_rest: bool
@@ -109,7 +109,7 @@ def joint_gap(shell: Shell, state: Floats) -> float:
 
 
 def rest_advice(energies: Energies, still: float, force: float, usual: float, drag: float) -> str:
-    """A drag and a duration that would bring a fall to rest, as words of a sentence.
+    """A drag and a duration that would bring a fall to rest, as a part of a sentence.
 
     A drag c makes velocities decay as exp(-c t / 2) where it is far from critical, and energies as exp(-c t).
 
@@ -117,7 +117,7 @@ def rest_advice(energies: Energies, still: float, force: float, usual: float, dr
     ----------
     energies : times [s] and kinetic energies [J] of the fall that was too short.
     still : kinetic energy that counts as rest [J].
-    force : out-of-balance force over the one that counts as rest [-]; energies go with its square.
+    force : out-of-balance force over that which counts as rest [-]; energies are proportional to its square.
     usual : duration of a fall on such a target [s].
     drag : of that fall [1/s].
     """

@@ -1,6 +1,6 @@
 """Seams: the patches into which they cut a target, where the middle of each is, and the rods of all patches.
 
-The rods are chosen such that where one ends on a seam, one of the next patch does too.
+The rods are chosen such that where a rod ends on a seam, a rod of the next patch ends too.
 """
 
 from collections.abc import Mapping
@@ -20,14 +20,14 @@ from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics
 from rodshell.targets import Patch, Target
 from rodshell.targets.patch import Seam
 
-RAYS, STEPS = 240, 90  # of the look around a target, from its summit
-FAR = 3.0  # sizes that a ray runs
-BESIDE = 0.09  # of the size: points closer than this are neighbours
-AGAIN = 0.3  # of the size: points that one ray has this much further to than another has been there before
-LEAST = 0.01  # of the target: what is smaller is no patch
-DEEP = 0.05  # of the size: a middle closer to the patch's end is none
+RAYS, STEPS = 240, 90  # of the survey of a target from its summit
+FAR = 3.0  # sizes: length of a ray
+ADJACENT = 0.09  # of the size: points closer than this are neighbours
+AGAIN = 0.3  # of the size: where one ray's path to a place is longer than another's by this, it is a repeated visit
+LEAST = 0.01  # of the target's area: smaller parts are not patches
+DEEP = 0.05  # of the size: a centre of area closer to the patch's end is not used as its middle
 REMEDY = "turn the layout (layout.rotate), so that its rods cross the seams, or use a smaller spacing"
-FEWEST = 2  # joints of a rod: one that is left out takes those with it that it meets
+FEWEST = 2  # joints of a rod; fewer than elsewhere, as leaving out a rod also removes those that it meets
 SWINGS = f"it has fewer than {FEWEST} joints and would swing"
 ALONE = "it ends on a seam where no rod of the next patch can meet it"
 
@@ -39,10 +39,10 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
     ------
     InputError : the seams cut off nothing, or there are more patches than letters.
     """
-    points, areas = _look_around(target)
+    points, areas = _survey(target)
     sides = np.array([seam.distance(points) > 0 for seam in seams])  # (seams, n)
     found = list[Patch]()
-    for part in _connected(points, sides, BESIDE * target.size):
+    for part in _connected(points, sides, ADJACENT * target.size):
         if areas[part].sum() > LEAST * areas.sum():
             signs = tuple(1 if left else -1 for left in sides[:, part[0]])
             patch = Patch(whole=target, seams=seams, sides=signs, middle=(0.0, 0.0))
@@ -50,8 +50,10 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
     if len(found) < 2:
         raise InputError("the seams leave the target in one piece: draw lines that run across it in plan")
     if len(found) > len(ascii_uppercase):
-        raise InputError(f"the seams cut the target into {len(found)} patches: at most {len(ascii_uppercase)} will do")
-    coarse = 0.05 * target.size  # of middles that are equally far left, the lower one comes first
+        raise InputError(
+            f"the seams cut the target into {len(found)} patches, more than {len(ascii_uppercase)}: use fewer seams"
+        )
+    coarse = 0.05 * target.size  # of two middles that are equally far left, the lower comes first
     found.sort(key=lambda patch: (round(patch.middle[0] / coarse), patch.middle[1]))
     return dict(zip(ascii_uppercase, found, strict=False))
 
@@ -59,7 +61,7 @@ def patches_of(target: Target, seams: tuple[Seam, ...]) -> dict[str, Patch]:
 def transported_heading(target: Target, anchor: tuple[float, float], rotate: float) -> float:
     """Angle against x, seen from above [rad], of the summit's heading `rotate` where it is carried to an anchor.
 
-    By the turn that takes one normal into the other: of patches that mirror each other, so do the headings.
+    It is rotated as the surface's normal is from one point to the other: mirrored patches get mirrored headings.
     """
     points = target.lift(np.array([target.summit, anchor]))
     n, m = target.on_surface(points).normal
@@ -69,18 +71,18 @@ def transported_heading(target: Target, anchor: tuple[float, float], rotate: flo
     return float(np.arctan2(turned[1], turned[0]))
 
 
-def _look_around(target: Target) -> tuple[Floats, Floats]:
+def _survey(target: Target) -> tuple[Floats, Floats]:
     """Points (n, 3) of a target, each standing for an area (n,) [m2].
 
-    They lie on geodesic rays from the summit, which also see what overhangs. A ray that comes back from below to where
-    others have been before counts no more.
+    They lie on geodesic rays from the summit, which also reach overhanging parts. Points of a ray that comes from below
+    to where other rays have been before are dropped.
     """
     x, y = target.summit
     top = target.lift(np.array([[x, y]]))
     normal = target.on_surface(top).normal
     along = np.array([[normal[0, 2], 0.0, -normal[0, 0]]])
     along /= np.linalg.norm(along)
-    angle = 2 * np.pi * (np.arange(RAYS)[:, None] + 0.5) / RAYS  # no ray along an axis: a seam may lie there
+    angle = 2 * np.pi * (np.arange(RAYS)[:, None] + 0.5) / RAYS  # no ray runs along an axis, where a seam may lie
     directions = np.cos(angle) * along + np.sin(angle) * cross(normal, along)
     step = FAR * target.size / STEPS
     with np.errstate(all="ignore"):
@@ -90,7 +92,7 @@ def _look_around(target: Target) -> tuple[Floats, Floats]:
     known = np.isfinite(rays[..., 0]) & np.isfinite(areas)
     known[known] = target.margin(rays[known]) > 0
     points, areas, far = rays[known], areas[known], far[known]
-    first, second = _neighbours(points, BESIDE * target.size).T
+    first, second = _neighbours(points, ADJACENT * target.size).T
     again = np.zeros(len(points), dtype=bool)
     again[first] |= far[first] > far[second] + AGAIN * target.size
     again[second] |= far[second] > far[first] + AGAIN * target.size
@@ -119,7 +121,7 @@ def _connected(points: Floats, sides: Bools, reach: float) -> list[Ints]:
 def _middle(patch: Patch, points: Floats, areas: Floats) -> tuple[float, float]:
     """x, y of the patch's centre of area, put on the target; of its deepest point where that is not on the target.
 
-    The centre of a patch that goes around another lies in that one: a net may start there.
+    The centre of area of a patch that surrounds another lies in the other patch.
     """
     centre = patch.closest(np.average(points, axis=0, weights=areas)[None])
     if not (patch.whole.margin(centre)[0] > DEEP * patch.size and _from_above(patch, centre)[0]):
@@ -130,7 +132,7 @@ def _middle(patch: Patch, points: Floats, areas: Floats) -> tuple[float, float]:
 
 
 def _from_above(patch: Patch, points: Floats) -> Bools:
-    """Whether these points (n, 3) are the ones that an anchor's x, y stands for."""
+    """Whether points (n, 3) are those that their x, y as an anchor would mean: the uppermost."""
     z = patch.height_at(points[:, :2])
     return np.asarray(np.abs(z - points[:, 2]) < 1e-6 * patch.size)
 
@@ -158,7 +160,7 @@ class Meeting:
 
 @dataclass(frozen=True)
 class PatchNet:
-    """A patch with its own rods; `dropped` names those that its layout leaves out, with the reason."""
+    """A patch with its rods; `dropped` names those that its layout leaves out, with the reason."""
 
     patch: Patch
     layout: GridLayout
@@ -168,13 +170,13 @@ class PatchNet:
 
     @property
     def rods(self) -> tuple[FlatRod, ...]:
-        """Those that are to be built."""
+        """The rods that are to be built."""
         return tuple(rod for rod in self.net.rods if not rod.virtual and rod.name not in self.layout.left_out)
 
 
 @dataclass(frozen=True)
-class _Open:
-    """An end on a seam, and the sides on which the patch beyond lies; its tangent, mirrored in the seam."""
+class _OpenEnd:
+    """A rod end on a seam that no rod meets yet: the sides of the patch beyond, its tangent mirrored in the seam."""
 
     end: End
     seam: int
@@ -193,22 +195,25 @@ def lay_patches(
 ) -> tuple[dict[str, PatchNet], tuple[Meeting, ...]]:
     """The rods of each patch, in turn: each takes up the rods of those before it.
 
-    Rods that no other meets at a seam are left out, and so are those that would swing without these.
+    Rods that meet no other at a seam are left out, and so are those that would swing without them.
 
-    eccentricity : see `chebyshev_net`; at a seam it is the points between the layers that meet.
+    Parameters
+    ----------
+    patches, layouts, anchors : by the patches' names; anchors x, y [m], default the patch's middle.
+    eccentricity : see `chebyshev_net`; at a seam the points midway between the layers meet.
     """
-    patch_nets, waiting, meetings = dict[str, PatchNet](), list[_Open](), list[Meeting]()
+    patch_nets, waiting, meetings = dict[str, PatchNet](), list[_OpenEnd](), list[Meeting]()
     for name, patch in patches.items():
         progress("seams", f"laying patch {name}", 0.0)
         layout, anchor = layouts[name], anchors[name] or patch.middle
-        mine = [end for end in waiting if end.beyond == patch.sides]
+        to_meet = [end for end in waiting if end.beyond == patch.sides]
         try:
-            if mine:
-                wanted = _wanted(patch, mine, [net.patch for net in patch_nets.values()])
+            if to_meet:
+                wanted = _end_goals(patch, to_meet, [net.patch for net in patch_nets.values()])
                 found = match_net(patch, layout, anchor, wanted, eccentricity=eccentricity)
                 patch_nets[name] = PatchNet(patch, found.layout, found.anchor, found.net)
                 for met in found.matched:
-                    other = mine[met.point]
+                    other = to_meet[met.point]
                     meetings.append(Meeting(other.seam, other.point, (other.end, End(name, met.rod, met.side))))
             else:
                 net = chebyshev_net(patch, layout, anchor=anchor, eccentricity=eccentricity)
@@ -217,10 +222,10 @@ def lay_patches(
             raise type(reason)(f"patch {name}: {reason}") from None
         done = {end for meeting in meetings for end in meeting.ends}
         waiting = [end for end in (*waiting, *_ends_on_seams(name, patch_nets[name])) if end.end not in done]
-    return _without_lonely(patch_nets, {end.end for end in waiting}, meetings)
+    return _without_unmatched(patch_nets, {end.end for end in waiting}, meetings)
 
 
-def _wanted(patch: Patch, ends: list[_Open], others: list[Patch]) -> EndGoals:
+def _end_goals(patch: Patch, ends: list[_OpenEnd], others: list[Patch]) -> EndGoals:
     """Where a patch's rods should end: at these ends of the others' rods."""
     taken = [k for k in range(len(patch.seams)) if any(_across(patch, k) == other.sides for other in others)]
     points = np.array([end.point for end in ends])
@@ -239,13 +244,13 @@ def _in_order(meetings: list[Meeting]) -> tuple[Meeting, ...]:
 
 
 def _rows(seams: Ints, points: Floats) -> list[Ints]:
-    """Indices of the points (n, 3) on each of the seams (n,) that there are, in their order along it."""
+    """Indices of the points (n, 3) on each seam, in their order along it; `seams` (n,) is the seam of each point."""
     here = [np.flatnonzero(seams == seam) for seam in np.unique(seams)]
     return [row[in_a_row(points[row])] for row in here]
 
 
 def in_a_row(points: Floats) -> Ints:
-    """The order (n,) of points (n, 3) along a curve through them, from one of its ends: that of their shortest tree."""
+    """The order (n,) of points (n, 3) along a curve through them, from one end, by their minimum spanning tree."""
     from scipy.sparse.csgraph import minimum_spanning_tree, shortest_path
     from scipy.spatial.distance import cdist
 
@@ -265,7 +270,7 @@ def _cut_by(patch: Patch, points: Floats) -> Ints:
     return np.asarray(np.argmin(np.abs(off), axis=0) - 1)
 
 
-def _ends_on_seams(name: str, grid: PatchNet) -> list[_Open]:
+def _ends_on_seams(name: str, grid: PatchNet) -> list[_OpenEnd]:
     """The ends of a patch's rods that a seam cuts off, at their points of the seam."""
     patch, rods = grid.patch, grid.rods
     points = rod_ends(grid.net, rods)
@@ -279,15 +284,15 @@ def _ends_on_seams(name: str, grid: PatchNet) -> list[_Open]:
         out = unit(points[k] - grid.net.positions(rod, np.array([at]))[0])
         across = patch.across(on_seam, seam)
         mirrored = out - 2 * (out @ across) * across
-        result.append(_Open(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, mirrored))
+        result.append(_OpenEnd(End(name, rod.name, k % 2), seam, _across(patch, seam), on_seam, mirrored))
     return result
 
 
-def _without_lonely(
-    patch_nets: dict[str, PatchNet], lonely: set[End], meetings: list[Meeting]
+def _without_unmatched(
+    patch_nets: dict[str, PatchNet], unmatched: set[End], meetings: list[Meeting]
 ) -> tuple[dict[str, PatchNet], tuple[Meeting, ...]]:
-    """Leave out rods with a lonely end, rods that would swing, and those that they met, until all is in order."""
-    out = {(end.patch, end.rod): ALONE for end in sorted(lonely)}
+    """Leave out rods with a unmatched end, rods that would swing, and those that they met, until all is in order."""
+    out = {(end.patch, end.rod): ALONE for end in sorted(unmatched)}
     while True:
         before = len(out)
         for name, net in patch_nets.items():

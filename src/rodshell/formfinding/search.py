@@ -1,4 +1,4 @@
-"""Where to put the anchor and which way to head: a coarse search, shown whole so that the user may differ."""
+"""A coarse search for the anchor and the heading; all trials are shown, so that the user can choose another."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -25,13 +25,13 @@ HEADINGS = tuple(k * pi / 12 for k in range(6))  # a grid looks the same after a
 ASIDE = 0.4  # of the size: anchors tried around the default one
 COARSE = 4  # spacings from the target's middle to its edge
 DEEP = 0.15  # of the size: anchors closer to the end leave half of an axis outside
-EQUAL = 1.01  # a coarse search tells no finer differences
+EQUAL = 1.01  # ratio of values that count as equal: a coarse search does not resolve finer differences
 UNITS: dict[Objective, str] = {"shear": "deg", "curvature": "1/m", "gap": "of the size"}
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One anchor [m] and heading [rad]: its value, infinite where it fails, and the reason then."""
+    """One anchor [m] and heading [rad]: its value, infinite where it fails, and the reason of the failure."""
 
     anchor: Point
     heading: float
@@ -48,7 +48,7 @@ class Search:
 
     @property
     def best(self) -> Trial:
-        """The first that is as good as the best: the default comes first."""
+        """The first trial that is as good as the best: the default comes first."""
         least = min(trial.value for trial in self.trials)
         return next(trial for trial in self.trials if trial.value <= least * EQUAL)
 
@@ -115,7 +115,7 @@ def search(
         except RodshellError as reason:
             trials.append(Trial(anchor, heading, np.inf, str(reason)))
     if not any(np.isfinite(trial.value) for trial in trials):
-        raise InputError(f"none of {len(trials)} anchors and headings will do; the first: {trials[0].reason}")
+        raise InputError(f"none of {len(trials)} anchors and headings works; the first: {trials[0].reason}")
     return Search(objective, tuple(trials))
 
 
@@ -129,7 +129,7 @@ def _best_so_far(objective: Objective, trials: list[Trial]) -> str:
 
 
 def largest_curvature(net: ChebyshevNet) -> float:
-    """Of all rods on the target, by second differences [1/m]."""
+    """Largest curvature of all rods on the target, by second differences [1/m]."""
     inside = inside_nodes(net.target, net.net)
     found = 0.0
     for x, s, mask in (

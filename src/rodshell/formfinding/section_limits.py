@@ -22,7 +22,7 @@ from rodshell.targets import Target
 from rodshell.units import length_text
 
 PLANE = 1e-6  # of the extent: what files of single precision leave of a plane
-BEYOND = 0.1  # of the rods' length beyond the moment at which they buckle: below it shells settle near their targets
+BEYOND = 0.1  # share of the rods' length beyond their buckling moment; with less, shells settle near their targets
 
 
 def rise(points: Floats) -> float:
@@ -69,7 +69,7 @@ class StrongBending:
     ratio : of the larger bending stiffness to the smaller [-].
     flat : whether they lie flat, the strong axis being the surface's normal; else they stand on edge.
     curvature : about the strong axis, where the moment is largest [1/m].
-    moment : the largest moment that it takes, over that at which a rod buckles sideways between its joints [-].
+    moment : the largest moment over that at which a rod buckles sideways between its joints [-].
     beyond : share of the rods' length where the moment is beyond that [-].
     """
 
@@ -125,8 +125,8 @@ def strong_bending(target: Target, mesh: GridMesh, positions: Floats, bends: Boo
 def section_rotation(shell: Shell, state: Floats) -> Floats | None:
     """(b,) angle by which each bend's section is turned about the rod's axis out of the shell's normal [rad].
 
-    From 0 to pi/2, between the rod's first material director and the normal, both seen along the rod; None where rods
-    have no directors, because they bend alike in all directions.
+    From 0 to pi/2, between the rod's first material director and the normal, both projected along the rod; None where
+    rods have no directors, because they bend alike in all directions.
 
     Parameters
     ----------
@@ -139,12 +139,12 @@ def section_rotation(shell: Shell, state: Floats) -> Floats | None:
     bends = slice(len(mesh.bends))
     tangents, m1 = frames.source_tangents[bends, 0], frames.material_directors(state)[bends, 0]
     normals = node_normals(mesh, shell.positions(state))[mesh.bends[:, 1]]
-    seen = unit(normals - dot(normals, tangents)[:, None] * tangents)
-    return np.asarray(np.arccos(np.clip(np.abs(dot(m1, seen)), 0.0, 1.0)))
+    projected = unit(normals - dot(normals, tangents)[:, None] * tangents)
+    return np.asarray(np.arccos(np.clip(np.abs(dot(m1, projected)), 0.0, 1.0)))
 
 
 def _joint_distances(mesh: GridMesh) -> Floats:
-    """(m,) median distance of neighbouring joints of each rod [m]; 0 of a rod that has only one."""
+    """(m,) median distance of neighbouring joints of each rod [m]; 0 for a rod with a single joint."""
     crossings, result = mesh.grid.crossings, np.zeros(len(mesh.grid.rods))
     for rod in range(len(result)):
         gaps = np.diff(np.sort(crossings.at[crossings.rods == rod]))

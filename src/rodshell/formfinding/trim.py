@@ -1,4 +1,4 @@
-"""Trim what hangs over the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
+"""Trim what extends past the target's end, and map the cuts back to the flat grid [HQK section 3.2]."""
 
 from dataclasses import dataclass
 
@@ -58,12 +58,12 @@ class Footprint:
 
 @dataclass(frozen=True, eq=False)
 class Trimmed:
-    """The draped grid without what hangs over.
+    """The draped grid without its overhangs.
 
     Parameters
     ----------
-    draped : the whole of it.
-    mesh : of the trimmed rods; rods in layers have nodes of their own in it, on their own lines.
+    draped : the whole grid.
+    mesh : of the trimmed rods; rods in layers have separate nodes in it, each on its own line.
     positions : (n, 3) of its nodes [m].
     boundary : where the rods end.
     dropped : names of the rods that are left out, each with the reason.

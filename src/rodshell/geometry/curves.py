@@ -7,18 +7,18 @@ import numpy as np
 
 from rodshell.arrays import Floats
 
-TOUCH = 1e-6  # of the extent of all polylines: ends this close are one
+TOUCH = 1e-6  # of the extent of all polylines: ends this close are joined
 
 
 @nb.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
-    """Interpolate with polynomials, one for each point that is wanted.
+    """Interpolate with polynomials, one for each requested point.
 
     Parameters
     ----------
     knots : (n, p), parameters at which each polynomial is known [m].
     points : (n, p, d), its values there.
-    s : (n,) parameters wanted [m].
+    s : (n,) requested parameters [m].
 
     Returns
     -------
@@ -45,7 +45,7 @@ def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:
     ----------
     knots : (m,) ascending parameters [m].
     points : (m, 3) points of the curve there [m].
-    s : (n,) parameters wanted [m].
+    s : (n,) requested parameters [m].
 
     Returns
     -------
@@ -75,7 +75,7 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
     points : (k, m, 3) points of the lines [m]; NaN where a line is not known. Of each line the run of known points
         around `origin` is used.
     origin : index of the knot around which the lines are known.
-    s : (n,) parameters wanted [m].
+    s : (n,) requested parameters [m].
     beyond : the cubics are continued past the known points by this many steps of the knots.
 
     Returns
@@ -161,7 +161,7 @@ def join_end_to_end(strokes: Iterable[Floats]) -> list[Floats]:
 
     Returns
     -------
-    Polylines (n, 3); one that is closed ends with its first point.
+    Polylines (n, 3); a closed polyline ends with its first point.
     """
     left = list(strokes)
     if not left:

@@ -13,7 +13,7 @@ with either rod (the axes turn against the complex plane). Its energy with that 
 
     E = 1/2 k s^2 + 1/2 e.K(s) e,   K(s) = (1/K + dC)^-1,   dC = DA (exp(is) - 1) + DB (exp(-is) - 1).
 
-k and K at rest, from `joint_stiffness`, make a joint second order in the edge length and independent of the mesh. K
+k and K at rest, from `joint`, make a joint second order in the edge length and independent of the mesh. K
 contains the compliance of half an edge of either rod, which differs between the rod's axis (twist) and the direction
 across it (bend) and turns with its rod; DA and DB are the deviators of both at rest, complex numbers since they turn by
 double angles. A joint of A and B is thus also one of B and A, and as stiff when sheared as if built at that angle.

@@ -1,4 +1,4 @@
-"""Straight rods lying in a plane, where they cross, and which lies over which."""
+"""Straight rods in a plane, their crossings, and the layers in which they lie."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ class FlatRod:
 
     Rods of family "u" run along the layout's x axis at y = `offset`, rods of family "v" along y at x = `offset`, and s
     is measured from the middle of the layout. A rod of family "free" is given by its two ends, and s is measured from
-    the first.
+    its first end.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Where rods cross. Those with the same content are equal.
+    """Where rods cross. Two of these are equal if their content is.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class FlatGrid:
         return np.bincount(self.crossings.rods.ravel(), minlength=len(self.rods))
 
     def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:
-        """Remove rods repeatedly, until none is to be removed.
+        """Remove rods repeatedly, until `leave_out` marks none.
 
         Parameters
         ----------
@@ -240,10 +240,10 @@ def straight_rods(ends: ArrayLike, *, names: Sequence[str] | None = None) -> Fla
     ]
     _refuse_overlaps(rods)
     grid = FlatGrid.of(rods)
-    lonely = [rod.name for rod, count in zip(rods, grid.joint_counts(), strict=True) if count == 0]
-    if lonely:
+    isolated = [rod.name for rod, count in zip(rods, grid.joint_counts(), strict=True) if count == 0]
+    if isolated:
         raise InputError(
-            f"{len(lonely)} of {len(rods)} rods cross no other rod (the first: {lonely[0]}): "
+            f"{len(isolated)} of {len(rods)} rods cross no other rod (the first: {isolated[0]}): "
             "give rods that cross between their ends, or remove them"
         )
     return grid

@@ -14,7 +14,7 @@ from rodshell.validation import instance, number, numbers, positive
 
 Auto = Literal["auto"]
 
-EDGES_A_SPAN = 6  # edges of the mesh to a spacing, where the edge is "auto"
+EDGES_A_SPAN = 6  # edges of the mesh per spacing, where the edge is "auto"
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,7 +107,7 @@ class GridLayout:
 
         Raises
         ------
-        InputError : as of the class.
+        InputError : as `GridLayout` does.
         """
         instance("layout spacing", spacing, Real | tuple | list, "one or two lengths in m")
         pair = spacing if isinstance(spacing, tuple | list) else (spacing, spacing)
@@ -212,8 +212,8 @@ def rod_name(family: Family, index: int, count: int) -> str:
 
     Parameters
     ----------
-    family : of the rod.
-    index : of the rod in its family, from 0 on.
-    count : of rods of the family, which gives the number of digits.
+    family : the rod's family.
+    index : the rod's position in its family, from 0.
+    count : number of rods of the family, which determines the number of digits.
     """
     return f"{family.upper()}{index + 1:0{max(2, len(str(count)))}d}"

@@ -1,6 +1,6 @@
 """Nodes and edges on a flat grid: a node at every joint and rod end, and equal edges between them.
 
-Several meshed grids become one, laid out side by side.
+Several meshed grids can be merged into one, side by side.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, sides, whole_rods
 
-CROWDED = 0.01  # of the usual edge: nodes closer to an end are left out, as round-off in forces goes with its cube
+CROWDED = 0.01  # of the usual edge: nodes closer to an end are left out: round-off in forces grows as the inverse cube
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -226,17 +226,17 @@ def _fixed_points(
     once = order[np.diff(rod[order] * len(rod) + nodes[order], prepend=-1) > 0]
     rod, s = np.concatenate([rod[once], rod_of_given]), np.concatenate([s[once], added])
     nodes = np.concatenate([nodes[once], np.full(len(added), -1)])
-    turn = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(added))])  # precedence
-    order = np.lexsort((turn, s, rod))
-    rod, s, nodes, turn = rod[order], s[order], nodes[order], turn[order]
+    rank = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(added))])  # the lowest is kept
+    order = np.lexsort((rank, s, rod))
+    rod, s, nodes, rank = rod[order], s[order], nodes[order], rank[order]
     tiny = 1e-9 * np.array([rod.length for rod in grid.rods])
     near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
     group = np.cumsum(np.append(0, ~near))  # points of a rod at one place: the first is kept, and every joint
-    first = np.full(group[-1] + 1, len(turn))
-    np.minimum.at(first, group, turn)
-    out = turn > first[group]
+    first = np.full(group[-1] + 1, len(rank))
+    np.minimum.at(first, group, rank)
+    out = rank > first[group]
     joints, fresh = int(merged.max(initial=-1)) + 1, np.flatnonzero(~out & (nodes < 0))
-    nodes[fresh[np.argsort(turn[fresh])]] = joints + np.arange(len(fresh))
+    nodes[fresh[np.argsort(rank[fresh])]] = joints + np.arange(len(fresh))
     return rod[~out], s[~out], nodes[~out], joints + len(fresh)
 
 
@@ -244,7 +244,7 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     """Cut a part out of a mesh.
 
     Joints too close to an end of either rod are not made: each rod keeps its own node there, unless that would be so
-    close to the end that it makes an edge far shorter and stiffer than the others.
+    close to the end that it makes an edge far shorter and stiffer than the other edges.
 
     Parameters
     ----------
@@ -405,7 +405,7 @@ def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
 
 
 def _merged(meshes: list[GridMesh]) -> GridMesh:
-    """One mesh of several that have nothing in common."""
+    """Merge meshes that share no nodes."""
     rods = np.cumsum([0, *(len(mesh.grid.rods) for mesh in meshes)])
     nodes = np.cumsum([0, *(mesh.node_count for mesh in meshes)])
     entries = np.cumsum([0, *(len(mesh.rod_nodes) for mesh in meshes)])

@@ -22,9 +22,8 @@ from rodshell.geometry.frames import cross, unit
 from rodshell.model.assembly import Assembly, Freedom
 from rodshell.model.rod_line import Clamps, End, RodBends, RodLine, Rods
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
-from rodshell.rods.stretch import Stretch
 from rodshell.validation import brief, described, direction, finite, vector
 
 Natural = Literal["straight", "rest"] | ArrayLike

@@ -31,17 +31,15 @@ from rodshell.joints import (
     Ties,
     require_joint,
 )
-from rodshell.joints.crossings import RodNodes
-from rodshell.joints.joint_stiffness import elastic_joints, refuse_mixtures
-from rodshell.joints.linkers import Corners, LinkerBend
-from rodshell.joints.offset_tie import offset_ties
+from rodshell.joints.crossings import Corners, LinkerBend, RodNodes
+from rodshell.joints.joint import elastic_joints, refuse_mixtures
+from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
 from rodshell.rods.bend_twist import BendTwist
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend
 from rodshell.rods.section import Rod
-from rodshell.rods.stretch import Stretch
 from rodshell.validation import instance
 
 UP = (0.0, 0.0, 1.0)

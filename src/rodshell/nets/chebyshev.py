@@ -5,7 +5,7 @@ target's end and extrapolated (Richardson), so that each rod end is far more acc
 model; the difference of the two marches estimates the error. Lines of the lattice that are not built still shape the
 net: they are kept as virtual rods.
 
-On a sphere the net is known without any marching, by a similarity equation: an independent reference. The crossing
+On a sphere the net is known without marching, from a similarity equation: an independent reference. The crossing
 angle w of a net whose axes are orthogonal great circles depends on sigma = u v / R^2 alone (from Gauss's
 w_uv = -sin w / R^2): sigma f'' + f' + sin f = 0 with f(0) = pi/2, f'(0) = -1. A rod at offset c then has the geodesic
 curvature -w_u, and its Frenet equations on the sphere give its path.
@@ -38,10 +38,10 @@ if TYPE_CHECKING:  # scipy.integrate costs a third of a second, and only the ref
     from scipy.integrate._ivp.ivp import OdeResult
 
 SMALLEST_ANGLE = 10.0  # degrees: no gridshell can be built with a smaller one
-SEARCHES = (2, 4, 8)  # steps to a spacing of the march that finds the lines; more where the net itself goes further
+SEARCHES = (2, 4, 8)  # steps per spacing of the march that finds the lines; more where the net extends further
 LOOSE = 0.05  # spacings: a larger error of a rod end gives a warning
-GRAZING = 0.01  # spacings: a line that comes no further inside runs along the end, and is ignored
-LIMIT = 1.8616  # f of `crossing_angle` is 0 first at this sigma: the net of a sphere folds
+GRAZING = 0.01  # spacings: a line that is nowhere further inside than this runs along the end, and is ignored
+LIMIT = 1.8616  # sigma at which f of `crossing_angle` first becomes 0: the net of a sphere folds
 KNOWN = 1.95  # f is integrated to this sigma
 
 
@@ -189,7 +189,7 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
 
 
 def _require_room(target: Target, net: Covering, height: float) -> None:
-    """Refuse layers beyond a centre of curvature of the target."""
+    """Refuse layers that reach a centre of curvature of the target."""
     points = net.points[net.inside]
     curvature = np.abs(np.linalg.eigvalsh(target.on_surface(points).hessian)).max(axis=1)
     k = int(np.argmax(curvature))
@@ -315,7 +315,7 @@ def _name_rods(
 
 
 def _in_pieces(names: list[str]) -> str:
-    """The warning that some rods do not go from rim to rim."""
+    """The warning that some rods do not run from rim to rim."""
     return (
         f"{len(names)} rods are on the target in several pieces, each with its own ends: {', '.join(names)}; an "
         "opening where they end needs a ring that carries their reactions; where they only cross the edge twice, "

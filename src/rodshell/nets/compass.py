@@ -34,7 +34,7 @@ class Net:
     Parameters
     ----------
     u, v : (nu,), (nv,) ascending material coordinates of the net's lines, both containing 0 [m].
-    points : (nu, nv, 3) positions [m]; NaN where the march could not go.
+    points : (nu, nv, 3) positions [m]; NaN where the march found none.
     heights : of the rods of families u and v above the surface, along its normal [m].
     """
 
@@ -107,7 +107,7 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Layer:
-    """The surface parallel to a target, as far as a march needs it.
+    """The surface parallel to a target, with what a march needs of it.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # ty
 
 
 def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None) -> None:
-    """Find the unknown nodes of all four quadrants, repeatedly those whose neighbours are known.
+    """Find the unknown nodes of all four quadrants, in each pass those whose neighbours are known.
 
     If only the axes are known, these are on one anti-diagonal after the other.
 

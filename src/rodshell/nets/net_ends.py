@@ -22,7 +22,7 @@ from rodshell.nets.compass import Net
 from rodshell.targets import Target
 
 SQUARE = 5  # nodes each way
-RINGS = 2  # with one the ends are 0.5 mm off the net on a 0.2 m hemisphere at 40 mm spacing, with two 0.1 mm
+RINGS = 2  # of joints: on a 0.2 m hemisphere at 40 mm spacing the ends are 0.1 mm off the net; 0.5 mm with 1 ring
 
 
 class Cut(NamedTuple):
@@ -237,7 +237,7 @@ def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: F
     index = np.arange(len(inner))
     below, above = np.minimum(margin(outer, index), 0.0), margin(inner, index)
     tiny = 1e-15 * (np.abs(outer) + np.abs(inner))
-    side = np.zeros(len(inner))  # which end moved last: 1 the inner, -1 the outer one
+    side = np.zeros(len(inner))  # the end that moved last: 1 for the inner, -1 for the outer
     found, at = inner.copy(), inner
     for _ in range(100):
         share = above / (above - below)

@@ -1,8 +1,8 @@
 """How far a net is marched: the lines of the lattice that can touch the target, and the nodes that are needed.
 
-Needed are nodes inside the target's end and up to a margin past it: what is bound to a target continues past its end
-(`with_apron`), and a rod is cut between nodes on both sides. Which nodes these are is known beforehand from the same
-net in longer steps; the first of these nets has a few long steps only.
+These are the nodes inside the target's end and up to a margin past it: the net that is bound to a target continues past
+its end (`with_apron`), and a rod is cut between nodes on both sides. They are known beforehand from the
+same net in longer steps; the first of these nets has only a few long steps.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ from rodshell.units import length_text
 
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 STRIDE = 0.2  # of the target's size: steps of the first march
-STRIDES = 10  # of the first march, from the anchor each way
-FEWEST_STEPS = 6  # from line to line
+STRIDES = 10  # steps of the first march, from the anchor each way
+FEWEST_STEPS = 6  # from each line to the next
 MOST_NODES = 4_000_000
 
 
@@ -178,7 +178,7 @@ def find_lines(
     start : (3,) the anchor [m].
     heading : (3,) direction of the u axis there.
     near : a net that may be similar, or None.
-    parts : steps to a spacing of the march.
+    parts : steps of the march per spacing.
     heights : see `Net`.
 
     Returns
@@ -267,8 +267,8 @@ def march_lines(
     lines : see `find_lines`.
     start : (3,) the anchor [m].
     heading : (3,) direction of the u axis there.
-    every : 1 for all nodes, 2 for every second one.
-    near : one or two nets in longer steps, the finer one first.
+    every : 1 for all nodes, 2 for every second node.
+    near : one or two nets in longer steps, the finer first.
     heights : see `Net`.
     """
     u, v = (np.ascontiguousarray(nodes[::every]) for nodes in lines.nodes)
@@ -302,4 +302,4 @@ def _subdivided(offsets: Floats, edge: float) -> Floats:
     return np.append(offsets[span] + gaps[span] * along / steps[span], offsets[-1])
 
 
-SURELY = 0.96  # of the margin: two nets in different steps end a little elsewhere
+SURELY = 0.96  # of the margin: the ends of two nets in different steps differ slightly

@@ -1,4 +1,4 @@
-"""A net from one that is similar: Newton's method for all nodes together.
+"""A net from one that is similar: Newton's method for all nodes at once.
 
 The march evaluates the target at a few points at a time, from node to node. Where a similar net is known, from a
 coarser march or from an earlier form, the target is evaluated once at all nodes, and the march is repeated on its local
@@ -48,7 +48,7 @@ def march_near(
     wanted: Bools | None = None,
     heights: Heights = ON_SURFACE,
 ) -> Net:
-    """March a net as `march` does, starting from a similar one; a bad start costs time, not accuracy.
+    """March a net as `march` does, starting from a similar net; a bad guess costs time, not accuracy.
 
     Parameters
     ----------
@@ -67,16 +67,16 @@ def march_near(
 
 
 def _extrapolated(near: Net, coarser: Net, u: Floats, v: Floats) -> Net:
-    """Extrapolate the nodes of `near` to the steps of the lines u and v: errors go with the square of the step."""
-    wanted, once, twice = (
+    """Extrapolate the nodes of `near` to the steps of the lines u and v: errors are of second order in the step."""
+    requested, fine, coarse = (  # squares of the steps
         (along[-1] - along[0]) * (across[-1] - across[0]) / ((len(along) - 1) * (len(across) - 1))
         for along, across in ((u, v), (near.u, near.v), (coarser.u, coarser.v))
     )
-    if twice <= CLEARLY * once:
+    if coarse <= CLEARLY * fine:
         return near
     change = near.points - interpolated(coarser, near.u, near.v)
     change[np.isnan(change)] = 0.0
-    return Net(near.u, near.v, near.points + (once - wanted) / (twice - once) * change)
+    return Net(near.u, near.v, near.points + (fine - requested) / (coarse - fine) * change)
 
 
 def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
@@ -84,7 +84,7 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
 
     Parameters
     ----------
-    net : that is known.
+    net : the known net.
     u, v : (nu,), (nv,) material coordinates wanted [m].
 
     Returns
@@ -98,14 +98,14 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
 def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
     i0, j0 = net.origin
-    along, back, across, aback = axes(target, anchor, heading)
-    normal = cross(along, across)
+    ahead, back, left, right = axes(target, anchor, heading)
+    normal = cross(ahead, left)
     net.points[i0, j0] = anchor
     arms = (
-        (net.points[i0 + 1 :, j0], np.diff(net.u[i0:]), along),
+        (net.points[i0 + 1 :, j0], np.diff(net.u[i0:]), ahead),
         (net.points[:i0, j0][::-1], np.diff(-net.u[i0::-1]), back),
-        (net.points[i0, j0 + 1 :], np.diff(net.v[j0:]), across),
-        (net.points[i0, :j0][::-1], np.diff(-net.v[j0::-1]), aback),
+        (net.points[i0, j0 + 1 :], np.diff(net.v[j0:]), left),
+        (net.points[i0, :j0][::-1], np.diff(-net.v[j0::-1]), right),
     )
     points = np.concatenate([arm for arm, _, _ in arms])
     steps = np.concatenate([step for _, step, _ in arms])
@@ -138,7 +138,7 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
 
 
 def _layers_of_axes(target: Target, heights: Heights, middle: int, stop: int) -> tuple[tuple[Layer, slice], ...]:
-    """The layer of each axis, and which of the nodes of both axes are its own."""
+    """The layer of each axis, and the range of its nodes among those of both axes."""
     return (Layer(target, heights[0]), slice(0, middle)), (Layer(target, heights[1]), slice(middle, stop))
 
 

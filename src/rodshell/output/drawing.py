@@ -1,5 +1,6 @@
 """A drawing: paths, marks and texts on named layers, y up [mm]. DXF, SVG, PDF and PNG are written from it."""
 
+import pathlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,6 +20,13 @@ TEXT = 3.43  # mm: size of usual texts on paper, whose capitals are 2.5 mm high,
 SMALL = 0.75  # size of the smallest texts over the usual one: where capitals are 2.5 mm high, these have 1.9 mm
 LINE = 0.95  # height of a line of text over its size, a little air included,
 BELOW = 0.2  # of which this much is below its baseline
+
+# The typeface of PDF and PNG: DejaVu Sans Condensed 2.37, unchanged, under the licence in fonts/LICENSE.txt. It covers
+# Latin, Greek and Cyrillic, and is about as wide as Helvetica, in which browsers and CAD programs show the same
+# drawings. System fonts are never used, so that files are the same on every computer.
+FONTS = pathlib.Path(__file__).with_name("fonts")
+REGULAR, BOLD = (FONTS / f"DejaVuSansCondensed{weight}.ttf" for weight in ("", "-Bold"))
+CAPITAL = 0.729  # height of a capital over the text size
 
 
 @dataclass(frozen=True)

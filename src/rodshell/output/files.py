@@ -190,7 +190,7 @@ def _obj(content: Content) -> Files:
 
 
 def _gltf(content: Content) -> Files:
-    from rodshell.output.gltf import glb_bytes
+    from rodshell.output.models import glb_bytes
 
     archive = content.archive
     if archive.final and _meshed(archive):
@@ -223,8 +223,7 @@ def _rhino(content: Content) -> Files:
 
 def _png(content: Content) -> Files:
     from rodshell.output.grid import shape_names, shape_of
-    from rodshell.output.pictures import picture
-    from rodshell.output.png import drawing_png
+    from rodshell.output.pictures import drawing_png, picture
 
     archive = content.archive
     for name in shape_names(archive) if _meshed(archive) else []:
@@ -276,4 +275,4 @@ NAMES: dict[str, list[str]] = {
     "png": [f"pictures/{state}{what}.png" for state in (*SHELLS, *_STAGES) for what in ("", "-stress")],
     "report": ["report.html"],
 }  # fmt: skip
-"""Of the files of each kind: what may stand in the way of a result is asked before the work."""
+"""Of the files of each kind: names that may conflict with files of others are checked before the work."""

@@ -203,7 +203,7 @@ class Shape:
 
 
 def shape_names(archive: Archive) -> list[str]:
-    """All shapes, in the order in which they come about."""
+    """All shapes, in the order of the deployment."""
     stages = [f"{STAGE}{k}" for k in range(1, len(archive.states.get("history_share", ())) - 1)]
     states = archive.states
     return [name for name in ("flat", *stages, *SHELLS) if name.startswith(STAGE) or name in states]

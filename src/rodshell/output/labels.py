@@ -120,8 +120,8 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
     wanted = np.ones((len(rods), 2), dtype=bool) if at is None else at
     for end in (0, 1):
         for k in np.flatnonzero(wanted[:, end]).tolist():
-            places = _on_own_line(texts[k], rods[k, end], rods[k, 1 - end], size)
-            label = next((label for label in places if fits(label, size, room, rods)), None)
+            choices = _on_own_line(texts[k], rods[k, end], rods[k, 1 - end], size)
+            label = next((label for label in choices if fits(label, size, room, rods)), None)
             if label is not None:
                 placed.append(label)
                 take(label, size, room)
@@ -190,16 +190,16 @@ def thin(line: Floats, width: float) -> Floats:
     return np.array([a - side, b - side, b + side, a + side])
 
 
-def spread(places: ArrayLike, gap: float) -> Floats:
+def spread(positions: ArrayLike, gap: float) -> Floats:
     """Places (k,) next to those asked for, in the same order, at least `gap` apart: least squares.
 
     Pool adjacent violators: neighbours that are too close form a group about the mean of what they asked for.
 
     Parameters
     ----------
-    places : (k,) positions on a line; gap : least distance of neighbours.
+    positions : (k,) positions on a line; gap : least distance of neighbours.
     """
-    asked = np.asarray(places, dtype=float)
+    asked = np.asarray(positions, dtype=float)
     order = np.argsort(asked, kind="stable")
     wanted = asked[order] - gap * np.arange(len(asked))  # now they need only be ascending
     groups: list[tuple[float, int]] = []
@@ -304,23 +304,23 @@ class Callout:
     line: Floats
 
 
-def outward(places: Floats) -> Floats:
-    """(k, 2) unit normals, to the right of an outline that is walked through the places (k, 2); 0 for a single one.
+def outward(points: Floats) -> Floats:
+    """(k, 2) unit normals, to the right of an outline that is walked through the points (k, 2); 0 for a single one.
 
-    At each place across the chord of its neighbours, so that places that nearly coincide do not turn it.
+    At each place across the chord of its neighbours, so that points that nearly coincide do not turn it.
 
     Parameters
     ----------
-    places : (k, 2) along an outline, in their order.
+    points : (k, 2) along an outline, in their order.
     """
-    along = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
+    along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     return _unit(np.column_stack([along[:, 1], -along[:, 0]]))
 
 
 def callouts(
-    names: Sequence[str], places: Floats, away: Floats, text: float, room: Room, lines: Floats
+    names: Sequence[str], points: Floats, away: Floats, text: float, room: Room, lines: Floats
 ) -> list[Callout]:
-    """Names of the places (k, 2) of one outline, in the order of a walk around it; takes their room.
+    """Names of the points (k, 2) of one outline, in the order of a walk around it; takes their room.
 
     Each name has a line, next to its neighbours' lines, and stands farther along it where it would cover a text or one
     of `lines` (m, 2, 2). Where not all find room, in an opening, they are written smaller or spaced wider. A name that
@@ -333,7 +333,7 @@ def callouts(
     """
     best: _Tried | None = None
     for size, gap in ((text * share, gap) for gap in GAPS for share in CALLOUT_SIZES):
-        tried = _tried(names, places, away, size, gap, room, lines)
+        tried = _tried(names, points, away, size, gap, room, lines)
         best = tried if best is None or tried.missing < best.missing else best
         if not best.missing or (size <= text * SMALL and best.missing > MANY):
             break
@@ -341,7 +341,7 @@ def callouts(
     room.join(best.room)
     sizes = [text * share for share in CALLOUT_SIZES if text * share <= best.size]
     found = list[Callout]()
-    for label, name, place, way in zip(best.labels, names, places, away, strict=True):
+    for label, name, place, way in zip(best.labels, names, points, away, strict=True):
         if label is not None:
             found.append(Callout(label.written(best.size), np.vstack([place, label.leader(best.size)])))
         elif best.missing <= MANY:
@@ -363,11 +363,11 @@ class _Tried:
 
 
 def _tried(
-    names: Sequence[str], places: Floats, away: Floats, size: float, gap: float, room: Room, lines: Floats
+    names: Sequence[str], points: Floats, away: Floats, size: float, gap: float, room: Room, lines: Floats
 ) -> _Tried:
     taken = Room(4 * size, room)
-    starts, ways = _slots(places, away, size, gap)
-    labels = [_free(*slot, size, taken, lines) for slot in zip(names, places, starts, ways, strict=True)]
+    starts, ways = _slots(points, away, size, gap)
+    labels = [_free(*slot, size, taken, lines) for slot in zip(names, points, starts, ways, strict=True)]
     return _Tried(labels, size, taken)
 
 
@@ -383,21 +383,21 @@ def _elsewhere(
     return []
 
 
-def _slots(places: Floats, away: Floats, size: float, gap: float) -> tuple[Floats, Floats]:
+def _slots(points: Floats, away: Floats, size: float, gap: float) -> tuple[Floats, Floats]:
     """Start (k, 2) of each name's line, off the outline and apart from its neighbours', and its direction (k, 2).
 
     gap : from a name to the next, in text sizes; less if the outline is too short.
     """
     for _ in range(EVENED if gap > GAPS[0] else 0):
         away = _unit(np.roll(away, 1, axis=0) + 2 * away + np.roll(away, -1, axis=0))
-    aside = places + OFF * size * away
+    aside = points + OFF * size * away
     steps = np.linalg.norm(np.roll(aside, -1, axis=0) - aside, axis=1)  # to the next place, all around
     around = float(steps.sum())
     if around == 0:
         return aside, away
-    first = (int(np.argmax(steps)) + 1) % len(places)  # the widest gap parts the last from the first
+    first = (int(np.argmax(steps)) + 1) % len(points)  # the widest gap parts the last from the first
     at = np.roll(np.append(0.0, np.cumsum(np.roll(steps, -first))[:-1]), first)
-    widest = around / len(places)
+    widest = around / len(points)
     asked = spread(at, min(gap * size, widest))
     table = [np.interp(asked, at, column, period=around) for column in np.hstack([aside, away]).T]
     return np.column_stack(table[:2]), _unit(np.column_stack(table[2:]))

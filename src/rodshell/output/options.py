@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from rodshell.checks.bending import VON_MISES, require_known_stress
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint
 from rodshell.output.drawing import LAYERS
 from rodshell.output.dxf import FORBIDDEN
 from rodshell.rods.section import Rod
-from rodshell.rods.section_stress import VON_MISES, require_known_stress
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 MOST_STAGES = 1000

@@ -1,6 +1,6 @@
 """Sheets as one PDF at true scale, by reportlab: a millimetre of a sheet is one on paper. The same bytes each time.
 
-Texts are set in the typeface of `fonts`, of which the file holds the glyphs that it shows.
+Texts are set in the typeface of `drawing`, of which the file holds the glyphs that it shows.
 """
 
 import warnings
@@ -13,8 +13,7 @@ from math import cos, sin
 from typing import TYPE_CHECKING
 
 from rodshell.errors import OutputWarning
-from rodshell.output.drawing import LAYERS, Drawing, Mark, Path, Pen, Text
-from rodshell.output.fonts import BOLD, REGULAR
+from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Mark, Path, Pen, Text
 
 if TYPE_CHECKING:
     from reportlab.lib.colors import Color

@@ -1,17 +1,115 @@
-"""Pictures of a shape: its rods in space, near ones over far ones, coloured by gap or stress."""
+"""Pictures of a shape in space: its rods, near ones over far ones, coloured by gap or stress; as SVG and PNG.
 
+The view is axonometric: from the right, the front and above, without perspective. PNG files are drawn by aggdraw, which
+draws soft edges, and written by Pillow, as their texts are.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from io import BytesIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, length_unit, mixed, scale_of
-from rodshell.output.drawing import Drawing, Path, Pen, Pencil
+from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Path, Pen, Pencil, Text
 from rodshell.output.grid import GridRod, Shape, opens, outlines_of, rods_of, shape_of
-from rodshell.output.svg import picture_document
-from rodshell.output.view import View, ground_axes
+from rodshell.output.svg import number, picture_document
 from rodshell.results.archive import SHELLS, Archive, made_once
-from rodshell.results.wording import MINUS
+from rodshell.results.wording import MINUS, nice_ticks
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+    from PIL.ImageFont import FreeTypeFont
+
+AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(27.0)  # of the eye
+_C, _S, _CE, _SE = np.cos(AZIMUTH), np.sin(AZIMUTH), np.cos(ELEVATION), np.sin(ELEVATION)
+RIGHT = np.array([-_S, _C, 0.0])
+UP = np.array([-_SE * _C, -_SE * _S, _CE])
+TOWARDS = np.array([_CE * _C, _CE * _S, _SE])
+
+
+@dataclass(frozen=True)
+class View:
+    """A box in space [m] drawn `width` units wide.
+
+    Parameters
+    ----------
+    low, high : (3,) corners of the box [m].
+    scale : drawing units per metre.
+    shift : (2,) added to the projected coordinates, so that the box's upper left corner is (0, 0).
+    size : (2,) width and height of the drawn box.
+    """
+
+    low: Floats
+    high: Floats
+    scale: float
+    shift: Floats
+    size: Floats
+
+    @staticmethod
+    def of(points: Floats, width: float) -> "View":
+        """The view of all points (n, 3) [m] and of the ground below them."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        corners = np.array([[x, y, low[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
+        corners = np.concatenate([corners, points])
+        plane = np.column_stack([corners @ RIGHT, corners @ UP])
+        spread = np.ptp(plane, axis=0)
+        scale = width / max(spread[0], 1e-12)
+        left_top = np.array([plane[:, 0].min(), plane[:, 1].max()])
+        return View(low, high, float(scale), -scale * left_top, scale * spread)
+
+    def project(self, points: Floats) -> Floats:
+        """(n, 2) drawing coordinates, y up, of the points (n, 3) [m]."""
+        return np.asarray(self.scale * np.column_stack([points @ RIGHT, points @ UP]) + self.shift)
+
+    def depth(self, points: Floats) -> Floats:
+        """(n,) nearness of the points to the eye, 0 (far) to 1 (near)."""
+        if not len(points):
+            return np.empty(0)
+        nearness = points @ TOWARDS
+        return np.asarray((nearness - nearness.min()) / max(np.ptp(nearness), 1e-12))
+
+
+def ground_axes(pencil: Pencil, view: View, colour: str, text: float) -> None:
+    """The box's ground with millimetre ticks on its front edges, and the height on the left.
+
+    Parameters
+    ----------
+    view : of the box; colour : of lines and numbers; text : size of the numbers [drawing units].
+    """
+    (x0, y0, z0), (x1, y1, z1) = view.low, view.high
+    thin, pale = Pen(colour, 0.8), Pen(mixed(colour, "#ffffff", 0.55), 0.8)
+    corners = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])
+    pencil.line(view.project(corners), "DIM", closed=True, pen=pale)
+    span = 0.02 * max(x1 - x0, y1 - y0)
+
+    def tick(point: list[float], out: list[float], value: float) -> None:
+        """A short line outwards from `point`, and the value [m] in mm beyond it."""
+        at, off = np.array(point), np.array(out)
+        a, b, c = view.project(np.array([at, at + off, at + 2.6 * off]))
+        anchor = "end" if b[0] < a[0] - 1 else "start" if b[0] > a[0] + 1 else "middle"
+        pencil.line([a, b], "DIM", pen=thin)
+        shown = number(1e3 * value).replace("-", MINUS)
+        pencil.write(shown, c - (0, 0.35 * text), text, "DIM", anchor=anchor, colour=colour)
+
+    for value in nice_ticks(1e3 * x0, 1e3 * x1, 5):
+        tick([1e-3 * value, y0, z0], [0, -span, 0], 1e-3 * value)
+    for value in nice_ticks(1e3 * y0, 1e3 * y1, 5):
+        tick([x1, 1e-3 * value, z0], [span, 0, 0], 1e-3 * value)
+    middle = np.array([[(x0 + x1) / 2, y0 - 8 * span, z0], [x1 + 8 * span, (y0 + y1) / 2, z0]])
+    for name, at in zip("xy", view.project(middle), strict=True):
+        pencil.write(f"{name}, mm", at - (0, 0.35 * text), text, "DIM", anchor="middle", colour=colour)
+    if z1 - z0 > span:
+        foot, top = view.project(np.array([[x0, y0, z0], [x0, y0, z1]]))
+        pencil.line([foot, top], "DIM", pen=thin)
+        pencil.write("z, mm", top + (0, 0.8 * text), text, "DIM", anchor="middle", colour=colour)
+        for value in nice_ticks(1e3 * z0, 1e3 * z1, 3):
+            if value > 1e3 * (z0 + 0.05 * (z1 - z0)):
+                tick([x0, y0, 1e-3 * value], [-0.6 * span, -0.6 * span, 0], 1e-3 * value)
+
 
 Polylines = list[list[tuple[int, slice]]]
 
@@ -19,7 +117,7 @@ WIDTH = 540.0  # drawing units of the shell itself
 SIDE, TOP, BELOW, BAR = 50.0, 22.0, 40.0, 28.0  # margins; the colour bar needs more below
 PAPER, INK, SOFT, GROUND = "#fdfdfb", "#22282f", "#7b838a", "#f1efe8"
 FAMILIES = ("#1f5f8b", "#a8552a")
-LAYERS = 20  # of depth: rods of a nearer layer pass over those of a farther one,
+DEPTHS = 20  # layers of depth: rods of a nearer layer pass over those of a farther one,
 LAG = 2  # and are set off against those so many layers farther: rods that meet at a joint do not cut each other
 SEGMENTS = 14000  # pieces of rods at most, so that files stay small
 LEVEL = 0.01  # of its width: an outline that rises more is not filled, which would look like a surface
@@ -74,9 +172,9 @@ def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     ground_axes(pencil, view, SOFT, 12.5)
     _ground_curves(pencil, view, shape, rods)
     drawn = _Rods.of(archive, view, shape, scale)
-    drawn.draw(pencil, range(LAYERS // 2))
+    drawn.draw(pencil, range(DEPTHS // 2))
     _supports(pencil, view, points[ends[~front]], state, len(ends))
-    drawn.draw(pencil, range(LAYERS // 2, LAYERS))
+    drawn.draw(pencil, range(DEPTHS // 2, DEPTHS))
     _supports(pencil, view, points[ends[front]], state, len(ends))
     if colour == "gap" and shape.gap is not None and scale is not None:
         _largest(pencil, archive, shape, view)
@@ -145,7 +243,7 @@ class _Rods:
         nodes = np.concatenate([np.empty(0, dtype=np.intp), *(rod.nodes for rod in rods)])[pieces.drawn]
         nearness = view.depth(shape.positions)[nodes]
         near = 0.5 * (nearness[pieces.first] + nearness[pieces.first + 1])
-        layer = np.minimum((near * LAYERS).astype(np.intp), LAYERS - 1)
+        layer = np.minimum((near * DEPTHS).astype(np.intp), DEPTHS - 1)
         if scale is None:
             shade = np.array([rod.family == "v" for rod in rods], dtype=np.intp)[pieces.rod]
             palette, fade = list(FAMILIES), 0.0 if shape.flat else FADE
@@ -160,7 +258,7 @@ class _Rods:
     def draw(self, pencil: Pencil, layers: range) -> None:
         """Some layers from far to near, each over halos of paper that set off what passes over it and farther ones."""
         for depth in layers:
-            for nearer in range(0 if depth == 0 else depth + LAG, min(depth + LAG + 1, LAYERS)):
+            for nearer in range(0 if depth == 0 else depth + LAG, min(depth + LAG + 1, DEPTHS)):
                 halo = Pen(PAPER, 2.2 * self._width(nearer))
                 pencil.paths += [Path(self.plane[chain], "CUT", pen=halo) for _, chain in self.halos[nearer]]
             near, width = _nearness(depth), self._width(depth)
@@ -176,7 +274,7 @@ class _Rods:
 
 def _nearness(depth: int) -> float:
     """Of the middle of a layer, 0 to 1."""
-    return (depth + 0.5) / LAYERS
+    return (depth + 0.5) / DEPTHS
 
 
 def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
@@ -186,7 +284,7 @@ def _polylines(pieces: Pieces, layer: Ints, shade: Ints) -> Polylines:
     ends = np.flatnonzero((np.diff(layer) != 0) | (np.diff(shade) != 0) | (np.diff(first) > 1))
     begin, end = (np.concatenate(parts)[: len(first)] for parts in (([0], ends + 1), (ends, [len(first) - 1])))
     columns = (layer[begin], shade[begin], first[begin], first[end] + 2)
-    lines: Polylines = [[] for _ in range(LAYERS)]
+    lines: Polylines = [[] for _ in range(DEPTHS)]
     for depth, colour, low, high in zip(*(column.tolist() for column in columns), strict=True):
         lines[depth].append((colour, slice(low, high)))
     return lines
@@ -234,3 +332,80 @@ def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None
     _dot(pencil, np.array([x, y]), 6.0, Pen(INK, 1.1))
     anchor = "end" if side < 0 else "start"
     pencil.write(text, (x + 9 * side, y + 7), 13.0, "TITLE", anchor=anchor, bold=True, halo=PAPER)
+
+
+CAP = 0.5  # pixels
+HALO = 2.0  # width of a text's halo, in drawing units
+
+
+def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
+    """A PNG file of a drawing.
+
+    Parameters
+    ----------
+    drawing : paths and level texts; dashes, marks and angles of texts, which pictures do not have, are not drawn.
+    width : of the image [pixels].
+    """
+    from aggdraw import Brush, Draw
+    from aggdraw import Pen as Stroke
+    from PIL import Image, ImageDraw
+
+    low, high = drawing.box()
+    scale = width / float(high[0] - low[0])
+    corner = np.array([low[0], high[1]])
+    image = Image.new("RGB", (width, round(scale * float(high[1] - low[1]))), "white")
+    canvas = Draw(image)
+    for path, points in zip(drawing.paths, _lines(drawing.paths, corner, scale), strict=True):
+        pen = drawing.pen(path)
+        if path.closed and pen.fill:
+            canvas.polygon(points, None, Brush(pen.fill))
+        if pen.width:
+            canvas.line(points + points[:2] if path.closed else points, Stroke(pen.colour, scale * pen.width))
+    canvas.flush()
+    letters = ImageDraw.Draw(image)
+    for text in drawing.texts:
+        _write(letters, text, _pixels(text.at, corner, scale), scale)
+    stream = BytesIO()
+    image.save(stream, "PNG", compress_level=3)
+    return stream.getvalue()
+
+
+def _lines(paths: Sequence[Path], corner: Floats, scale: float) -> list[list[float]]:
+    """The points of each path in pixels, x, y, x, y, ...
+
+    Open lines are CAP longer at both ends: where two meet, their soft ends would show as a seam.
+    """
+    count = np.array([len(path.points) for path in paths])
+    points = _pixels(np.concatenate([np.empty((0, 2)), *(path.points for path in paths)]), corner, scale)
+    stop = np.cumsum(count)
+    still_open = np.array([not path.closed and len(path.points) > 1 for path in paths])
+    first, last = (stop - count)[still_open], stop[still_open] - 1
+    for end, inside in ((first, first + 1), (last, last - 1)):
+        along = points[end] - points[inside]
+        points[end] += CAP * along / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+    flat = points.ravel().tolist()
+    return [flat[2 * (end - size) : 2 * end] for end, size in zip(stop.tolist(), count.tolist(), strict=True)]
+
+
+def _pixels(points: Floats, corner: Floats, scale: float) -> Floats:
+    """Points (..., 2), y up, as pixels from the upper left `corner`, y down."""
+    return np.asarray(scale * (points - corner) * (1, -1))
+
+
+def _write(letters: "ImageDraw", text: Text, at: Floats, scale: float) -> None:
+    letters.text(
+        tuple(at.tolist()),
+        text.text,
+        fill=text.colour or LAYERS[text.layer].colour,
+        font=_font(text.bold, scale * text.size),
+        anchor={"start": "ls", "middle": "ms", "end": "rs"}[text.anchor],
+        stroke_width=round(HALO * scale) if text.halo else 0,
+        stroke_fill=text.halo or None,
+    )
+
+
+@lru_cache(maxsize=16)
+def _font(bold: bool, size: float) -> "FreeTypeFont":
+    from PIL import ImageFont
+
+    return ImageFont.truetype(str(BOLD if bold else REGULAR), size)

@@ -241,13 +241,13 @@ def _joints_at(rod: GridRod, mm: Show) -> str:
 
 
 def _ends(
-    mm: Show, name: str, axes: int, places: Callable[[GridRod], Floats | None]
+    mm: Show, name: str, axes: int, coordinates: Callable[[GridRod], Floats | None]
 ) -> list[tuple[str, bool, Callable[[GridRod], str]]]:
     """Columns of the coordinates of both ends."""
 
     def cell(end: int, axis: int) -> Callable[[GridRod], str]:
         def show(rod: GridRod) -> str:
-            found = places(rod)
+            found = coordinates(rod)
             return "" if found is None else mm(found[end][axis])
 
         return show

@@ -13,13 +13,16 @@ from rodshell.formfinding.methods import MethodName
 from rodshell.formfinding.progress import Progress
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets import chebyshev_net
-from rodshell.paper.cases import CASES, HEIGHT, ROD, WIDE_CASES, Case
-from rodshell.paper.figure import Figure
-from rodshell.paper.genetic_records import stored_footprint
-from rodshell.paper.plotting import (
+from rodshell.paper.figure import (
+    CASES,
     FINAL,
     FLAT,
+    HEIGHT,
     INK,
+    ROD,
+    WIDE_CASES,
+    Case,
+    Figure,
     PanelScale,
     closed,
     dots,
@@ -28,6 +31,7 @@ from rodshell.paper.plotting import (
     rows_of_panels,
     standing,
 )
+from rodshell.paper.genetic_records import stored_footprint
 
 FALL = Fall(height=HEIGHT, drag=3.0)  # shared DOFs: the paper's *mapping*
 METHODS: tuple[MethodName, ...] = ("paper", "gravity", "bound")

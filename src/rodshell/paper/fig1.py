@@ -14,12 +14,14 @@ from rodshell.arrays import Floats
 from rodshell.formfinding import PatchForm, find_stages
 from rodshell.formfinding.progress import Progress
 from rodshell.output.svg import tag
-from rodshell.paper.cases import CASES, ROD, Case
-from rodshell.paper.figure import Figure
-from rodshell.paper.plotting import (
+from rodshell.paper.figure import (
+    CASES,
     FINAL,
     FLAT,
+    ROD,
     SOFT,
+    Case,
+    Figure,
     PanelScale,
     closed,
     dots,

@@ -20,9 +20,7 @@ from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import mesh_grid
 from rodshell.model import Shell
-from rodshell.paper.cases import CASES, LENGTH, ROD, Case
-from rodshell.paper.figure import Figure
-from rodshell.paper.plotting import INK, TARGET_COLOURS, Chart, Series, charts_svg
+from rodshell.paper.figure import CASES, INK, LENGTH, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
 from rodshell.solve.implicit_euler import Motion
 from rodshell.solve.newton_matrix import Banded
 from rodshell.solve.problem import NO_CURVATURE

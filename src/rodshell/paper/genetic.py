@@ -17,11 +17,9 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding import Agreement, PatchForm, agreement, find_stages
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.paper.cases import CASES, ROD, Case
-from rodshell.paper.figure import Figure
+from rodshell.paper.figure import CASES, INK, ROD, TARGET_COLOURS, Case, Chart, Figure, Series, charts_svg
 from rodshell.paper.genetic_records import WINDOW, History, stored
 from rodshell.paper.genetic_search import MOST, POPULATION, Design, search
-from rodshell.paper.plotting import INK, TARGET_COLOURS, Chart, Series, charts_svg
 
 SEED = 1
 SEARCHES = Path("out") / "genetic-searches"
@@ -183,7 +181,7 @@ def make(
         if history is None:
             new_seed = SEED if seed is None else seed
             history = find(case, folder, seed=new_seed, jobs=jobs or 1, most=generations or MOST, progress=progress)
-        progress(f"{case.target.name}, once more", "pop-up", 0.0)
+        progress(f"{case.target.name}, again", "pop-up", 0.0)
         comparisons.append(compare(case, history))
     return Genetic(tuple(comparisons))
 

@@ -25,7 +25,7 @@ from rodshell.formfinding.trim import FEWEST_JOINTS, NEAREST_JOINT, Boundary, Fo
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, mesh_grid
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.mesh import CROWDED
-from rodshell.paper.cases import ROD
+from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
 from rodshell.targets import Target
 

@@ -21,9 +21,7 @@ from rodshell.formfinding.progress import Progress
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Joint, Linker
 from rodshell.layout import GridLayout
 from rodshell.nets import chebyshev_net
-from rodshell.paper.cases import EDGE, HEIGHT, LENGTH, ROD
-from rodshell.paper.figure import Figure
-from rodshell.paper.plotting import Chart, Series, charts_svg
+from rodshell.paper.figure import EDGE, HEIGHT, LENGTH, ROD, Chart, Figure, Series, charts_svg
 from rodshell.rods.materials import Material
 from rodshell.rods.section import Circle, GivenSection, Rod
 from rodshell.targets import Hemisphere
@@ -105,7 +103,7 @@ class Studies(Figure):
         return [line.row() for line in self.lines]
 
     def content(self) -> dict[str, Any]:
-        """The runs; what there is not is None."""
+        """The runs; None for a run that was not made."""
         return {"lines": [{k: None if v != v else v for k, v in asdict(line).items()} for line in self.lines]}
 
     def pictures(self) -> dict[str, str]:

@@ -5,7 +5,6 @@ tables, models and the report are made from an `Archive` by `rodshell.output`, w
 """
 
 from rodshell.results.archive import Archive, read
-from rodshell.results.checked import Verdict
-from rodshell.results.results import Results
+from rodshell.results.results import Results, Verdict
 
 __all__ = ["Archive", "Results", "Verdict", "read"]

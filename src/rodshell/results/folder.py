@@ -32,11 +32,11 @@ except ImportError:  # Windows: two runs into one folder at the same time are no
 
 MANIFEST, MANIFEST_FORMAT, MANIFEST_VERSION = "manifest.json", "rodshell-manifest", 1
 STAGE, NEW, RECORD = ".rodshell-stage-", "new", "commit.json"
-FORGOTTEN = 3600.0  # s: age of a stage that has lost its process, where locks do not tell
+FORGOTTEN = 3600.0  # s: age of a stage that has lost its process, where locks are not available
 
 Mark = dict[str, object]
 """What stands at a name: {"size", "sha256"} of a file, {"link"} of a symbolic link, {"folder"} or {"other"}; {"behind"}
-of a name whose folder is none, but a link, a file or another mount."""
+of a name whose folder is in fact a link, a file or another mount."""
 
 
 class ForeignFileError(OutputError):
@@ -398,7 +398,7 @@ def above(name: str) -> list[str]:
 
 
 def foreign(folder: Path, marks: Mapping[str, Mark | None]) -> list[str]:
-    """Of names and what stands there, those that rodshell did not write, or that stand in the way of such a name.
+    """Of names and what stands there, those that rodshell did not write, or that conflict with such a name.
 
     Parameters
     ----------

@@ -15,7 +15,8 @@ from rodshell.checks import OtherShapes as ShapeSearch
 from rodshell.checks import Reactions as SupportReactions
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
-from rodshell.results.checked import (
+from rodshell.results.records import Bent, Ends, Rod
+from rodshell.results.results import (
     Bar,
     Bending,
     Brace,
@@ -30,13 +31,12 @@ from rodshell.results.checked import (
     OtherShapes,
     Piece,
     Reactions,
+    Results,
     SelfWeight,
     Stage,
     Stock,
     WorstBent,
 )
-from rodshell.results.records import Bent, Ends, Rod
-from rodshell.results.results import Results
 from rodshell.results.verdict import verdict
 
 PREFERRED: tuple[Ends, Ends] = ("clamped", "pinned")  # the final shape is the first of these that is there

@@ -46,11 +46,12 @@ from rodshell.results.records import (
     Solve,
     StrongBending,
     Target,
+    plain,
 )
-from rodshell.results.results import Results, plain
+from rodshell.results.results import Results
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod as RodModel
-from rodshell.solve.report import SolveReport
+from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
 
 States = dict[str, NDArray[Any]]

@@ -5,9 +5,12 @@ null is what is not known, and keys of later versions are kept as they are. Read
 of a number, a number that is not finite or a point with two coordinates is refused.
 """
 
+import json
+from collections.abc import Mapping
 from math import isfinite
 from typing import Annotated, Any, Literal, Self, TypeVar
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 Ends = Literal["pinned", "clamped"]
@@ -77,6 +80,49 @@ def rows(meaning: str, unit: str = "") -> Any:
 def by_ends(meaning: str) -> Any:
     """A table by end condition that may be absent."""
     return Field(default_factory=dict, description=f"{meaning}, by end condition")
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """Plain content as strict JSON, a key or a rod on each line; what is not a finite number becomes null.
+
+    Parameters
+    ----------
+    content : keys and values; NumPy's arrays and numbers are converted.
+    """
+    lines = []
+    for name, value in plain(content).items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            text = "[\n  " + ",\n  ".join(map(_dumps, value)) + "\n ]"
+        else:
+            text = _dumps(value)
+        lines.append(f" {_dumps(name)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _dumps(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def plain(value: Any) -> Any:
+    """`value` in JSON's types; records, NumPy's arrays and numbers are converted, texts are printable.
+
+    Parameters
+    ----------
+    value : dictionaries, sequences, arrays, records, numbers, texts.
+    """
+    if isinstance(value, float):  # most are; NumPy's float64 is one
+        return float(value) if isfinite(value) else None
+    if isinstance(value, str):
+        return printable(value)
+    if isinstance(value, Mapping):
+        return {printable(str(name)): plain(item) for name, item in value.items()}
+    if isinstance(value, Record):
+        return value.plain()
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value
 
 
 # What was asked for

@@ -3,9 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
-from rodshell.results.checked import Bending
 from rodshell.results.records import Bent, RodType
-from rodshell.results.results import Results
+from rodshell.results.results import Bending, Results
 from rodshell.results.verdict import unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,
@@ -179,10 +178,10 @@ def _curved(bent: Bent, length: Length) -> str:
 
 
 def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
-    """How much of its own weight the shell bears, and the forces at its supports."""
+    """How much of its own weight the shell carries, and the forces at its supports."""
     least = " (weakest patch, its seam held)" if results.patches else ""
     for ends, weighed in results.self_weight.items():
-        line = f"  weight    {ends:<8}own weight borne: {share_of_weight(weighed)}{least}"
+        line = f"  weight    {ends:<8}own weight carried: {share_of_weight(weighed)}{least}"
         if weighed.deflection is not None:
             line += f"; deflection under it: {length(weighed.deflection)}"
         yield line

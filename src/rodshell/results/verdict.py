@@ -6,9 +6,8 @@ not checked, and then the result is not good.
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rodshell.results.checked import Clearance, Deployment, Level, Verdict, WorstBent
 from rodshell.results.records import Agreement, Ends, PopUp
-from rodshell.results.results import Results
+from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
 from rodshell.results.wording import millimetres, percent, place, rounded, rounding_of, whole_percent
 
 ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
@@ -137,8 +136,9 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
         yield f"{_shape(shape, bent)} the rods would break: {share}{where}"
     if strain is not None and strain > THIN:
         yield (
-            f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for their bends, "
-            f"the theory of thin rods holds up to some {percent(THIN)}; use thinner rods or a larger target"
+            f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for this "
+            f"curvature, and the theory of thin rods is valid up to about {percent(THIN)}; use thinner rods or a "
+            "larger target"
         )
 
 
@@ -160,7 +160,7 @@ def _best(results: Results, usable: list[Ends]) -> tuple[Ends, Agreement] | None
 
 
 def _off_words(results: Results, ends: Ends, gap: Agreement) -> str:
-    """How far off the best shell is; with clamped ends a convex shell keeps to the target, and dips are the cause."""
+    """How far the best shell deviates; with clamped ends a convex shell fits the target, and dips are the cause."""
     where = f", near ({place(gap.where, rounding_of(results))})" if gap.where else ""
     drape = results.drape
     strong = drape.strong_bending if drape else None
@@ -171,7 +171,7 @@ def _off_words(results: Results, ends: Ends, gap: Agreement) -> str:
     dips = ends == "clamped" and bound and not buckles and not against_shear
     advice = ": dips and ridges need seams, graded stiffness or supports" if dips else ""
     return (
-        f"with {ends} ends, the best that can be used, the shell is off the target by {_mm(results, gap.max)} "
+        f"with {ends} ends, the best that can be used, the shell deviates from the target by {_mm(results, gap.max)} "
         f"({percent(gap.max_relative)} of its size){where}{advice}"
     )
 
@@ -189,7 +189,7 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
     yield from _other_shapes(results, usable)
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
-        yield "how near the shell comes to the target was not checked"
+        yield "the gap to the target was not checked"
 
 
 def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
@@ -199,7 +199,7 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
         (met.of(ends) if met else None) is None or _bent(results, ends).max_bending_strain is None for ends in usable
     ):
         yield (
-            "whether rods touch and are thin enough for their bends was not checked; a given section needs "
+            "whether rods touch and are thin enough for their curvature was not checked; a given section needs "
             "rod.section.fibre_distances for that"
         )
     if results.bending is None or results.bending.strength is None:
@@ -211,7 +211,7 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
     if name and used > RESERVED:
         yield (
             f"the rods permanently use {percent(used)} of {name}'s strength, which is characteristic and short-term: "
-            "reduce it for duration and moisture and give what is left as checks.strength, or use thinner rods"
+            "reduce it for duration and moisture and give the reduced value as checks.strength, or use thinner rods"
         )
 
 
@@ -219,19 +219,19 @@ def _weight(results: Results, usable: list[Ends]) -> Iterator[str]:
     """Shells that cannot stand; what is not known of them is among a result's warnings."""
     borne = {ends: found for ends, found in results.self_weight.items() if ends in usable}
     if set(borne) != set(usable):
-        yield "whether it bears its own weight was not checked"
+        yield "whether it carries its own weight was not checked"
     factors = {ends: found.load_factor for ends, found in borne.items() if found.limit != "not followed"}
     weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
     if weak:
         each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
-        yield f"it bears only {each}: it does not stand unless it is held, braced or made of stiffer rods"
+        yield f"it carries only {each}: it does not stand unless it is supported, braced or made of stiffer rods"
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:
     """Whether the deployment was checked; what was found there is among a result's warnings."""
     deployment = results.deployment
     if not deployment:
-        remedy = "" if late else ": that takes pinned ends (pop_up.ends) and checks.stages above 0"
+        remedy = "" if late else ": this needs pinned ends (pop_up.ends) and checks.stages above 0"
         failed = _status(results.pop_up.get("pinned")) != CONVERGED
         why = ", since the pinned shell was not found" if failed else remedy
         yield f"whether the shell is reached from flat was not checked{why}"
@@ -255,7 +255,7 @@ def _other_shapes(results: Results, usable: list[Ends]) -> Iterator[str]:
             distance, energy = min(near, key=lambda pair: pair[0])
             yield (
                 f"with {ends} ends the shell has another stable shape, {percent(distance)} of its size away "
-                f"at {rounded(energy)} times the energy: make sure on site that it takes the right one"
+                f"at {rounded(energy)} times the energy: check on site that it takes the intended one"
             )
 
 
@@ -273,12 +273,12 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
     weight = "over 100" if least is None else f"{'at least ' if len(usable) > 1 else ''}{rounded(least)}"
     best = _best(results, usable)
     near = (
-        f"; with {best[0]} ends it keeps to the target within {percent(best[1].max_relative)} of its size"
+        f"; with {best[0]} ends the gap to the target is at most {percent(best[1].max_relative)} of its size"
         if best
         else ""
     )
-    yield f"with {' and '.join(usable)} ends the shell is stable and bears {weight} times its own weight{near}"
-    yield "no other load than its own weight was checked, neither snow, wind nor people; nor were imperfections"
+    yield f"with {' and '.join(usable)} ends the shell is stable and carries {weight} times its own weight{near}"
+    yield "loads other than its own weight (snow, wind, people) and imperfections were not checked"
 
 
 def _mm(results: Results, metres: float | None) -> str:
@@ -316,7 +316,7 @@ def _advice(gaps: Mapping[Ends, float], relative: float | None) -> Iterator[str]
         share = percent(gaps["clamped"] / gaps["pinned"])
         yield f"Supports that hold the rods' directions (clamped) leave {share} of the gap that pinned ones leave."
     elif relative is None or relative <= OFF:
-        yield "Supports that hold the rods' directions (clamped) gain little here: pinned ones will do."
+        yield "Supports that hold the rods' directions (clamped) improve little here: pinned ones are enough."
 
 
 def _strength(results: Results) -> Iterator[str]:
@@ -334,10 +334,11 @@ def _known(deployment: Deployment | None, unknown: float) -> str:
     if not deployment:
         return "in the final shape; the deployment from flat was not followed."
     if unknown >= 1:
-        return "in the final shape; nothing is known of the deployment, which could not be followed."
+        return "in the final shape; for the deployment, which could not be followed, the stress is not known."
     if unknown:
         return (
-            f"in the final shape and above {whole_percent(unknown)} of the deployment; below, nothing is known of it."
+            f"in the final shape and above {whole_percent(unknown)} of the deployment; below that share the stress is "
+            "not known."
         )
     if deployment.guided:
         low, high = (whole_percent(share) for share in deployment.guided)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from math import ceil, floor, isfinite, log10, pi
 from typing import Any
 
-from rodshell.results.checked import SelfWeight
 from rodshell.results.records import Record
-from rodshell.results.results import Results
+from rodshell.results.results import Results, SelfWeight
 from rodshell.units import stress_text
 
 FINEST, COARSEST = 1e-3, 1.0  # mm
@@ -157,7 +156,7 @@ def percent(share: float | None) -> str:
 
 
 def share_of_weight(found: SelfWeight) -> str:
-    """How much of its own weight a shell bears."""
+    """How much of its own weight a shell carries."""
     factor = found.load_factor
     if found.limit == "no mass":
         return "unknown: no mass was given"

@@ -20,7 +20,7 @@ starts from the source s, spins about t by minus the solid angle of the triangle
 
     d psi = -w.de,   w = (s x t) / ((1 + s.t) |e|),
 
-and a spin acts like a change of theta. Hence grad_e is the usual gradient, that of frames which do not spin,
+and a spin acts like a change of theta. So grad_e is the usual gradient, that of frames which do not spin,
 minus w dE/dtheta. As for the Hessian, the derivative of the usual gradient has an antisymmetric part,
 dE/dtheta [t]x / (2 |e|^2) at e, which the derivative of w takes away. Gradient and Hessian are exact at every
 state; where state and source agree, w = 0. Refresh at each accepted iterate, and compare energies from one

@@ -122,7 +122,7 @@ def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-unty
 
 @nb.njit(cache=True, error_model="numpy")
 def subtract_product(panel, rows, begin, end, first, keep, target, work):  # type: ignore[no-untyped-def]
-    """target = keep target - panel[begin:end, first:]^T rows[begin:end, first:], but for what is below the diagonal.
+    """target = keep target - panel[begin:end, first:]^T rows[begin:end, first:], except below the diagonal.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@
 
 Newton's method is damped by the natural monotonicity test [Deuflhard 2004, section 3.3]: a step is kept if the
 simplified step that follows, by the same factors, is shorter. All lengths of steps are measured by the mass,
-sqrt(sum m dq^2), so that metres and radians may be summed. The simplified step also corrects, and tells what is
+sqrt(sum m dq^2), so that metres and radians may be summed. The simplified step also corrects, and shows what is
 left: steps of the lengths L0, L1 by one matrix are followed by one of about 2 L1^2 / L0, since the error of the
 matrix, which made L1 of L0 where it grew from nothing, is there from the start. Where the motion is smooth, one
 factorisation, two solutions and two evaluations, one with the Hessian, make a step.
@@ -14,7 +14,7 @@ grows, and could end on a saddle of  |dq - h v|^2_M / 2h^2 + E;  at a minimum of
 ground, kinetic and elastic energy together do not grow. Smaller steps have more of M / h^2 and pass.
 
 The source frames of the elements stay those of the step's start and are refreshed when it is accepted. The twist
-angles of a motion are hence measured from frames that travel with the rod, and mean nothing without them.
+angles of a motion are therefore measured from frames that travel with the rod, and mean nothing without them.
 
 With contact (`ContactEuler`) [HQK Algorithm 1] a step is a predictor, and a corrector until no new node is below the
 target. Every step starts with nothing in contact, so that nodes can leave: one that the rest of the step lifts is not
@@ -34,16 +34,15 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
-from rodshell.solve.forces import Damping, Force, ImplicitForce, PointLoads
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
-from rodshell.solve.problem import NO_CURVATURE, Constraint, Supports
+from rodshell.solve.problem import NO_CURVATURE, Constraint, Damping, Force, ImplicitForce, PointLoads, Supports
 from rodshell.solve.sparse_ldl import SingularError
 
 MakeMatrix = Callable[[list[Ints], Freedom], SummedMatrix]
 
 RELATIVE = 1e-9  # of the step's own motion: what is left once the last simplified step has been taken
-ROUND_OFF = 1e-13  # of the state: no step can be told from zero below this
-CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth going on with
+ROUND_OFF = 1e-13  # of the state: a shorter step cannot be distinguished from zero
+CONTRACTION = 0.1  # simplified steps that shorten by less than this are not worth continuing
 MOST_ITERATIONS = 20
 LEAST_SHARE = 1 / 64
 MOST_PASSES = 30  # of predictor and corrector, with contact
@@ -191,7 +190,7 @@ class ImplicitEuler:
         return _Newton(self, motion, constraint, implicit, inertia, held, state, velocity, end, step).solve()
 
     def _plan(self, motion: Motion, implicit: tuple[ImplicitForce, ...], free: Freedom) -> None:
-        """Room; made anew only where the elements' blocks or the number of free directions have changed."""
+        """Work arrays; allocated again only where the elements' blocks or the count of free directions have changed."""
         blocks = [*(element.blocks for element in motion.elements), *(force.blocks for force in implicit)]
         old = self._planned
         if old and len(old) == len(blocks) + 1 and all(a is b for a, b in zip(old[1:], blocks, strict=True)):

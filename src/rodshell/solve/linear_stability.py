@@ -8,7 +8,7 @@ unit circle only at z = -1, where  h^2 (k_e - k_i) = 4m.
 A node in contact that is stopped at each step [HQK 3.1] has no velocity to bring along, and obeys
 M (x+ - x) + h^2 K_i x+ + h^2 K_e x = 0:  at z = -1,  h^2 (k_e - k_i) = 2m. Together, with m4 of the nodes that move
 freely and m2 of those that are stopped along a mode, (m4 + m2 + h^2 k_i) z^2 + (h^2 k_e - 2 m4 - m2) z + m4 = 0, and
-the same argument holds. The limit is hence exact: the longest h at which
+the same argument holds. The limit is therefore exact: the longest h at which
 
     (4 M4 + 2 M2) / h^2 + K_i - K_e
 

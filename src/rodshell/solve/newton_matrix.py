@@ -306,7 +306,7 @@ def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  
 @nb.njit(cache=True, error_model="numpy")
 def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
     """Turn rows and columns of blocks of three unknowns from x, y, z to their directions; blocked ones get a one."""
-    own = np.empty((3, 3))
+    block = np.empty((3, 3))
     for m in range(len(first)):
         at, d = first[m], directions[m]
         for j in range(max(0, at + 2 - b), at):  # to the left; what is coupled to one of the three is so to all
@@ -319,12 +319,12 @@ def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
                 band[at + r, i - at - r] = d[r, 0] * v0 + d[r, 1] * v1 + d[r, 2] * v2
         for r in range(3):
             for c in range(r, 3):
-                own[r, c] = own[c, r] = band[at + r, c - r]
+                block[r, c] = block[c, r] = band[at + r, c - r]
         for r in range(3):
             for c in range(r, 3):
                 value = 0.0
                 for k in range(3):
-                    value += d[r, k] * (own[k, 0] * d[c, 0] + own[k, 1] * d[c, 1] + own[k, 2] * d[c, 2])
+                    value += d[r, k] * (block[k, 0] * d[c, 0] + block[k, 1] * d[c, 1] + block[k, 2] * d[c, 2])
                 band[at + r, c - r] = value
             if d[r, 0] == d[r, 1] == d[r, 2] == 0.0:
                 band[at + r, 0] = 1.0

@@ -31,7 +31,7 @@ STALE = 1e-3  # of the largest axial force: by more they must not change after t
 CHORD = 5e-3  # of the length: after a Newton step this short the factorisation serves for the next one, too
 SLOW = 0.1  # of the last step: a chord step that is longer is not made
 SHIFT_GROWTH = 8.0
-TINY = 1e-300  # no step is shorter, but for none at all
+TINY = 1e-300  # no step is shorter, except zero
 
 
 @dataclass(frozen=True)

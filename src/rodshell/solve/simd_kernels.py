@@ -47,7 +47,7 @@ def subtracting(rows: int, registers: int) -> Kernel:
 
     def emit(code: "_Code", c, stride_c, a, stride_a, b, stride_b, depth, keep) -> None:  # type: ignore[no-untyped-def]
         sums = chain(*code.product(rows, registers, a, stride_a, b, stride_b, depth))
-        tile = list(zip(chain(*code.places(c, stride_c, rows, registers)), sums, strict=True))
+        tile = list(zip(chain(*code.addresses(c, stride_c, rows, registers)), sums, strict=True))
         with code.builder.if_else(code.is_not_zero(keep)) as (keeping, fresh):
             with keeping:
                 for place, value in tile:
@@ -75,7 +75,7 @@ def eliminating(rows: int, registers: int) -> Kernel:
 
     def emit(code: "_Code", c, d, a, b, stride, depth, factors) -> None:  # type: ignore[no-untyped-def]
         sums = code.product(rows, registers, a, stride, b, stride, depth)
-        into, scaled = code.places(c, stride, rows, registers), code.places(d, stride, rows, registers)
+        into, scaled = code.addresses(c, stride, rows, registers), code.addresses(d, stride, rows, registers)
         done = list[list[ir.Value]]()
         for r in range(rows):
             row = [code.builder.fsub(code.load(place), value) for place, value in zip(into[r], sums[r], strict=True)]
@@ -106,7 +106,7 @@ def multiplying(rows: int) -> Kernel:
     def emit(code: "_Code", y, a, stride, x, count) -> None:  # type: ignore[no-untyped-def]
         def onward(k: ir.Value, sums: Sequence[ir.Value]) -> list[ir.Value]:
             right = code.load(code.past(x, k))
-            left = (code.load(place) for (place,) in code.places(code.past(a, k), stride, rows, 1))
+            left = (code.load(place) for (place,) in code.addresses(code.past(a, k), stride, rows, 1))
             return [code.add_product(value, right, total) for value, total in zip(left, sums, strict=True)]
 
         for r, total in enumerate(code.loop(count, LANES, [code.zero] * rows, onward)):
@@ -166,7 +166,7 @@ class _Code:
         count = self.integer(numbers) if isinstance(numbers, int) else numbers
         return self.builder.add(address, self.builder.mul(count, self.integer(BYTES)))
 
-    def places(self, address: ir.Value, stride: ir.Value, rows: int, registers: int) -> list[list[ir.Value]]:
+    def addresses(self, address: ir.Value, stride: ir.Value, rows: int, registers: int) -> list[list[ir.Value]]:
         """Addresses of a tile's registers, row by row."""
         result = list[list[ir.Value]]()
         for _ in range(rows):

@@ -39,8 +39,8 @@ class End(Enum):
 _SENTENCES = {
     End.FINISHED: "reached its end",
     End.STOPPED: "was stopped",
-    End.INTERRUPTED: "was interrupted; go on from `series.last`",
-    End.STALLED: "could not go on with the smallest step allowed; look at the loads there, or allow a smaller step",
+    End.INTERRUPTED: "was interrupted; continue from `series.last`",
+    End.STALLED: "could not continue with the smallest step allowed; look at the loads there, or allow a smaller step",
 }
 
 

@@ -1,7 +1,8 @@
 """The symbolic phase of a multifrontal factorisation: from a pattern and an order to the maps of the numeric one.
 
 All but the last maps is done on *blocks*, unknowns that lie at one point and are coupled alike: a node's directions
-of motion. Tree, supernodes and fronts are found from a graph some ten times smaller than the matrix.
+of motion. Tree, supernodes and fronts are found from a graph some ten times smaller than the matrix. The plan also says
+how the fronts share threads and memory.
 """
 
 from typing import NamedTuple
@@ -11,7 +12,6 @@ import numpy as np
 
 from rodshell.arrays import Longs
 from rodshell.solve.dense import padded
-from rodshell.solve.subtree_scheduling import parts_of, stacks_of
 
 
 class Plan(NamedTuple):
@@ -32,7 +32,7 @@ class Plan(NamedTuple):
     entry_place: Longs  # where it goes in the rows of the front's pivots
     panel_start: Longs  # (n_s + 1,) where its part of the factor begins
     update_start: Longs  # (n_s,) where its update matrix lies in `stacks`
-    part_start: Longs  # (p + 1,) parts that can be eliminated at the same time, but for the last, which needs them all
+    part_start: Longs  # (p + 1,) parts that can be eliminated at the same time, except the last, which needs them all
     parts: Longs  # (n_s,) the supernodes of each part, ascending
     stack_size: int
     largest_front: int
@@ -55,7 +55,7 @@ def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> Blocks:
 
 
 def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan:
-    """Of a pattern whose `blocks` are eliminated in `order` (b,), but for what the tree leaves open."""
+    """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open."""
     order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
@@ -337,3 +337,67 @@ def _by_front(indptr, indices, place, owner, supers):  # type: ignore[no-untyped
             filled[owner[low]] += 1
             sorted_values[k, 0], sorted_values[k, 1], sorted_values[k, 2] = e, low, high
     return start, sorted_values
+
+
+SHARE = 1 / 12  # of all work: no part that is eliminated by itself holds more
+WORTHWHILE = 1e8  # multiplications from which on work is shared
+
+
+@nb.njit(cache=True)
+def parts_of(up, width, below):  # type: ignore[no-untyped-def]
+    """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them."""
+    supers = len(up)
+    lowest, work = np.arange(supers), np.empty(supers)
+    for s in range(supers):
+        work[s] = width[s] * float(width[s] + below[s]) ** 2
+    total = work.sum()
+    for s in range(supers):  # children come before their parents, and a subtree is a run that ends with its root
+        if up[s] >= 0:
+            work[up[s]] += work[s]
+            lowest[up[s]] = min(lowest[up[s]], lowest[s])
+    start, parts, used = [0], np.empty(supers, dtype=np.int64), 0
+    above = np.zeros(supers, dtype=np.bool_)
+    for s in range(supers):
+        above[s] = total > WORTHWHILE and work[s] > SHARE * total
+    for s in range(supers):
+        if not above[s] and total > WORTHWHILE and (up[s] < 0 or above[up[s]]):
+            for c in range(lowest[s], s + 1):
+                parts[used] = c
+                used += 1
+            start.append(used)
+    for s in range(supers):
+        if above[s] or total <= WORTHWHILE:
+            parts[used] = s
+            used += 1
+    start.append(used)
+    return np.array(start), parts
+
+
+@nb.njit(cache=True)
+def stacks_of(up, below, child_start, children, part_start, parts):  # type: ignore[no-untyped-def]
+    """Where update matrices (rows `below`) lie, and room for all.
+
+    Each part has two stacks, for even and for odd depths of the tree: what a supernode reads, its children's, and what
+    it writes are then never on the same stack, and the children's lie on top of theirs. The last that a part writes
+    stays there for the part that needs all.
+    """
+    supers = len(up)
+    odd, part = np.zeros(supers, dtype=np.int64), np.zeros(supers, dtype=np.int64)
+    for s in range(supers - 1, -1, -1):  # parents come after their children
+        odd[s] = 1 - odd[up[s]] if up[s] >= 0 else 0
+    start, room = np.empty(supers, dtype=np.int64), 0
+    for p in range(len(part_start) - 1):
+        here = parts[part_start[p] : part_start[p + 1]]
+        part[here] = p
+        height, deepest = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
+        for s in here:
+            for e in range(child_start[s], child_start[s + 1]):
+                if part[children[e]] == p:
+                    height[1 - odd[s]] -= below[children[e]] * padded(below[children[e]])
+            start[s] = height[odd[s]]
+            height[odd[s]] += below[s] * padded(below[s])
+            deepest[odd[s]] = max(deepest[odd[s]], height[odd[s]])
+        for s in here:
+            start[s] += room + odd[s] * deepest[0]
+        room += deepest[0] + deepest[1]
+    return start, room

@@ -184,11 +184,11 @@ class TangentAssembly:
     """Assembles the tangent stiffness of a problem at one state after another.
 
     Its buffers serve for all states; what it returns is not touched again. The supports must not be on their way
-    (`Supports` with nodes still to move): prescribed motions are no part of K.
+    (`Supports` with nodes still to move): prescribed motions do not contribute to K.
 
     Parameters
     ----------
-    problem : the structure; its elements may be given anew at each state, on the same blocks.
+    problem : the structure; its elements may be replaced at each state, on the same blocks.
     state : (N, 3) any state, for the pattern.
     """
 

@@ -1,4 +1,4 @@
-"""From a triangle mesh to its smooth field: samples, openings filled, least squares, and on past an open rim."""
+"""From a triangle mesh to its smooth field: samples, openings filled, least squares, continuation past an open rim."""
 
 from dataclasses import dataclass, replace
 from math import pi, sqrt
@@ -18,14 +18,14 @@ APART = 0.2  # spacings: samples closer to each other are merged
 
 # openings
 STEEPEST = 0.35  # cosine between an opening's axis and the normals around it: beyond it no cap fits, as on a tube
-BAND = 0.6  # of the opening's radius: width of the surface around it through which a cap is laid
-CAP_POINTS = 1500  # through which a cap is laid, at most
-DEEP, WIDEST = 0.3, 0.5  # a door is at least so deep, in its widths, and at most so wide, in the surface's extents
+BAND = 0.6  # of the opening's radius: width of the band around it to which a cap is fitted
+CAP_POINTS = 1500  # most points to which a cap is fitted
+DEEP, WIDEST = 0.3, 0.5  # a door: least depth over its width, and largest width over the surface's extent
 PITCH = 0.5  # spacings between the samples of a cap
 
 # least squares
 FEWEST, MOST = 300, 8000  # cubics on a surface
-POINTS_EACH = 3.0  # points for each cubic
+POINTS_EACH = 3.0  # points per cubic
 FIT_RADIUS = 2.4  # spacings: points to which a cubic is fitted; their weight falls to exp(-2.9)
 FADE = 1.4  # spacings: radius of that weight
 SAME_SIDE = 0.3  # cosine between normals: points of another sheet of the surface are left out
@@ -33,8 +33,8 @@ RIDGE = 1e-7  # of the sum of weights: keeps the least squares regular where poi
 
 # past an open rim
 EASE = 1.5  # [rad] curvature fades as 1 / (1 + turned / EASE), so that the surface does not roll up
-DIRECTIONS = 12  # in which a cubic past the rim looks for sites of the next
-MEANS = 10  # cubics of which a new one is the mean
+DIRECTIONS = 12  # in which the next cubics are placed around a cubic past the rim
+MEANS = 10  # cubics whose mean a new cubic is
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,9 +114,9 @@ def _thinned(points: Floats, normals: Floats, areas: Floats, apart: float) -> Sa
 def fill_openings(mesh: TriangleMesh, samples: Samples, spacing: float) -> Samples:
     """Add samples across every opening, and every door in the outer edge, where a smooth cap fits.
 
-    The net continues there, although no rod does. Without a cap the surface would be continued into a door from three
+    The net continues there, although rods do not. Without a cap the surface would be continued into a door from three
     sides, and would meet itself there in a crease. A cap is the interpolant of |r|^3 through the surface around the
-    opening: it bends least [Duchon 1977].
+    opening: its bending energy is the smallest [Duchon 1977].
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def _doors(rim: Floats, spacing: float) -> list[Floats]:
 
 
 def _cap(rim: Floats, samples: Samples, spacing: float) -> tuple[Floats, Floats] | None:
-    """Points and normals (n, 3) on a lattice over the plane of a rim (k, 3); None where there is no such cap."""
+    """Points and normals (n, 3) on a lattice over the plane of a rim (k, 3); None where no smooth cap fits."""
     from scipy.interpolate import RBFInterpolator
 
     centre = rim.mean(axis=0)
@@ -276,7 +276,7 @@ def _along(a, b):  # type: ignore[no-untyped-def]
 def _continued(field: SmoothField, points: CellList, rings: int) -> SmoothField:
     """Continue a field past the rim, ring by ring, with quadrics that keep the curvature of their neighbours.
 
-    The first ring follows the cubics of the rim, so that curvature changes for one more spacing. Each ring is a mean
+    The first ring follows the cubics of the rim, so that curvature changes over one more spacing. Each ring is a mean
     over the last one, so that noise dies out.
     """
     front = np.arange(len(field.centres))

@@ -20,15 +20,15 @@ from rodshell.units import length_text
 from rodshell.validation import array, number
 
 PAST = 0.6  # of the size: how far the surface is continued past an open rim
-OFF = 0.005  # of the size: where a vertex is this far off its smooth field, the field does not follow the mesh
-ASKEW = 0.7  # cosine: nor where the normals of vertex and field differ this much
+OFF = 0.005  # of the size: where a vertex is further off its smooth field, the field does not follow the mesh
+ASKEW = 0.7  # least cosine between the normals of a vertex and of the field there
 ASIDE = 0.05  # of the size: a boundary curve further from the surface does not belong to it
 TIE = 1e-3  # of the size: points this close to the highest count as equally high
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Freeform(Target):
-    """A surface in triangles, open or closed, through which a smooth field is laid; make one with `Freeform.of`.
+    """A surface in triangles, open or closed, to which a smooth field is fitted; make one with `Freeform.of`.
 
     Two such targets are equal only if they are the same object.
 
@@ -148,7 +148,7 @@ class Freeform(Target):
 
     @cached_property
     def rims(self) -> tuple[Rim, ...]:
-        """The open boundary and the boundary curves, as far as there are any."""
+        """The rims of the open boundary and of the boundary curves, if there are any."""
         rims = []
         if self.surface.loops:
             rims.append(self._rim(self._open_ends[0]))
@@ -243,7 +243,7 @@ class Freeform(Target):
     def summit(self) -> tuple[float, float]:
         """x, y of the highest point inside the end [m]; of the surface's middle where it is on the edge.
 
-        Of equally high points, as on a barrel vault, the one nearest to the middle.
+        Of equally high points, as on a barrel vault, the point nearest to the middle.
         """
         x = self.surface.vertices
         margin = self.margin(x)
@@ -275,7 +275,7 @@ class Freeform(Target):
         return x, y
 
     def _over(self, curve: Floats) -> Floats:
-        """A curve drawn in a horizontal plane, such as a plan, projected onto the surface; any other as it is."""
+        """A curve drawn in a horizontal plane, such as a plan, projected onto the surface; any other curve as it is."""
         if np.ptp(curve[:, 2]) > 1e-6 * self._extent or self._off(curve) < ASIDE * self._extent:
             return curve
         z = self.height_at(curve[:, :2])
@@ -308,7 +308,7 @@ class Freeform(Target):
             raise InputError(f"no part of {name} is inside its boundary: choose a lower base or another boundary")
 
     def _require_a_good_fit(self, name: str) -> None:
-        """Refuse a mesh that its smooth field does not follow: it is rough, or two sheets of it are too close."""
+        """Refuse a mesh that its smooth field does not follow, as it is rough or two of its sheets are too close."""
         x = self.surface.vertices
         value, gradient = self.level(x)
         cosine = dot(gradient, self.surface.normals) / np.linalg.norm(gradient, axis=1)

@@ -32,8 +32,8 @@ GRID_FILES = (*TABLES, ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff")
 FEWEST = 4  # heights each way
 POINT = 3  # numbers in a row of points x, y, z; heights need more each way
 EVEN = 0.02  # of a step: coordinates go in equal steps, except for rounding
-LEAP = 4.0  # times the change to the next row: a row of coordinates differs by more, a surface hardly ever
-SQUARE = 0.01  # relative: by how much the proportion of points may differ from that of the size
+LEAP = 4.0  # times the change to the next row: a row of coordinates differs by more, heights hardly ever
+SQUARE = 0.01  # relative difference allowed between the proportions of the points and of the size
 
 COARSE = 1 / 300  # of white: an image whose levels are further apart, such as one of 8 bits, has terraces
 ROUNDING = 12**-0.5  # levels, rms: error that rounding to levels adds to a smooth height
@@ -220,7 +220,7 @@ def read_image(path: Path) -> tuple[Floats, float | None]:
 
 
 def smoothed(grey: Floats, step: float) -> Floats:
-    """Smooth an image as far as the rounding to its levels explains.
+    """Smooth an image by no more than the rounding to its levels explains.
 
     A smoothing spline along both axes [Eilers and Marx 1996], which keeps planes. Its weight is the largest that
     changes heights by the rms error of rounding, and none by more than a step.
@@ -368,9 +368,9 @@ def heights_from(
     Parameters
     ----------
     file : path.
-    size : width along x and depth along y [m], centred on the origin; the first row is that of the largest y.
+    size : width along x and depth along y [m], centred on the origin; the first row is at the largest y.
     height : of a CSV the length of its unit [m], default 1; of an image the height of white [m], default 1.
-    base, boundary, placement : as of `surface_from`, with the boundary in metres.
+    base, boundary, placement : as in `surface_from`, with the boundary in metres.
 
     Raises
     ------

@@ -23,9 +23,9 @@ STEEPEST = 1e3  # slope that counts as infinite (89.94 degrees)
 SHARPEST = 1e-2  # change of slope at a point that counts as a crease (0.6 degrees)
 SUSPECTS, HALVINGS = 64, 26  # pairs of neighbours searched for a crease, down to 1e-8 of their distance
 TIGHTEST = 1e-4  # of the size: a smaller radius of curvature counts as a crease
-BAND = 1.6  # half extents: as far as the function is examined; the net is marched past the edge
+BAND = 1.6  # half extents up to which the function is examined, as the net is marched past the edge
 TAME = 4.0  # slope up to which a formula is followed past the edge (76 degrees), or twice the steepest inside
-CLIMBERS = 500
+CLIMBERS = 500  # samples from which peaks are searched
 
 
 @dataclass(frozen=True)
@@ -227,12 +227,12 @@ def climb(heights: Heights, domain: Region) -> Floats:
 
     Returns
     -------
-    Points (n, 2) of the domain and its edge from which no step leads up [m]; the highest is among them.
+    Points (n, 2) of the domain and its edge [m] without a higher point nearby; the highest is among them.
     """
     at = sample(heights, domain).reshape(8, -1)
     a, b = domain.half_extent
     pitch = max(a, b) * max(2 * np.pi / COLUMNS, 1 / ROWS)
-    # a peak is at most so much higher than the lattice's points next to it
+    # a peak is at most this much higher than the lattice's points next to it
     hidden = 0.5 * np.abs(at[5:]).max() * pitch**2
     high = np.flatnonzero(at[2] >= at[2].max() - hidden)
     xy = at[:2, [np.argmax(at[2]), *high[:: len(high) // CLIMBERS + 1]]].T
@@ -303,7 +303,7 @@ def _nearest_centre(at: Floats, domain: Region) -> tuple[float, float]:
 
 
 def _smaller(domain: Region, x: float, y: float) -> str:
-    """Words for a domain that ends before a point."""
+    """Text that proposes a domain that ends before a point."""
     within = 0.95 * float(relative_radius(domain, np.array(x), np.array(y)))
     if within < 0.2:
         return "another formula there"
@@ -316,7 +316,7 @@ def _smaller(domain: Region, x: float, y: float) -> str:
 def _close_in(heights: Heights, at: Floats) -> tuple[Floats, Floats]:
     """Pairs of neighbours (8, k) whose heights and slopes fit each other least, with their distances halved repeatedly.
 
-    The worse half is kept each time: smooth functions fit ever better, a singularity never does.
+    The worse half is kept each time: the misfit of smooth functions decreases, that of a singularity does not.
     """
     p = np.hstack([at[:, :-1].reshape(8, -1), at[:, :, :-1].reshape(8, -1)])
     q = np.hstack([at[:, 1:].reshape(8, -1), at[:, :, 1:].reshape(8, -1)])

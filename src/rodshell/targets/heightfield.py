@@ -1,6 +1,6 @@
 """A surface z = f(x, y) over a disc or a rectangle, from a formula or from a Python function.
 
-Formulas are as people write them: "0.1 - 2*x^2 - y^2" is parsed into a function, without running any code.
+Formulas are written as usual: "0.1 - 2*x^2 - y^2" is parsed into a function, without running any code.
 """
 
 import ast
@@ -54,7 +54,7 @@ FOREIGN = {"−": "-", "·": "*", "×": "*", "÷": "/", "²": "^2", "³": "^3", 
 LONGEST = 4000  # characters; Python's parser is safe with texts of this length
 DEEPEST = 100  # nested parentheses
 TIE = 1e-6  # of the size: peaks this close in height count as equally high
-SAME = 1e-3  # of the size: refined peaks this close are one
+SAME = 1e-3  # of the size: refined peaks this close are the same
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/^() ]|//|__")
 
 Slot = int
@@ -122,7 +122,7 @@ _Operand = float | str | _Result
 
 
 class _Compiler:
-    """Turns Python's syntax tree into a straight-line program, refusing every node that it does not know."""
+    """Turns Python's syntax tree into a straight-line program, and refuses every node that it does not know."""
 
     def __init__(self, text: str, source: str) -> None:
         self.text, self.source = text, source
@@ -130,7 +130,7 @@ class _Compiler:
 
     def formula(self) -> Formula:
         result = self._walk(self._parse())
-        if isinstance(result, float):  # one height for every x: added to 0 x, so that shapes are kept
+        if isinstance(result, float):  # a constant height: added to 0 x, so that shapes are kept
             self._step(operator.add, self._step(operator.mul, "x", 0.0), result)
         elif isinstance(result, str):
             self._step(operator.pos, result)
@@ -155,7 +155,7 @@ class _Compiler:
             raise InputError(f"formula {shown(self.text)} is nested too deeply: write a simpler one") from None
 
     def _walk(self, root: ast.expr) -> _Operand:
-        """Operands first, by a stack of our own: a long sum is a deep tree."""
+        """Operands first, with an explicit stack: a long sum is a deep tree."""
         done: dict[ast.expr, _Operand] = {}
         stack = [root]
         while stack:

@@ -17,8 +17,8 @@ LN2, LN10 = float(np.log(2.0)), float(np.log(10.0))
 class Jet:
     """A function of x and y at n points: value, gradient and Hessian through arithmetic and numpy functions.
 
-    A part that is constant stays a float, and 0.0 and 1.0 cost nothing: most parts of x, of y and of functions of one
-    of them alone. Parts may be jets: a jet of jets has higher derivatives. Operations without a derivative here
+    A part that is constant stays a float, and 0.0 and 1.0 cost nothing: most parts of x, of y and of functions of
+    a single variable. Parts may be jets: a jet of jets has higher derivatives. Operations without a derivative here
     (comparisons, np.where, np.maximum, float()) are refused with a TypeError.
 
     Parameters
@@ -100,7 +100,7 @@ class Jet:
 
 
 def _times(a: Part, b: Part) -> Part:
-    """a b, without arithmetic where one is a plain 0 or 1: a part that is zero everywhere stays so."""
+    """a b, without arithmetic where a factor is a plain 0 or 1: a part that is zero everywhere stays so."""
     if a.__class__ is float:
         if a == 0.0:
             return 0.0

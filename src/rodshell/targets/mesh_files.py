@@ -61,7 +61,7 @@ def read_mesh(path: str | PathLike[str], unit: float | None, name: str | None = 
 
 
 def require_few_heights(path: Path, rows: int, columns: int) -> None:
-    """Refuse a lattice of heights with too many, before it is read: it is meshed with two faces for each height."""
+    """Refuse a lattice with too many heights before it is read: it is meshed with two faces for each height."""
     if rows * columns > MOST_HEIGHTS:
         raise InputError(
             f"{path} has {rows} x {columns} heights: scale it down to {MOST_HEIGHTS / 1e6:g} million or fewer"
@@ -140,7 +140,7 @@ def recoded(text: bytes) -> bytes:
 
 
 def _loaded(path: Path, data: bytes) -> dict[str, Any]:
-    """The meshes in a file by name, transformed to their places in the scene."""
+    """The meshes in a file by name, transformed to their positions in the scene."""
     import trimesh
 
     kind = path.suffix[1:].lower()
@@ -177,7 +177,7 @@ def _merged(meshes: list[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
 
 
 def _require_whole(path: Path, data: bytes, vertices: Floats, faces: Ints) -> None:
-    """Refuse a truncated file. Text formats can be read even so: compare with the counts that the file announces."""
+    """Refuse a truncated file. Readers accept truncated text: the result is compared with counts in the file."""
     used, kind = len(np.unique(faces)), path.suffix.lower()
     announced: Mapping[str, int] = {}
     if kind == ".obj":

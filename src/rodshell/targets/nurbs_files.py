@@ -19,7 +19,7 @@ from rodshell.targets.mesh_files import file_bytes
 from rodshell.units import shown
 
 GRID = 64  # quads each way: the field through them is accurate to 4e-5 of the size on a whole sphere
-PER_SPAN = 4  # quads for each span, of a NURBS with many knots
+PER_SPAN = 4  # quads per span of a NURBS with many knots
 FINEST = 400  # quads each way, at most
 ALONG_EDGES = 400  # straight pieces of each trimming edge
 LISTED = 12  # faces named in a message
@@ -33,7 +33,7 @@ RHINO_UNITS = {
 STEP_FILES = (".step", ".stp")
 MILLIMETRE = 1e-3  # m: OpenCASCADE converts every unit to millimetres
 LAST_LINE = b"END-ISO-10303-21"
-ABSURD = re.compile(rb"-?\d\.\d*E\+?\d{3,}")  # OpenCASCADE does not end with such coordinates
+ABSURD = re.compile(rb"-?\d\.\d*E\+?\d{3,}")  # OpenCASCADE does not terminate with such coordinates
 READER = Path(__file__).with_name("opencascade.py")
 LONGEST = 120.0  # seconds that reading may take
 
@@ -115,7 +115,7 @@ def read_3dm(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Fl
 
     Raises
     ------
-    InputError : the file is missing or damaged; rhino3dm is not installed; there is not exactly one such face.
+    InputError : the file is missing or damaged; rhino3dm is not installed; the file has no such face, or several.
     """
     try:
         import rhino3dm
@@ -170,7 +170,7 @@ def _nurbs(surface: Any) -> Nurbs:
 
 
 def _trims(brep: Any) -> list[Floats]:
-    """The closed curves at which a face ends; an edge that a loop follows twice is a seam of the surface, no end."""
+    """The closed curves that bound a face; an edge that a loop follows twice is a seam of the surface, not an end."""
     loops = brep.Faces[0].Loops
     edges = [trim.EdgeIndex for loop in (loops[k] for k in range(len(loops))) for trim in loop.Trims]
     return closed_loops([_polyline(brep.Edges[k]) for k in edges if k >= 0 and edges.count(k) == 1])
@@ -182,7 +182,7 @@ def _polyline(curve: Any) -> Floats:
 
 
 def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[Floats]]:
-    """Read one face of a STEP file, in a process of its own (see `opencascade`).
+    """Read one face of a STEP file, in a separate process (see `opencascade`).
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def read_step(path: Path, name: str | None = None) -> tuple[Floats, Ints, list[F
 
     Raises
     ------
-    InputError : the file is missing or damaged; OpenCASCADE is not installed; there is not exactly one such face.
+    InputError : the file is missing or damaged; OpenCASCADE is not installed; the file has no such face, or several.
     """
     if find_spec("OCP") is None:
         raise InputError(f'{path}: STEP files need OpenCASCADE: pip install "rodshell[step]"')

@@ -1,6 +1,6 @@
 """A separate program that reads a face of a STEP file with OpenCASCADE; see `nurbs_files.read_step`.
 
-It imports nothing of rodshell, and runs in a process of its own because a damaged file can crash OpenCASCADE.
+It imports nothing of rodshell, and runs in a separate process because a damaged file can crash OpenCASCADE.
 Usage: `python -P opencascade.py REQUEST RESULT`. REQUEST is JSON with `path`, `name` (of a face, or null) and the
 resolution: `grid`, `per_span`, `finest`, `along_edges`. RESULT is an npz file with `names` (JSON, a list for each face)
 and, if one face matches, `points` (k, l, 3) of its surface and `trims` (n, along_edges + 1, 3), the curves that bound

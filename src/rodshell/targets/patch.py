@@ -17,7 +17,7 @@ BEYOND = 1e3  # lengths of an open seam by which its two ends are prolonged
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """A polyline in the plan along which a target is cut, straight down; make one with `Seam.of`.
+    """A polyline in the plan along which a target is cut vertically; make one with `Seam.of`.
 
     An open seam is prolonged straight past both ends. Seams with the same points are equal.
 
@@ -98,7 +98,7 @@ class Seam:
         return np.asarray(np.copysign(np.linalg.norm(off, axis=1), np.einsum("ni,ni->n", off, side)))
 
     def _nearest(self, x: Floats) -> tuple[Ints, Floats, Floats]:
-        """For each point (n, 2 or 3): the nearest edge, its fraction before the closest point, the way from there."""
+        """Of each point (n, 2 or 3): nearest edge, its fraction before the closest point, the vector from there."""
         start, edge = self._corners[:-1], np.diff(self._corners, axis=0)
         off = x[:, None, :2] - start
         share = np.clip(np.einsum("nki,ki->nk", off, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
@@ -133,7 +133,7 @@ class Patch(Target):
 
     @property
     def size(self) -> float:
-        """That of the whole target [m], so that the gaps of all patches are related to one length."""
+        """The size of the whole target [m], so that the gaps of all patches are related to one length."""
         return self.whole.size
 
     @property
@@ -157,7 +157,7 @@ class Patch(Target):
         return np.asarray(np.min([self.whole.margin(x), *apart], axis=0))
 
     def on_seam(self, x: Floats, seam: int) -> Floats:
-        """The point (3,) [m] both of the surface and of a seam that is closest to `x` (3,), a point near both."""
+        """The common point (3,) [m] of the surface and a seam that is closest to `x` (3,), a point near both."""
         for _ in range(12):
             value, gradient = self.level(x[None])
             rows = np.vstack([gradient, self._aside(x, seam)])

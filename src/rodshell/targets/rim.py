@@ -1,7 +1,7 @@
 """Where a target ends: regions of the plan, and closed curves on a surface.
 
-A region bounds a height field, or what a rim encloses in plan. A rim separates what is the shell from what is not;
-jagged edges of meshes are smoothed.
+A region is the domain of a height field, or is enclosed by a rim in plan. A rim separates the shell from the rest of a
+surface; jagged edges of meshes are smoothed.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,15 +18,18 @@ from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.validation import numbers, positive
 
-CORNER = 0.5  # cosine of 60 degrees between edges of a loop: it is not rounded there
+CORNER = 0.5  # cosine of 60 degrees: a loop is not rounded where its edges turn by more
 POINTS = 1500  # on each loop
-IN_A_BALL = 32  # of these
+IN_A_BALL = 32  # points in each bounding ball
 
 # jagged edges
 SHARP = 0.35  # [rad], 20 degrees: an edge between two such turns to opposite sides is a jog
 FEWEST = 4  # successive jogs that make an edge jagged: a real corner or notch has fewer
 RUN = 2.5  # times sqrt(n): edges between successive jogs; a lattice cut along a circle of n edges has 1.1 sqrt(n)
-MOST, RMS = 1.0, 0.35  # edge lengths by which a vertex may be moved; steps of a lattice deviate by 0.29 rms
+MOST, RMS = (
+    1.0,
+    0.35,
+)  # edge lengths: moves of vertices, largest and rms; steps of a lattice deviate by 0.29 rms
 HALVINGS = 20
 
 
@@ -128,7 +131,7 @@ class EllipseDomain:
         axes = np.array([self.a, self.b])
         # closest point: x_k = a_k^2 p_k / (a_k^2 + t) with sum (a_k p_k / (a_k^2 + t))^2 = 1;
         # in s = t + min(a)^2 the root is bracketed and the function convex, so Newton from the left end
-        # converges monotonically; a little off the axes: on the long one a closest point has a mirror image
+        # converges monotonically; a little off the axes: on the long axis a closest point has a mirror image
         p = np.maximum(np.abs(xy), 1e-12 * axes)
         low = np.min(axes) ** 2
         shift = axes**2 - low
@@ -433,7 +436,7 @@ def _rows(jogs: Ints, count: int) -> list[Ints]:
 
 def _splined(loop: Floats, edge: Floats, free: Bools, weight: float) -> Floats:
     """The z (n, 3) that minimise |(z - loop) / edge|^2 + weight |third differences of z around the loop / edge|^2,
-    those that are not free kept."""
+    with the vertices that are not free held."""
     from scipy.sparse import coo_matrix, diags_array
     from scipy.sparse.linalg import spsolve
 

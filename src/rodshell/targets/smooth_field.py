@@ -6,8 +6,8 @@ weighted least squares: Q_i(x) = zeta - q_i(xi, eta). Gaussian weights of |x - c
     F(x) = sum_i w_i Q_i / sum_i w_i,   w_i = exp(-|x - c_i|^2 / width^2),
 
 a partition of unity [Ohtake et al. 2003, Multi-level partition of unity implicits] with weights that never vanish:
-since |x - c_i|^2 - |x - c_j|^2 is linear in x, the blend is as smooth far off the surface as on it. F is smooth,
-and its gradient and Hessian are exact, which is what Newton needs; a mesh's own facets have neither.
+since |x - c_i|^2 - |x - c_j|^2 is linear in x, the blend is as smooth far from the surface as on it. F is smooth,
+and its gradient and Hessian are exact, as Newton's method needs; the facets of a mesh have neither.
 
 Neighbours of points are found in a list of cells, searched by compiled loops: points of a surface lie evenly, so that
 cells of one size are faster than a tree.
@@ -35,7 +35,7 @@ class CellList:
     Parameters
     ----------
     points : (n, 3) [m].
-    low : (3,) corner of the first cell [m].
+    low : (3,) lower corner of the first cell [m].
     shape : (3,) number of cells along each axis.
     cell : width of a cell [m].
     start : (cells + 1,) where the points of each cell begin in `order`; cells are counted with z fastest.
@@ -169,7 +169,7 @@ def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, 
             continue
         first, last = n * count, (n + 1) * count - 1
         reach, found = 1, False
-        while not found and (2 * reach + 1) ** 2 < len(points):  # to look into more rows of cells would be slower
+        while not found and (2 * reach + 1) ** 2 < len(points):  # searching more rows of cells would be slower
             distance[first : last + 1] = np.inf
             i_from, i_stop, j_from, j_stop, k_from, k_stop = _box(x, n, low, shape, cell, reach)
             for i in range(i_from, i_stop):
@@ -299,7 +299,7 @@ class SmoothField:
         return Implicit(value, gradient, hessian)
 
 
-# Offsets of the quantities of four points in one array: so the compiler does four sums at once.
+# Offsets of the quantities of four points in one array: so the compiler computes four sums at once.
 LANES = 4
 _X, _Y, _Z, _LEAST, _MOST, _D, _F, _GX, _GY, _GZ, _AX, _AY, _AZ = range(0, 13 * LANES, LANES)
 _DXX, _DXY, _DXZ, _DYY, _DYZ, _DZZ, _HXX, _HXY, _HXZ, _HYY, _HYZ, _HZZ = range(13 * LANES, 25 * LANES, LANES)

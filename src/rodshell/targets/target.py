@@ -1,4 +1,4 @@
-"""What every target offers: an implicit surface, continued smoothly past the place where the shell ends."""
+"""What every target offers: an implicit surface, continued smoothly past the end of the shell."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -125,7 +125,7 @@ class Target(ABC):
         return self.margin(x) > 0
 
     def retract(self, x: Floats, steps: int = 4) -> Floats:
-        """Move points onto the surface along its gradient, which for small gaps leads close to the closest points.
+        """Move points onto the surface along its gradient, which for small gaps leads near the closest points.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class Target(ABC):
         return step, convex, at.gradient
 
     def _descend_to_closest(self, x: Floats) -> Floats:
-        """Closest points with damped steps that always lead closer: for points beyond a centre of curvature."""
+        """Closest points by damped steps that only decrease the distance: for points beyond a centre of curvature."""
         y = self.retract(x, 20)
         damping = np.ones(len(x))
         for _ in range(60):

@@ -1,4 +1,4 @@
-"""A triangle mesh as a surface: vertices merged, faces oriented alike, in one smooth piece; unsuitable ones refused."""
+"""A triangle mesh as a surface: vertices merged, faces oriented alike, in one smooth piece; others are refused."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -106,7 +106,7 @@ class TriangleMesh:
 def sound_mesh(vertices: Floats, faces: Ints, name: str) -> tuple[TriangleMesh, list[str]]:
     """Check and repair a mesh.
 
-    Normals may point either way. Creases end the surface: of a half ball with its floor, or of a shell with a
+    Normals may point to either side. Creases end the surface: of a half ball with its floor, or of a shell with a
     thickness, the piece that covers most of the plan is taken.
 
     Parameters
@@ -247,7 +247,7 @@ class _Neighbours:
         return _Neighbours(np.column_stack([first, second]) // 3, np.column_stack([a, b])[first], a[first] == a[second])
 
     def pieces(self, keep: Bools, faces: int) -> Ints:
-        """Number (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""
+        """Index (m,) of the piece of each face, where only the edges `keep` (e,) connect faces."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
 

@@ -21,7 +21,7 @@ from rodshell.targets.trianglemesh import TriangleMesh
 
 LEVEL = 1e-4  # of the size: an edge this even counts as a base
 FAR = 0.5  # of the field's reach
-UPRIGHT = 0.2  # upward part of a normal: where the edge is not level, a steeper surface may lean over past it
+UPRIGHT = 0.2  # upward part of a normal: where the edge is not level, a steeper surface may overhang it
 CORNER = 0.9  # cosine between edges of the rim: its points are close, and smooth curves turn by far less
 
 
@@ -88,7 +88,7 @@ class WalledTarget(Target):
         return Gap(across, n, hessian)
 
     def _nearest_of_rim(self, x: Floats, foot: Floats) -> Floats:
-        """Points (n, 3) of the rim closest to x; `foot` (n, 2) is closest in plan, and so are they for a level rim."""
+        """Points (n, 3) of the rim closest to x; `foot` (n, 2) is closest in plan, which suffices for a level rim."""
         if self.base is not None:
             return np.column_stack([foot, np.full(len(x), self.base)])
         for _ in range(12):  # Gauss-Newton along the rim: an error shrinks by distance over radius
@@ -219,7 +219,7 @@ class WalledSurface(WalledTarget):
         return value, gradient
 
     def height_at(self, xy: Floats) -> Floats:
-        """z (n,) [m] of the rim: no other heights are needed."""
+        """z (n,) [m] of the rim; other heights are not needed."""
         return self.rim_plan.height_at(xy)
 
     def _nearest_of_rim(self, x: Floats, foot: Floats) -> Floats:
@@ -234,14 +234,14 @@ def walled_surface(
     Parameters
     ----------
     surface : the target.
-    mesh : the mesh through which its field is laid.
+    mesh : the mesh to which its field was fitted.
     field : its smooth field.
-    rims : the open boundary and the boundary curves, as far as there are any.
+    rims : the open boundary and the boundary curves, if there are any.
     section : the rim that a plane at a height z [m] cuts out of the surface.
 
     Raises
     ------
-    InputError : it has openings or several edges, or leans over its edge.
+    InputError : it has openings or several edges, or overhangs its edge.
     """
     instead = 'use drape method "bound"'
     if surface.base is not None:

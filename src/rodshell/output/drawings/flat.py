@@ -190,9 +190,9 @@ def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
         if label.moved:
             pencil.line(label.leader(text), "DIM")
     for loop in inside:
-        places = plan.cuts.reshape(-1, 2)[loop]
-        away = outward(places)
-        for callout in callouts([names[end // 2] for end in loop], places, away, text, room, lines):
+        points = plan.cuts.reshape(-1, 2)[loop]
+        away = outward(points)
+        for callout in callouts([names[end // 2] for end in loop], points, away, text, room, lines):
             named.add(callout.written.text)
             pencil.texts.append(callout.written)
             pencil.line(callout.line, "DIM")
@@ -202,7 +202,7 @@ def _labels(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats) -> None:
 def diagonals(plan: FlatPlan) -> list[tuple[Floats, Floats]]:
     """The two diagonals of each grid's largest rectangle with a joint at every crossing: by them it is set out square.
 
-    No diagonal runs over an opening; grids that do not touch each other, the patches of a sewn shell, have two each.
+    No diagonal runs over an opening; grids that do not touch each other, as patches with seams, have two each.
     """
     found = []
     for patch in _patches(plan):
@@ -330,8 +330,8 @@ def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str,
     if start > 0:
         stops += [(start, "", "support"), (cut - start, "", "support")]
     stops.sort(key=lambda stop: stop[0])
-    places = spread([at for at, _, _ in stops], 1.15 * text)
-    for (at, name, kind), x in zip(stops, places, strict=True):
+    spaced = spread([at for at, _, _ in stops], 1.15 * text)
+    for (at, name, kind), x in zip(stops, spaced, strict=True):
         _stop(pencil, rod, at, float(x), y, text, name, kind, layer, mm)
 
 

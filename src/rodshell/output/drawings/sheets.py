@@ -17,10 +17,9 @@ from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawi
 from rodshell.output.labels import Room
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
-from rodshell.results.checked import Drawings
-from rodshell.results.inputs import input_hash
-from rodshell.results.records import Joint, Material, RodType, Section
-from rodshell.results.results import json_text
+from rodshell.results.archive import input_hash
+from rodshell.results.records import Joint, Material, RodType, Section, json_text
+from rodshell.results.results import Drawings
 from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress
 
 NOTE = "Design aid, not code compliance"

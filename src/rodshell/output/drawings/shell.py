@@ -27,7 +27,7 @@ from rodshell.results import Archive
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
 SUPPORTS_LEGEND = (
-    "Red: where each rod ends and how it goes on. A thin line leads to its name: rod.0 its start, rod.1 its end.",
+    "Red: where each rod ends and how it continues. A thin line leads to its name: rod.0 its start, rod.1 its end.",
     "Blue: straight lines from rod end to rod end{seams}; the edge itself may run outside them.",
 )
 RADIUS, TICK = 0.3, 0.8  # radius of a support's mark, and how far its rod's direction is drawn, in text sizes
@@ -72,7 +72,7 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
 
 
 def erection_drawing(archive: Archive, text: float) -> Drawing:
-    """Ways of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
+    """Paths of the rod ends from flat to their supports, seen from above, and the shell's side at each stage.
 
     Parameters
     ----------
@@ -85,12 +85,12 @@ def erection_drawing(archive: Archive, text: float) -> Drawing:
     ways = 1e3 * history[:, ends, :2]
     for way in ways.transpose(1, 0, 2):
         pencil.line(way[[0, -1]], "DIM", pen=Pen("#b08a2e", 0.1 * text))
-    for k, places in enumerate(ways):
+    for k, points in enumerate(ways):
         last = k == len(ways) - 1
-        for at in places:
+        for at in points:
             pencil.mark(at, (0.3 if last else 0.12) * text, "MARK" if last else "DIM", pen=Pen(SOFT, 0.05 * text))
     low, high = ways.reshape(-1, 2).min(axis=0), ways.reshape(-1, 2).max(axis=0)
-    pencil.write("Ways of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
+    pencil.write("Paths of the rod ends, from above", (low[0], low[1] - 3 * text), 1.2 * text, "LABEL", bold=True)
     left, top = high[0] + 8 * text, high[1]
     for k, (stage, positions) in enumerate(zip(stages, history, strict=True)):
         if k == len(stages) // 2 + 1:
@@ -205,9 +205,9 @@ def supports_drawing(archive: Archive, plan: FlatPlan, text: float) -> Drawing:
 
 
 def _walks(outlines: list[Ints], ends: Floats, alone: Bools) -> Iterator[Ints]:
-    """The ends that are `alone`, not sewn, in their order around the whole shell, its openings, and what is by itself.
+    """The ends that are `alone`, on no seam, in their order around the whole shell and its openings.
 
-    outlines : the ends around each grid and its openings. Where a seam ends, a walk goes on along the next patch.
+    outlines : the ends around each grid and its openings. Where a seam ends, a walk continues along the next patch.
     """
     runs = [run for loop in outlines for run in _runs(loop, alone)]
     while runs:
@@ -272,12 +272,12 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     pencil, final = Pencil(), archive.final
     assert final is not None
     seen_from_above(pencil, archive, text)
-    places = joint_places(archive, archive.states[final])
+    joints = joint_places(archive, archive.states[final])
     known = archive.results.fabrication.bracing if archive.results.fabrication else ()
     cells = zip(known[::2], known[1::2], strict=True)  # both diagonals of a cell follow each other
-    drawn = [cell for cell in cells if all({brace.start, brace.end} <= places.keys() for brace in cell)]
+    drawn = [cell for cell in cells if all({brace.start, brace.end} <= joints.keys() for brace in cell)]
     braces = [brace for cell in drawn for brace in cell]
-    ends = 1e3 * np.array([[places[end][:2] for end in (brace.start, brace.end)] for brace in braces])
+    ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)
     for brace, line in zip(braces, ends, strict=True):
         pencil.line(line, "DIM", pen=Pen("#b08a2e", 0.07 * text), note=f"{brace.start} to {brace.end}")

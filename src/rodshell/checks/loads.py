@@ -1,0 +1,318 @@
+"""Loads: reactions and their balance, forces and moments between crossing rods, and the shell's own weight.
+
+*Reactions.* The gradient of the elastic energy at a held end is the force of its support. A clamp acts on the ghost
+node past the end too: its force there is the clamp's moment about the end. No part of this sees the balance, so the
+sums check it: they vanish only if every free node is in equilibrium.
+
+*Joint loads.* The force on a rod at a joint is what balances the rod's own stretch, bending and twist there; the moment
+about the joint is that of the joint's energy: of the forces on the nodes next to it and of the torques on the edges'
+twist angles. Both are resultants, whatever the joint is made of.
+
+*Self-weight.* How much of its own weight a popped-up shell carries, and how far it sinks under it. The weight is that
+of the rods and joints, lumped at the nodes as in the motions, acting along -z. A shell carries a load where the path of
+equilibria that begins at the unloaded shell is stable up to there. A linear buckling factor is not enough: the unloaded
+shell is bent, and sinks before it buckles.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.formfinding.layers import joint_normals, joint_tangents
+from rodshell.formfinding.popup import Ends
+from rodshell.geometry.frames import cross, dot, unit
+from rodshell.joints.crossings import LinkerBend, RodNodes
+from rodshell.model import Shell
+from rodshell.rods.elements import Elements
+from rodshell.solve.critical import first_critical
+from rodshell.solve.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """Forces and moments of the supports on both ends of each rod in turn.
+
+    Parameters
+    ----------
+    points : (2m, 3) where they act [m].
+    forces : (2m, 3) [N].
+    moments : (2m, 3), each about its own point [N m]; zero where the ends are pinned.
+    """
+
+    points: Floats
+    forces: Floats
+    moments: Floats
+
+    @property
+    def sum_of_forces(self) -> Floats:
+        """(3,) [N]"""
+        return np.asarray(self.forces.sum(axis=0))
+
+    @property
+    def about_middle(self) -> Floats:
+        """(2m, 3) moments about the middle of all points [N m]."""
+        return np.asarray(np.cross(self.points - self.points.mean(axis=0), self.forces) + self.moments)
+
+    @property
+    def sum_of_moments(self) -> Floats:
+        """(3,) about the middle of all points [N m]."""
+        return np.asarray(self.about_middle.sum(axis=0))
+
+    @property
+    def force_imbalance(self) -> float:
+        """Size of the sum of forces over the largest force."""
+        return _share(self.sum_of_forces, self.forces)
+
+    @property
+    def moment_imbalance(self) -> float:
+        """Size of the sum of moments over the largest moment about the middle."""
+        return _share(self.sum_of_moments, self.about_middle)
+
+
+def reactions(shell: Shell, found: Equilibrium) -> Reactions:
+    """Reactions of a shell without loads whose ends are held.
+
+    Parameters
+    ----------
+    shell : with its source frames at the equilibrium.
+    found : the equilibrium; its gradient at the held ends is what the supports exert.
+    """
+    state, gradient = found.state, found.gradient
+    points = state[shell.ends]
+    forces, moments = gradient[shell.ends], np.zeros_like(points)
+    if len(shell.ghosts):
+        at_ghosts = gradient[shell.ghosts]
+        forces = forces + at_ghosts
+        moments = np.cross(state[shell.ghosts] - points, at_ghosts)
+    return Reactions(points, forces, moments)
+
+
+def _share(total: Floats, parts: Floats) -> float:
+    largest = float(np.linalg.norm(parts, axis=1).max(initial=0.0))
+    return float(np.linalg.norm(total)) / largest if largest > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class JointLoads:
+    """Of each of the grid's c crossings, in its order.
+
+    Parameters
+    ----------
+    normals : (c, 3) unit normals of the two rods, on the side that was up in the flat grid.
+    forces : (c, 2, 3) on its first and its second rod [N]. Where two rods meet they are opposite; where more meet,
+        each is what all the others do together.
+    moments : (c, 3) on the second rod about the joint [N m].
+    flat_angles, angles : (c,) from the first rod's direction to the second's about the normal, flat and now [rad].
+    """
+
+    normals: Floats
+    forces: Floats
+    moments: Floats
+    flat_angles: Floats
+    angles: Floats
+
+    @property
+    def scissor(self) -> Floats:
+        """(c,) by how much the angle between the two rods has grown, whichever of them is the first [rad]."""
+        return np.asarray(np.abs(self.angles) - np.abs(self.flat_angles))
+
+    @property
+    def normal_forces(self) -> Floats:
+        """(c,) by which the second rod is pushed along the normal [N]."""
+        return np.asarray(dot(self.forces[:, 1], self.normals))
+
+    @property
+    def shear_moments(self) -> Floats:
+        """(c,) about the normal: against scissoring [N m]."""
+        return np.asarray(dot(self.moments, self.normals))
+
+    @property
+    def out_of_plane_moments(self) -> Floats:
+        """(c,) size of the moment about the axes in the joint's plane [N m]."""
+        return np.asarray(np.linalg.norm(self.moments - self.shear_moments[:, None] * self.normals, axis=1))
+
+
+def joint_loads(shell: Shell, state: Floats) -> JointLoads:
+    """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric."""
+    mesh, positions = shell.mesh, shell.positions(state)
+    met = RodNodes(mesh, shell.node_blocks, shell.first_angle).at_crossings
+    normals = joint_normals(mesh, positions)
+    between, moments = _between(shell, state, met)
+    forces = _on_places(shell, state)[met] + between
+    return JointLoads(
+        normals, forces, moments, _angles(joint_tangents(mesh, mesh.flat), joint_normals(mesh, mesh.flat)),
+        _angles(joint_tangents(mesh, positions), normals),
+    )  # fmt: skip
+
+
+def _angles(tangents: Floats, normals: Floats) -> Floats:
+    a, b = unit(tangents[:, 0]), unit(tangents[:, 1])
+    return np.arctan2(dot(normals, cross(a, b)), dot(a, b))
+
+
+def _rows(elements: Elements, state: Floats) -> Floats:
+    """(m, k, 3) gradient of each element by its own blocks."""
+    m, k = elements.blocks.shape
+    alone = replace(elements, blocks=np.arange(m * k).reshape(m, k))  # type: ignore[type-var]
+    gradient = np.zeros((m * k, 3))
+    alone.evaluate(np.ascontiguousarray(state[elements.blocks].reshape(-1, 3)), gradient)
+    return gradient.reshape(m, k, 3)
+
+
+def _on_places(shell: Shell, state: Floats) -> Floats:
+    """(k, 3) gradient of each rod's own energy by each entry of `rod_nodes` [N]."""
+    mesh = shell.mesh
+    rods = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+    key = rods * len(shell.like) + shell.node_blocks
+    order = np.argsort(key)
+    result = np.zeros((len(key), 3))
+    clamps = np.repeat(np.arange(len(mesh.rod_start)), 2)
+    for element in (shell.stretch, *shell.within):
+        if isinstance(element, LinkerBend):
+            continue
+        of_rods = mesh.edge_rods if element is shell.stretch else mesh.bend_rods
+        of_rods = np.append(of_rods, clamps[: len(element.blocks) - len(of_rods)])
+        rows = _rows(element, state)
+        for column in range(element.blocks.shape[1]):
+            blocks = element.blocks[:, column]
+            nodes = blocks < shell.node_count
+            at = order[np.searchsorted(key[order], (of_rods * len(shell.like) + blocks)[nodes])]
+            np.add.at(result, at, rows[nodes, column])
+    return result
+
+
+def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:
+    """Of the joints' energies: minus their forces on the nodes next to each joint, by crossing and rod (c, 2, 3) [N],
+    and their moment about the joint on the second rod (c, 3) [N m]."""
+    mesh, first = shell.mesh, shell.first_angle
+    count = len(mesh.grid.rods)
+    pair = np.sort(mesh.grid.crossings.rods, axis=1) @ [count, 1]
+    order = np.argsort(pair)
+    forces, moments = np.zeros((len(pair), 2, 3)), np.zeros((len(pair), 3))
+    elements = [element for element in shell.elements if isinstance(element, LinkerBend) or element in shell.between]
+    for element in elements:
+        angles = [c for c in range(element.blocks.shape[1]) if (element.blocks[:, c] >= first).all()]
+        if not angles or len(element.blocks) == 0:
+            continue
+        rows, edges = _rows(element, state), element.blocks[:, angles] - first
+        rods = mesh.edge_rods[edges]
+        extreme = np.column_stack([rods.min(axis=1), rods.max(axis=1)])
+        crossing = order[np.searchsorted(pair[order], extreme @ [count, 1])]
+        for column, edge, rod in zip(angles, edges.T, rods.T, strict=True):
+            side = (mesh.grid.crossings.rods[crossing, 1] == rod).astype(np.intp)
+            joint = shell.node_blocks[met[crossing, side]]
+            ends = shell.stretch.blocks[edge]
+            outer = np.where(ends[:, 0] == joint, ends[:, 1], ends[:, 0])
+            at = (element.blocks == outer[:, None]).argmax(axis=1)
+            pull = rows[np.arange(len(rows)), at]
+            tangent = unit(state[ends[:, 1]] - state[ends[:, 0]])
+            torque = np.cross(pull, state[outer] - state[joint]) - rows[:, column, :1] * tangent
+            np.subtract.at(forces, (crossing, side), pull)
+            np.add.at(moments, crossing, np.where(side[:, None] == 1, torque, 0.0))
+    return forces, moments
+
+
+GRAVITY = 9.81  # [m/s2]
+MOST = 100.0  # times its own weight: a shell that carries more is not loaded further
+
+Limit = Literal["unstable unloaded", "limit point", "bifurcation", "none", "not followed", "no mass"]
+
+
+@dataclass(frozen=True)
+class SelfWeight:
+    """How much of its own weight a shell carries.
+
+    Parameters
+    ----------
+    load_factor : on the weight, up to which the shell is stable; 0 if it is unstable unloaded; None where it is above
+        `MOST`, or where no mass is known. At most 0.2 % below where stability is lost.
+    deflection : largest displacement of a node under the whole weight [m]; None where the shell does not carry it.
+    limit : why the factor is what it is. "limit point": the load cannot grow, the shell snaps through; "bifurcation":
+        it gives way sideways; "none": it is stable up to `MOST`; "not followed": it is stable up to the factor, and
+        nothing is known above; "no mass": the rods have none, so that nothing is known.
+    factorizations : what it took.
+    """
+
+    load_factor: float | None
+    deflection: float | None
+    limit: Limit
+    factorizations: int = 0
+
+    @property
+    def at_least(self) -> float:
+        """The factor as a number: infinite above `MOST`, 0 where nothing is known."""
+        if self.load_factor is not None:
+            return self.load_factor
+        return np.inf if self.limit == "none" else 0.0
+
+
+def self_weight(
+    shell: Shell,
+    found: Equilibrium,
+    *,
+    gravity: float = GRAVITY,
+    most: float = MOST,
+    progress: Callable[[int, float], None] = lambda count, factor: None,
+) -> SelfWeight:
+    """Load a shell with its own weight until it is no longer stable.
+
+    Parameters
+    ----------
+    found : the equilibrium of the shell without loads, its ends held.
+    gravity : [m/s2].
+    most : largest factor that is looked for.
+    progress : as of `first_critical`.
+    """
+    if not shell.mass[np.unique(shell.stretch.blocks), 2].all():  # joints may have some even then
+        return SelfWeight(None, None, "no mass")
+    load = np.zeros_like(found.state)
+    load[:, 2] = -gravity * shell.mass[:, 2]
+    end = first_critical(found, load, most=most, progress=progress)
+    deflection = None
+    if end.state is not None:
+        moved = shell.positions(end.state) - shell.positions(found.state)
+        deflection = float(np.linalg.norm(moved, axis=1).max())
+    if end.limit == "none":
+        return SelfWeight(None, deflection, "none", end.factorizations)
+    limit: Limit = "not followed" if end.limit == "lost" else end.limit
+    return SelfWeight(end.factor, deflection, limit, end.factorizations)
+
+
+def unknown_weights(found: Mapping[Ends, SelfWeight]) -> tuple[str, ...]:
+    """Sentences on what is not known.
+
+    Parameters
+    ----------
+    found : by end condition.
+    """
+    if any(weight.limit == "no mass" for weight in found.values()):
+        return (
+            "no mass was given, so that it is not known what share of its own weight the shell carries: "
+            "give rod.section.mass",
+        )
+    return tuple(
+        f"with {ends} ends the shell carries at least {_in_weights(weight.load_factor or 0.0)} its own weight; above, "
+        "its path could not be followed, and nothing is known"
+        for ends, weight in found.items()
+        if weight.limit == "not followed"
+    )
+
+
+def weakest(parts: Sequence[SelfWeight]) -> SelfWeight:
+    """Of patches that stand by themselves: the smallest factor, and the largest deflection if all carry their weight.
+
+    Parameters
+    ----------
+    parts : of each patch.
+    """
+    least = min(parts, key=lambda part: part.at_least)
+    sunk = [part.deflection for part in parts]
+    deflection = None if None in sunk else max(depth for depth in sunk if depth is not None)
+    return SelfWeight(least.load_factor, deflection, least.limit, sum(part.factorizations for part in parts))
+
+
+def _in_weights(factor: float) -> str:
+    return f"{100 * factor:.2g} % of" if factor < 1 else f"{factor:.3g} times"

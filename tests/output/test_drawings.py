@@ -1,0 +1,317 @@
+"""The drawing set: true to scale, on sheets that match, with labels that never cover each other."""
+
+import csv
+import io
+import re
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from rodshell.errors import InputError
+from rodshell.output import export
+from rodshell.output.drawing import TEXT, Drawing, Pencil
+from rodshell.output.drawing import Path as Line
+from rodshell.output.drawings import FINER, drawing_set, sheet_set
+from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan
+from rodshell.output.drawings.sheets import OVERLAP, SCALES, fitted, room, tiled
+from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing
+from rodshell.output.grid import joint_places, rods_of
+from rodshell.output.labels import boxes_meet, lines_meet, spread
+from rodshell.output.options import DrawingStyle, OutputOptions
+from rodshell.results import Archive
+from rodshell.results.wording import rounding_of
+from tests.output.dxf_reader import read_dxf
+from tests.output.forms import TARGETS, archive, formed, wished
+from tests.output.sample_archive import sample_archive, table_archive
+
+PAPER = (420.0, 297.0)  # A3
+FORMED = [*TARGETS, "roof", "opening", "sewn"]
+ARCHIVES = [*FORMED, "wished", "sample", "table"]
+
+
+def named(name: str) -> Archive:
+    others = {"wished": wished, "sample": sample_archive, "table": table_archive}
+    return others[name]() if name in others else formed(name)
+
+
+def covered(drawing: Drawing) -> list[tuple[str, str]]:
+    """Pairs of texts of a drawing that cover each other."""
+    boxes = np.array([text.box() for text in drawing.texts]).reshape(-1, 4, 2)
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    found = []
+    for k, text in enumerate(drawing.texts):
+        near = k + 1 + np.flatnonzero(np.all((low[k + 1 :] < high[k]) & (high[k + 1 :] > low[k]), axis=1))
+        found += [
+            (text.text, drawing.texts[j].text)
+            for j in near
+            if boxes_meet(0.999 * boxes[k] + 0.001 * boxes[k].mean(0), boxes[j][None])
+        ]
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
+    plan = flat_plan(named(name))
+    for drawing in drawing_set(named(name), plan).values():
+        assert covered(drawing) == [], drawing.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_labels_of_no_sheet_cover_each_other(name: str) -> None:
+    sheets, paper = sheet_set(named(name), flat_plan(named(name)))
+    for sheet in sheets:
+        assert covered(sheet) == [], sheet.title
+        low, high = sheet.box()
+        assert np.all(low >= 0)
+        assert np.all(high <= paper)
+
+
+def test_the_check_sees_labels_that_cover_each_other() -> None:
+    pencil = Pencil()
+    pencil.write("U01", (0, 0), 10, "LABEL")
+    pencil.write("V01", (12, 3), 10, "LABEL", angle=0.5)
+    pencil.write("V02", (12, 30), 10, "LABEL")
+    assert covered(pencil.done("", "", 10)) == [("U01", "V01")]
+
+
+@pytest.mark.parametrize("name", ["dome", "ridge"])
+def test_every_rod_and_joint_is_labelled_on_the_plan(name: str) -> None:
+    plan = flat_plan(archive(name))
+    texts = {text.text for text in flat_drawing(plan, plan.text).texts}
+    assert {rod.id for rod in plan.rods} | {joint.id for joint in plan.joints} <= texts
+
+
+def test_scale_is_the_largest_standard_one_that_fits() -> None:
+    plan = flat_plan(archive("dome"))
+    low, high = room(PAPER)
+    sheet = fitted(lambda text: flat_drawing(plan, text), PAPER)
+    bottom, top = sheet.content.box()
+    assert np.all(bottom >= low - 1e-9)
+    assert np.all(top <= high + 1e-9)
+    larger = SCALES[SCALES.index(sheet.scale) - 1]
+    whole = np.subtract(*flat_drawing(plan, TEXT * larger).box()[::-1])
+    assert np.any(whole / larger > high - low)
+
+
+def test_sheets_of_the_plan_meet_at_their_match_lines() -> None:
+    """Within the match lines of all sheets each rod is there once and whole; every sheet goes on beyond them."""
+    plan = flat_plan(archive("dome"))
+    low, high = room(PAPER)
+    sheets = list(tiled(lambda text: flat_drawing(plan, text), PAPER))
+    assert len(sheets) > 1
+    drawn = {rod.id: 0.0 for rod in plan.rods}
+    for sheet in sheets:
+        inner = sheet.content.clipped(low + OVERLAP, high - OVERLAP)
+        for path in inner.paths:
+            if path.name:
+                drawn[path.name] += float(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum())
+        whole = sum(np.linalg.norm(np.diff(path.points, axis=0)) for path in sheet.content.paths if path.name)
+        assert whole > sum(np.linalg.norm(np.diff(path.points, axis=0)) for path in inner.paths if path.name)
+    for rod in plan.rods:
+        assert drawn[rod.id] == pytest.approx(1e3 * rod.length, abs=1e-6)
+    words = {text.text for sheet in sheets for text in sheet.content.texts if "match line" in text.text}
+    assert words == {f"match line to part {row}{column}" for row in "ABCD" for column in "12"}
+
+
+def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
+    """Row A is the top one; the line to the next row is at the bottom, that to the next column on the right."""
+    plan = flat_plan(archive("dome"))
+    sheets = {
+        sheet.title.split(" part ")[1][:2]: sheet for sheet in tiled(lambda text: flat_drawing(plan, text), PAPER)
+    }
+    assert list(sheets) == [row + column for row in "ABCD" for column in "12"]
+    rods = {part: {path.name for path in sheet.content.paths if path.name} for part, sheet in sheets.items()}
+    top = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "u" else -1.0).id
+    right = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "v" else -1.0).id
+    assert {part for part, drawn in rods.items() if top in drawn} == {"A1", "A2"}
+    assert {part[1] for part, drawn in rods.items() if right in drawn} == {"2"}
+    middle = 0.5 * np.sum(room(PAPER), axis=0)
+    lines = {text.text: text.at for text in sheets["B1"].content.texts if "match line" in text.text}
+    assert lines["match line to part A1"][1] > middle[1] > lines["match line to part C1"][1]
+    assert lines["match line to part B2"][0] > middle[0]
+
+
+@settings(max_examples=100, deadline=None)
+@given(arrays(float, (5, 2), elements=st.floats(-3, 3).map(lambda value: round(value, 3))))
+def test_clipping_keeps_what_is_inside(points: np.ndarray) -> None:
+    """Against many points along the polyline: inside the square they are on a piece that is kept, and no other is."""
+    drawing = Drawing("", "", 1.0, (Line(points, "CUT"),)).clipped(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    kept = sum(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum() for path in drawing.paths)
+    share = np.linspace(0, 1, 2001)[:, None]
+    inside = 0.0
+    for a, b in pairwise(points):
+        within = np.all(np.abs((1 - share) * a + share * b) <= 1, axis=1)
+        inside += np.linalg.norm(b - a) * within.mean()
+    assert kept == pytest.approx(inside, abs=0.02)
+    assert all(np.all(np.abs(path.points) <= 1 + 1e-9) for path in drawing.paths)
+
+
+@given(st.lists(st.floats(0, 100), max_size=12), st.floats(0.1, 20))
+def test_spread_keeps_the_order_and_the_gap_and_moves_least(places: list[float], gap: float) -> None:
+    """The least squares' own condition: no group of neighbours gains by moving as a whole."""
+    found = spread(places, gap)
+    order = np.argsort(places, kind="stable")
+    asked, put = np.array(places)[order], found[order]
+    assert np.all(np.diff(put) >= gap - 1e-9)
+    groups = np.split(np.arange(len(put)), np.flatnonzero(np.diff(put) > gap + 1e-9) + 1)
+    for group in groups:
+        moved = put[group] - asked[group]
+        assert abs(moved.sum()) < 1e-6
+        assert np.all(np.cumsum(moved) <= 1e-6)  # the left part of a group is pushed left, never right
+
+
+def test_diagonals_are_those_of_the_largest_rectangle() -> None:
+    plan = flat_plan(archive("dome"))
+    (a, b), (c, d) = diagonals(plan)
+    assert np.linalg.norm(b - a) == pytest.approx(np.linalg.norm(d - c))
+    marks = {tuple(np.round(mark, 6)) for mark in plan.marks}
+    assert {tuple(np.round(point, 6)) for point in (a, b, c, d)} <= marks
+    area = abs((b - a)[0] * (b - a)[1])
+    x, y = (np.unique(np.round(plan.marks[:, k], 6)) for k in (0, 1))
+    best = max(
+        (x1 - x0) * (y1 - y0)
+        for x0 in x for x1 in x for y0 in y for y1 in y
+        if x1 > x0 and y1 > y0 and {(x0, y0), (x1, y0), (x0, y1), (x1, y1)} <= marks
+    )  # fmt: skip
+    assert area == pytest.approx(best)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORMED)
+def test_each_grid_is_set_out_by_two_diagonals_with_their_lengths(name: str) -> None:
+    """Each patch of a sewn shell has its own; along them every cell is there, so that none runs over an opening."""
+    plan = flat_plan(formed(name))
+    found = diagonals(plan)
+    assert len(found) == (4 if name == "sewn" else 2)
+    for a, b in found:
+        for point in a + np.linspace(0.01, 0.99, 99)[:, None] * (b - a):
+            near = np.abs(plan.marks - point).max(axis=1) < 1.001 * plan.spacing
+            sides = np.sign(np.round(plan.marks[near] - point, 6))
+            assert {(1, 1), (1, -1), (-1, 1), (-1, -1)} <= {
+                (i or j, k or m) for i, k in sides for j in (1, -1) for m in (1, -1)
+            }  # a joint in each quarter around it
+    written = [text.text for text in flat_drawing(plan, plan.text).texts]
+    for a, b in found:
+        words, *others = (plan.rounding.mm(1e-3 * np.linalg.norm(d - c)) for c, d in [(a, b), *found])
+        assert written.count(words) == others.count(words)
+
+
+def apart(point: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Distances (n,) from a point to lines (n, 2, 2)."""
+    start, along = lines[:, 0], lines[:, 1] - lines[:, 0]
+    share = np.clip(np.sum((point - start) * along, axis=1) / np.sum(along**2, axis=1), 0, 1)
+    return np.linalg.norm(start + share[:, None] * along - point, axis=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "share"), [("dome", 0.7), ("roof", 1.0), ("opening", 1.0), ("sewn", 0.45)])
+def test_numbers_of_braces_lie_on_no_rod_and_no_brace(name: str, share: float) -> None:
+    """Nearly all of them find room, where cells are not too thin; between joints, rods are taken to be straight."""
+    made = formed(name)
+    drawing = bracing_drawing(made, FINER["bracing"] * flat_plan(made).text)
+    braces = np.array([path.points for path in drawing.paths if "to" in path.note])
+    numbers = [text for text in drawing.texts if text.layer == "LABEL"]
+    assert len(numbers) >= share * len(braces)
+    joints = joint_places(made, made.states[made.final or ""])
+    rods = []
+    for rod in rods_of(made):
+        met = sorted(rod.joints, key=lambda joint: joint[1])
+        places = [joints.get(f"{rod.id}/{other}", joints.get(f"{other}/{rod.id}")) for other, _ in met]
+        rods += [(a[:2], b[:2]) for a, b in pairwise(places)]
+    lines = np.concatenate([1e3 * np.array(rods), braces])
+    assert [text.text for text in numbers if lines_meet(text.box(), lines)] == []
+    lengths = [rounding_of(made.results).mm(one["final"]) for one in made.results.plain()["fabrication"]["bracing"]]
+    for number in numbers:  # of the brace that it lies along: nearest to both ends of its text
+        ends = 0.5 * (number.box()[[0, 1]] + number.box()[[3, 2]])
+        off = np.max([apart(end, braces) for end in ends], axis=0)
+        assert lengths[int(np.argmin(off))] == number.text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "spans"), [("roof", ("12000", "8000")), ("dome", ("400.00", "400.00"))])
+def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[str, str]) -> None:
+    """Rod ends are some hundredths of a millimetre off the edge: to a ten-thousandth a roof of 12 by 8 m is that."""
+    made = formed(name)
+    plan = flat_plan(made)
+    texts = [text.text for text in elevations_drawing(made, plan.text).texts]
+    assert texts[0] == spans[0]
+    assert texts[3] == spans[1]
+    longer = {**made.states, made.final: made.states[made.final or ""] * 1.0002}
+    assert elevations_drawing(replace(made, states=longer), plan.text).texts[0].text != spans[0]
+
+
+@pytest.mark.slow
+def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:
+    """Strips, both schedules, the PDF's tables and the pieces of stock: 12 mm of allowance before the rod's start."""
+    made = wished()
+    half = 0.501 * rounding_of(made.results).step
+    export(made, tmp_path, ["dxf", "csv"])
+    rods, joints, stock = (rows_of(tmp_path / f"schedule/{name}.csv") for name in ("rods", "joints", "stock"))
+    pieces = dict(words.split() for row in stock for words in row["pieces_mm"].split("; "))
+    tables = [one for one in sheet_set(made, flat_plan(made))[0] if re.match("(Rods|Joints)(,|$)", one.title)]
+    printed = {word for sheet in tables for text in sheet.texts for word in text.text.split("; ")}
+    entities = read_dxf(tmp_path / "drawings/strips.dxf")
+    lines = sorted((one.points for one in entities if one.layer == "LASER"), key=lambda points: -points[0, 1])
+    holes, saws = (
+        np.array([one.points.mean(axis=0) for one in entities if one.layer == "MARK" and one.kind == kind])
+        for kind in ("CIRCLE", "LINE")
+    )
+    for rod, row, line in zip(made.results.plain()["rods"], rods, lines, strict=True):
+        assert line[1, 0] - line[0, 0] == pytest.approx(float(row["cut_length_mm"]), abs=half)
+        met = {joint["with"]: 1e3 * joint["at"] + 12.0 for joint in rod["joints"]}
+        cuts = 1e3 * np.array(rod["splices"]) + 12.0
+        for marks, wanted in ((holes, sorted(met.values())), (saws, cuts)):
+            np.testing.assert_allclose(np.sort(marks[np.abs(marks[:, 1] - line[0, 1]) < 1e-6, 0]), wanted, atol=half)
+        listed = dict(word.split() for word in row["joints_from_cut_end_mm"].split("; "))
+        assert {name: float(at) for name, at in listed.items()} == pytest.approx(met, abs=half)
+        shown = [word for word in row["splices_from_cut_end_mm"].split("; ") if word]
+        np.testing.assert_allclose([float(word) for word in shown], cuts, atol=half)
+        lengths = [float(pieces[f"{rod['id']}.{k + 1}"]) for k in range(len(cuts) + 1)]
+        np.testing.assert_allclose(np.cumsum(lengths)[:-1], cuts, atol=len(lengths) * half)
+        ends = [(joint[f"rod_{b}"], joint[f"at_{a}_from_cut_end_mm"])
+                for joint in joints for a, b in ("ab", "ba") if joint[f"rod_{a}"] == rod["id"]]  # fmt: skip
+        assert {name: float(at) for name, at in ends} == pytest.approx(met, abs=half)
+        assert {*shown, *(at for _, at in ends)} <= printed
+    assert any(rod["splices"] for rod in made.results.plain()["rods"])
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
+
+
+def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> None:
+    export(wished(), tmp_path, ["dxf"])
+    entities = read_dxf(tmp_path / "drawings/plan.dxf")
+    cuts = [one.points for one in entities if one.layer == "LASER"]
+    rods = wished().results.plain()["rods"]
+    for cut, rod in zip(cuts, rods, strict=True):
+        assert np.linalg.norm(cut[1] - cut[0]) == pytest.approx(1e3 * rod["length"] + 24.0, abs=1e-6)
+    (footprint,) = (one.points for one in entities if one.layer == "BOUNDARY-FLAT")
+    expected = {tuple(np.round(1e3 * np.array(point), 6)) for point in wished().results.plain()["footprint"]}
+    assert {tuple(np.round(point, 6)) for point in footprint} == expected
+
+
+@pytest.mark.parametrize(
+    ("style", "reason"),
+    [({"paper": "A5"}, "use A4, A3"), ({"layers": {"CUTS": "x"}}, "there are CUT, MARK"),
+     ({"layers": {"CUT": "a*b"}}, "cannot be called"), ({"layers": {"CUT": " "}}, "cannot be called"),
+     ({"layers": {"CUT": "mark"}}, 'two layers would be called "MARK"')],
+)  # fmt: skip
+def test_styles_that_no_file_can_hold_are_refused(style: dict, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        DrawingStyle(**style)
+
+
+def test_options_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(InputError, match="strength must be positive"):
+        OutputOptions(strength=0.0)
+    with pytest.raises(InputError, match="0 to 1000 stages"):
+        OutputOptions(stages=-1)

@@ -1,0 +1,138 @@
+"""Sheets can be read on paper, and say what they are and what they leave out."""
+
+import os
+import time
+from dataclasses import replace
+
+import pytest
+
+import rodshell as rs
+from rodshell.errors import InputError
+from rodshell.joints import Joint, joint_parameters
+from rodshell.output.drawing import CAPITAL, LETTER, TEXT, Drawing
+from rodshell.output.drawings import sheet_set
+from rodshell.output.drawings.flat import flat_drawing, flat_plan
+from rodshell.output.drawings.sheets import MARGIN, fitted, parts, tiled, title_block
+from rodshell.output.options import PAPERS, DrawingStyle
+from rodshell.results import Archive, Results
+from tests.output.forms import archive, wished
+from tests.output.hostile import hostile_archive
+from tests.output.sample_archive import sample_archive, table_archive
+
+
+def sheets(made: Archive) -> list[Drawing]:
+    return sheet_set(made, flat_plan(made))[0]
+
+
+def styled(made: Archive, **style: object) -> Archive:
+    return replace(made, results=Results.of({**made.results.plain(), "drawings": style}))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("paper", ["A4", "A3", "A1"])
+def test_capitals_are_never_lower_than_iso_3098_has_them(paper: str) -> None:
+    """1.8 mm is the smallest height of letters in ISO 3098, 2.5 mm the usual one."""
+    sizes = [text.size for sheet in sheets(styled(archive("dome"), paper=paper)) for text in sheet.texts]
+    assert CAPITAL * min(sizes) >= 1.8
+    assert pytest.approx(2.5, abs=0.02) == CAPITAL * TEXT
+
+
+@pytest.mark.slow
+def test_what_finds_no_room_is_counted_and_said() -> None:
+    """The whole plan of the dome on A3 has no room for ids of joints: those written and those left out are all."""
+    made = archive("dome")
+    plan = flat_plan(made)
+    whole = next(sheet for sheet in sheets(made) if sheet.title == "Flat plan")
+    ids = {joint.id for joint in plan.joints}
+    written = [text.text for text in whole.texts if text.text in ids]
+    assert whole.left_out == (f"all of {len(ids)} joint ids (named by the rods that cross)",)
+    assert not written
+    assert any(whole.left_out[0] in text.text for text in whole.texts)
+
+
+def test_parts_show_what_the_whole_leaves_out() -> None:
+    """All ids of joints stand on the parts, which are no larger than it takes: the next smaller scale has no room."""
+    plan, paper = flat_plan(archive("dome")), PAPERS["A3"]
+
+    def compose(text: float) -> Drawing:
+        return flat_drawing(plan, text)
+
+    shown = list(parts(compose, paper, fitted(compose, paper)))
+    texts = {text.text for sheet in shown for text in sheet.content.texts}
+    assert {joint.id for joint in plan.joints} <= texts
+    coarser = {2.5: 3, 2: 2.5, 1: 2}[shown[0].scale]
+    assert next(tiled(compose, paper, coarser)).content.left_out
+
+
+def test_a_sheet_that_shows_all_needs_no_parts() -> None:
+    plan, paper = flat_plan(table_archive()), PAPERS["A0"]
+    whole = fitted(lambda text: flat_drawing(plan, text), paper)
+    assert not whole.content.left_out
+    assert list(parts(lambda text: flat_drawing(plan, text), paper, whole)) == []
+
+
+@pytest.mark.slow
+def test_the_title_block_names_rods_joints_author_and_date() -> None:
+    made = styled(wished(), name="Pavilion roof", author="A. Nyone", date="2026-11-22", project="Park", tolerance=5e-4)
+    entries = dict(title_block(made, "").entries)
+    assert entries["Section"] == "circle, radius 1 mm"
+    assert entries["Material"].startswith("E 1 MPa, 1000 kg/m")
+    assert (entries["Drawn by"], entries["Date"], entries["Project"]) == ("A. Nyone", "2026-11-22", "Park")
+    assert (entries["Units"], entries["Tolerance"]) == ("mm, shown to 0.1 mm", "0.5 mm")
+    for sheet in sheets(made):
+        texts = {text.text for text in sheet.texts}
+        assert set(entries) | {"A. Nyone", "circle, radius 1 mm"} <= texts
+        assert any(text.startswith("Pavilion roof: ") for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("joint", "words"),
+    [
+        (rs.Pin(eccentricity=0.008), "pin, eccentricity 8 mm"),
+        (rs.Ball(), "ball"),
+        (rs.Ball(mass=0.12), "ball, mass 0.12 kg"),
+        (rs.Spring(shear=0.5, out_of_plane=float("inf")), "spring, shear 0.5 N m/rad, out of plane rigid"),
+    ],
+)
+def test_joints_stand_in_the_title_block_with_their_units(joint: Joint, words: str) -> None:
+    made = wished()
+    made = replace(made, results=Results.of({**made.results.plain(), "joint": joint_parameters(joint)}))
+    assert dict(title_block(made, "").entries)["Joints"] == words
+
+
+def test_the_date_is_that_of_source_date_epoch_or_today(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    assert dict(title_block(sample_archive(3, 2), "").entries)["Date"] == "1970-01-01"
+    assert dict(title_block(styled(sample_archive(3, 2), date="2026-11-22"), "").entries)["Date"] == "2026-11-22"
+    for broken in ("soon", "1e400", "99999999999999999999"):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", broken)
+        before = time.strftime("%Y-%m-%d", time.gmtime())
+        assert (
+            before
+            <= dict(title_block(sample_archive(3, 2), "").entries)["Date"]
+            <= time.strftime("%Y-%m-%d", time.gmtime())
+        )
+    assert os.environ["SOURCE_DATE_EPOCH"] == broken
+
+
+def test_dates_that_are_no_days_are_refused() -> None:
+    with pytest.raises(InputError, match="2026-13-01"):
+        DrawingStyle(date="2026-13-01")
+    with pytest.raises(InputError, match="tolerance"):
+        DrawingStyle(tolerance=-1e-3)
+
+
+@pytest.mark.slow
+def test_long_names_are_shortened_to_their_place() -> None:
+    made = hostile_archive()
+    made = styled(made, **{**made.results.plain()["drawings"], "project": "W" * 500, "name": "W" * 500, "paper": "A4"})
+    for sheet in sheets(made):
+        for text in sheet.texts:
+            if set(text.text) & {"W"} and text.layer == "TITLE":
+                assert text.at[0] + LETTER * text.size * len(text.text) <= PAPERS["A4"][0] - MARGIN
+
+
+def test_a_result_without_rod_or_joint_says_so() -> None:
+    bare = {key: value for key, value in sample_archive(3, 2).results.plain().items() if key not in ("rod", "joint")}
+    entries = dict(title_block(replace(sample_archive(3, 2), results=Results.of(bare)), "").entries)
+    assert entries["Section"] == entries["Material"] == "not given"

@@ -1,0 +1,202 @@
+"""The multifrontal factorisation against NumPy's dense eigenvalues and solutions, and against QDLDL."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sparse
+
+from rodshell.solve import dense, sparse_ldl
+from rodshell.solve.sparse_ldl import Multifrontal, Qdldl, SingularError, dissect
+
+RANDOM = np.random.default_rng(20211)
+
+
+def upper(matrix):
+    triangle = sparse.triu(sparse.csc_matrix(matrix), format="csc")
+    triangle.sort_indices()
+    return triangle
+
+
+def random_matrix(size, density, shift):
+    """Symmetric, every diagonal stored; `shift` on the diagonal decides the inertia."""
+    part = sparse.random(size, size, density, random_state=RANDOM, data_rvs=RANDOM.standard_normal)
+    return (part + part.T + sparse.diags(np.full(size, shift) + 0.1 * RANDOM.standard_normal(size))).tocsc()
+
+
+def grid_matrix(count, directions=3):
+    """A square grid with `directions` unknowns a node, coupled to the second neighbours as bending is; places too."""
+    line = sparse.diags([1, -4, 6.5, -4, 1], [-2, -1, 0, 1, 2], shape=(count, count))
+    mixing = RANDOM.standard_normal((directions, directions))
+    matrix = sparse.kron(sparse.kronsum(line, line), mixing @ mixing.T + np.eye(directions)).tocsc()
+    x, y = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
+    return matrix, np.repeat(np.column_stack([x.ravel(), y.ravel()]).astype(float), directions, axis=0)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 40, 200])
+@pytest.mark.parametrize("shift", [40.0, 0.5, -3.0])
+@pytest.mark.parametrize("placed", [False, True])
+def test_solution_and_inertia_are_those_of_the_dense_matrix(size, shift, placed):
+    matrix = random_matrix(size, min(1.0, 4 / size), shift)
+    triangle = upper(matrix)
+    places = RANDOM.random((size, 2)) if placed else None
+    factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
+    right = RANDOM.standard_normal(size)
+    scale = np.linalg.cond(matrix.toarray())
+    exact = np.linalg.solve(matrix.toarray(), right)
+    # unpivoted elimination may lose some digits, one step of refinement wins them back: 1e-14 cond measured
+    assert np.abs(factors.solve(right) - exact).max() <= 1e-11 * scale * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("directions", [1, 2, 3])
+def test_grid_agrees_with_qdldl_and_dissection_saves_fill(directions):
+    matrix, places = grid_matrix(30, directions)
+    triangle = upper(matrix)
+    placed = Multifrontal(triangle.indptr, triangle.indices, places)
+    unplaced = Multifrontal(triangle.indptr, triangle.indices)
+    reference = Qdldl(triangle.indptr, triangle.indices)
+    right = RANDOM.standard_normal(matrix.shape[0])
+    *ours, theirs = (solver.factor(triangle.data) for solver in (placed, unplaced, reference))
+    exact = theirs.solve(right)
+    for factors in ours:
+        assert factors.negative == theirs.negative
+        assert np.abs(factors.solve(right) - exact).max() < 1e-10 * np.abs(exact).max()
+    assert placed.fill < 1.3 * unplaced.fill
+
+
+def test_large_fronts_go_through_blas_and_still_agree():
+    """A dense block of 400 unknowns is one front far above the size from which updates are blocked."""
+    size = 400
+    part = RANDOM.standard_normal((size, size))
+    matrix = part + part.T + np.diag(np.where(np.arange(size) % 3, 60.0, -60.0))
+    triangle = upper(matrix)
+    factors = Multifrontal(triangle.indptr, triangle.indices).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
+    right = RANDOM.standard_normal(size)
+    assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-9
+
+
+@pytest.mark.parametrize("bad", [False, True])
+def test_threads_share_the_work_and_change_no_bit(monkeypatch, bad):
+    matrix, places = grid_matrix(50)
+    triangle = upper(matrix - 3.0 * sparse.eye(matrix.shape[0]))
+    right, found = RANDOM.standard_normal(matrix.shape[0]), []
+    if bad:
+        triangle.data[triangle.indptr[1000] - 1] = np.nan
+    for count in (1, 2, 5):
+        monkeypatch.setattr(sparse_ldl, "threads", lambda count=count: count)
+        solver = Multifrontal(triangle.indptr, triangle.indices, places)
+        assert len(solver.plan.part_start) > 6  # one thread alone would be no test
+        assert sorted(solver.plan.parts) == list(range(len(solver.plan.first) - 1))
+        if bad:
+            with pytest.raises(SingularError):
+                solver.factor(triangle.data)
+            continue
+        factors = solver.factor(triangle.data)
+        found.append((factors.negative, factors.solve(right).tobytes()))
+    assert all(one == found[0] for one in found)
+    if not bad:
+        reference = Qdldl(triangle.indptr, triangle.indices).factor(triangle.data)
+        assert reference.negative == found[0][0] > 0
+        exact = reference.solve(right)
+        assert np.abs(np.frombuffer(found[0][1]) - exact).max() < 1e-9 * np.abs(exact).max()
+
+
+def test_blocks_whose_unknowns_are_coupled_differently():
+    """A block is coupled as its unknowns are together: here each of three at a place has neighbours of its own."""
+    size, places = 60, np.repeat(RANDOM.random((20, 2)), 3, axis=0)
+    matrix = random_matrix(size, 0.08, 9.0)
+    triangle = upper(matrix)
+    factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
+    right = RANDOM.standard_normal(size)
+    assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-12
+
+
+def test_refactoring_the_same_pattern_forgets_the_old_values():
+    matrix, places = grid_matrix(12)
+    triangle = upper(matrix)
+    solver = Multifrontal(triangle.indptr, triangle.indices, places)
+    factors = solver.factor(triangle.data, reuse=solver.factor(-triangle.data))
+    assert factors.negative == 0
+    right = np.ones(matrix.shape[0])
+    assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", [Multifrontal, Qdldl])
+def test_factors_stay_as_they_are_whatever_else_is_factorised(kind):
+    """Nor can factors be used whose memory was given away."""
+    matrix, _ = grid_matrix(12)
+    triangle, right = upper(matrix), RANDOM.standard_normal(matrix.shape[0])
+    solver = kind(triangle.indptr, triangle.indices)
+    first = solver.factor(triangle.data)
+    before, other = first.solve(right), None
+    for scale in (-1.0, 3.0, 0.1):
+        other = solver.factor(scale * triangle.data, reuse=other)
+        np.testing.assert_allclose(other.solve(right), before / scale, rtol=1e-9)
+    np.testing.assert_array_equal(first.solve(right), before)
+    again = solver.factor(triangle.data, reuse=first)
+    np.testing.assert_array_equal(again.solve(right), before)
+    with pytest.raises(AssertionError, match="given to another"):
+        first.solve(right)
+
+
+def test_nearly_singular_system_is_solved_to_a_small_residual():
+    matrix, places = grid_matrix(12)
+    lowest = np.linalg.eigvalsh(matrix.toarray())[0]
+    matrix = (matrix - (lowest - 1e-9) * sparse.eye(matrix.shape[0])).tocsc()
+    triangle = upper(matrix)
+    factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+    assert factors.negative == 0
+    right = RANDOM.standard_normal(matrix.shape[0])
+    x = factors.solve(right)
+    assert np.abs(matrix @ x - right).max() < 1e-12 * np.abs(x).max() * np.abs(triangle.data).max()
+
+
+def test_digits_lost_to_a_small_pivot_are_won_back():
+    """Elimination without pivoting loses eight digits here: 1e-8 beside entries of order 1."""
+    matrix = np.array([[1e-8, 1.0, 0.3], [1.0, 1e-8, 0.7], [0.3, 0.7, 2.0]])
+    triangle = upper(matrix)
+    factors = Multifrontal(triangle.indptr, triangle.indices, np.arange(3.0)[:, None]).factor(triangle.data)
+    assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
+    exact = np.array([1.0, -2.0, 3.0]) / 7
+    assert np.abs(factors.solve(matrix @ exact) - exact).max() < 1e-14
+
+
+@pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
+def test_vanishing_pivot_is_refused(bad):
+    triangle = upper(np.diag([1.0, 2.0, 3.0]))
+    triangle.data[1] = bad
+    with pytest.raises(SingularError):
+        Multifrontal(triangle.indptr, triangle.indices).factor(triangle.data)
+
+
+def test_dissection_orders_every_block_once_and_separators_last():
+    matrix, places = grid_matrix(20, 1)
+    coupled = sparse.csr_matrix(matrix - sparse.diags(matrix.diagonal()))
+    coupled.eliminate_zeros()
+    order = dissect(places, coupled.indptr.astype(np.int64), coupled.indices.astype(np.int64))
+    assert sorted(order) == list(range(400))
+    last = places[order[-40:]]  # the first separator: two lines of nodes, since bending couples second neighbours
+    assert np.ptp(last, axis=0).min() == 1.0
+
+
+def test_what_memory_held_before_does_not_matter(monkeypatch):
+    """Kernels read some numbers past what is theirs; nothing of it may get into the solution."""
+    matrix, places = grid_matrix(23)
+    triangle, right = upper(matrix), RANDOM.standard_normal(matrix.shape[0])
+    found = []
+    for rubbish in (0.0, np.nan, 1e300):
+        make = sparse_ldl.room
+
+        def filled(numbers, make=make, rubbish=rubbish):
+            memory = make(numbers)
+            memory[:] = rubbish
+            return memory
+
+        with monkeypatch.context() as patched:
+            patched.setattr(sparse_ldl, "room", filled)
+            patched.setattr(dense, "room", filled)
+            factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+            found.append(factors.solve(right))
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(found[2], found[0])
