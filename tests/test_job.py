@@ -1,6 +1,7 @@
 """A job is a value: the same however it is written; run again from an earlier form, only what changed is run."""
 
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -169,7 +170,7 @@ def test_a_job_is_read_only_and_says_what_it_is_in_one_line() -> None:
     with pytest.raises(AttributeError, match=r"use job.changed\(...\)"):
         job.case = None  # type: ignore[misc]
     assert repr(job) == (
-        "<rodshell.Job: hemisphere, spacing 60 mm x 60 mm, 1 seams, bound drape, ball joints, ends pinned and clamped>"
+        "<rodshell.Job: hemisphere, spacing 60 mm x 60 mm, 1 seam, bound drape, ball joints, ends pinned and clamped>"
     )
 
 
@@ -376,6 +377,11 @@ def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
     job = rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job == rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job != rs.Job.of_table(folder, rod__section__radius="1 mm", checks__stages=1)
+    for key, value in {"layout.rotate": 0.1, "pop_up.ends": "clamped", "target.radius": 1.0}.items():
+        with pytest.raises(InputError, match=f"{key} = .*: a table of rods does not use this key"):
+            job.changed({key: value})
+        with pytest.raises(InputError, match="does not use this key"):
+            rs.Job.of_table(folder, {key: value})
     form = job.run()
     assert form.from_table
     assert form.agreement == {}
@@ -399,7 +405,7 @@ def test_keys_that_a_table_of_rods_does_not_have_are_refused(
     table = earlier.save(tmp_path / "dome", kinds=["csv"]) / "schedule" / "rods.csv"
     job = rs.Job.of_table(table)
     for make in (lambda: rs.Job.of_table(table, changes), lambda: job.changed(changes)):
-        with pytest.raises(InputError, match=f"{next(iter(changes))} is not used for a table of rods"):
+        with pytest.raises(InputError, match=f"{next(iter(changes))} = .*a table of rods does not use this key"):
             make()
 
 
@@ -444,6 +450,34 @@ def test_a_notebook_shows_the_shell_and_its_verdict(earlier: rs.Form) -> None:
     assert "<svg" in shown
     assert f"<b>{earlier.verdict.level}</b>" in shown
     assert "&lt;rodshell.Form of hemisphere" in shown
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda job: job.changed(layout=3), r"layout = 3: must be a table; \[layout\] has rods"),
+        (lambda job: job.changed({3: 4}), "words such as target.radius, not 3"),
+        (lambda job: job.run(time_limit="60 s"), 'time_limit must be a number in s, not "60 s"'),
+        (lambda _: rs.Job.load(""), "the name of the case is empty"),
+        (lambda _: rs.Job.load(3), "the case must be the name of a built-in case"),
+        (lambda _: rs.Job.of_case("pavilion"), "case must be the case of a form"),
+        (lambda _: rs.Job.of_table(3), "source must be the path of a file, not 3"),
+    ],
+)
+def test_arguments_of_a_wrong_kind_are_one_sentence(call: Callable[[rs.Job], object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call(dome())
+
+
+def test_a_form_refuses_options_of_a_wrong_kind(earlier: rs.Form) -> None:
+    with pytest.raises(InputError, match="options must be a rodshell OutputOptions, not 3"):
+        earlier.archive(options=3)  # type: ignore[arg-type]
+
+
+def test_a_form_is_shown_by_the_name_of_its_case(earlier: rs.Form) -> None:
+    assert repr(rs.Job.of_case(earlier.case).changed(drawings__name="my dome").run(warm_start=earlier)).startswith(
+        "<rodshell.Form of my dome: "
+    )
 
 
 def test_the_ready_progress_says_the_stages(capsys: pytest.CaptureFixture[str]) -> None:

@@ -33,6 +33,7 @@ from rodshell.results.from_checks import checked_results, checked_states, final_
 from rodshell.results.from_form import results_of, states_of, with_seam_forces
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
+from rodshell.validation import instance
 
 Stages = PatchForm | PatchedForm
 
@@ -199,6 +200,7 @@ class Form:
 
     def with_options(self, options: OutputOptions) -> "Form":
         """The same stages, to be checked, fabricated and drawn with other options."""
+        instance("options", options, OutputOptions)
         same = options.stages == self.options.stages and self._weight(options) == self._weight(self.options)
         known = self.known_checks if same else None
         asked = Case.model_validate(options.parameters())
@@ -257,7 +259,7 @@ class Form:
 
     def __repr__(self) -> str:
         rods, pieces = len(self.footprint.rods), len(self.patches)
-        name = "a table of rods" if self.from_table else self.target.name
+        name = "a table of rods" if self.from_table else self.case.drawings.name or self.target.name
         parts = f" in {pieces} patches" if pieces > 1 else ""
         found = f"popped up {' and '.join(self.popped)}" if self.popped else "not popped up"
         return f"<rodshell.Form of {name}{parts}: {rods} rods, {found}, {self.status}>"

@@ -5,6 +5,7 @@ The command line, a studio, a sweep or a script load or make a `Job`, change it,
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Literal, Self, get_args
@@ -28,18 +29,19 @@ from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output.options import OutputOptions
+from rodshell.results.archive import read_inputs
 from rodshell.results.folder import reading
-from rodshell.results.inputs import read_inputs
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run
 from rodshell.targets import Target
 from rodshell.units import length_text, shown
-from rodshell.validation import choice, choices_of, instance, point
+from rodshell.validation import choice, choices_of, file_path, instance, point
 
 Auto = Literal["auto"]
 AskedEnds = Literal["pinned", "clamped", "both"]
 
 FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
+"""Tables of the case that a job of a table of rods uses."""
 OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
 
 
@@ -58,7 +60,7 @@ class Job:
         target's highest point.
     rotate : heading in place of the layout's [rad]; "auto": the best found.
     objective : what an "auto" anchor or heading makes smallest, see `search`.
-    joint : what the rods do to each other where they cross, see `pop_up`; default: ball joints.
+    joint : the joints where rods cross, see `pop_up`; default: ball joints.
     ends : end conditions of the pop-up: "pinned", "clamped", or "both"; also in a tuple, which may be empty.
     seams : rows of points (x, y) of the plan [m], lines along which the target is cut straight down into patches; each
         continues straight past its ends, unless it is closed. Rods and length of the layout are then "auto"; its
@@ -137,6 +139,7 @@ class Job:
     @classmethod
     def of_case(cls, case: Case) -> Self:
         """The job of a case that was loaded before; of an earlier form: `Job.of_case(form.case)`."""
+        instance("case", case, Case, "the case of a form or of a job; to load one by its name use rodshell.Job.load")
         job = cls.__new__(cls)
         job._set(case, None)
         return job
@@ -158,7 +161,7 @@ class Job:
         Parameters
         ----------
         source : a CSV table; the folder of an earlier result; or the ends themselves.
-        overrides, more : as of `load`, of the tables rod, checks, fabrication and drawings.
+        overrides, more : as of `load`, of the tables rod, joint, checks, fabrication and drawings.
         unit : of the coordinates in a table, unless its columns end in _mm.
         rod : section and material; default: those of the result, or a rod that is chosen to fit.
         joint : where rods cross, without eccentricity; default: that of the result, or ball joints.
@@ -182,7 +185,8 @@ class Job:
 
         Raises
         ------
-        InputError : as of `load`; also a key of a table that was made from an object which no key describes.
+        InputError : as of `load`; also a key of a table that was made from an object which no key describes, and one
+            that a table of rods does not use.
         """
         changes = flattened({**(overrides or {}), **more})
         job = type(self).of_case(changed_case(self._case, changes))
@@ -226,8 +230,8 @@ class Job:
             shell that has several equilibria stays in its own.
         progress : called as progress(stage, detail, residual) at every iteration.
         time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
-        announce : called with a sentence for each thing that the job decided itself, before the form is searched.
-        until : the last stage that is run now; the checks and all after them are else run when they are asked for.
+        announce : called with a sentence for each value that the job chose itself, before the form is computed.
+        until : the last stage that is run now. With "pop-up", checks and fabrication are made when first asked for.
         frames_in : folder in which a fall's folder of frames (drape.frames) is made; default: the current one.
 
         Returns
@@ -243,6 +247,8 @@ class Job:
         if warm_start is not None:
             instance("warm_start", warm_start, Form, FOUND)
         choice("until", until, ("pop-up", "fabrication"))
+        if time_limit is not None:
+            instance("time_limit", time_limit, Real, "a number in s")
         limit = limited(progress, time_limit)
         run = Run(self._case, self._target, self._inputs, warm_start, limit, announce, Path(frames_in))
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
@@ -258,7 +264,8 @@ class Job:
         what = case.drawings.name or target
         source = getattr(case.target, "file", None)
         spacing = "auto" if case.layout.spacing == "auto" else " x ".join(map(length_text, case.layout.spacing))
-        seams = f", {len(case.seams.lines)} seams" if case.seams.lines else ""
+        cuts = len(case.seams.lines)
+        seams = f", {cuts} seam{'s' if cuts > 1 else ''}" if cuts else ""
         return (
             f"<rodshell.Job: {what}{f' {source}' if source else ''}, spacing {spacing}{seams}, "
             f"{case.drape.method} drape, {case.joint.kind} joints, ends {' and '.join(case.ends) or 'none'}>"
@@ -297,7 +304,7 @@ def _ends_and_case(
     """The rods of a table or a result; and the result's case, or an empty one, with `overrides`."""
     if isinstance(source, RodEnds):
         return source, load_case(None, overrides)
-    path = Path(source)
+    path = file_path("source", source)
     if path.is_dir():
         if unit is not None:
             raise InputError(f"unit = {shown(unit)}: {path} is a result, which is in SI: leave it out")
@@ -326,7 +333,7 @@ def find_form(
     progress: Progress = silent,
     time_limit: float | None = None,
 ) -> Form:
-    """From a target to the flat grid that pops up into it, with the proof: a `Job` of these objects, run.
+    """Find the flat grid that pops up into a target: a `Job` of these objects, run.
 
     Checks and fabrication are made when they are first asked for.
 

@@ -91,9 +91,7 @@ class Run:
         same = self._unchanged(case)
         joint, stages = built(case.joint), self.earlier.stages if self.earlier is not None else None
         if not (isinstance(stages, PatchForm) and "pop-up" in same and stages.finished_pop_ups(stages.ends)):
-            stages = pop_up_stages(
-            ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress
-        )  # fmt: skip
+            stages = pop_up_stages(ends.grid, ends.final, rod, joint=joint, edge=ends.edge, progress=self.progress)
         return self._made(case, stages, None, same)
 
     def _one_piece(self, case: Case, found: Built, same: Sequence[str]) -> PatchForm:

@@ -194,8 +194,8 @@ def test_any_words_reach_their_key(key: str, finder: FakeFinder) -> None:
         (["--formula", "x*y"], 'kind "hemisphere" has no formula'),
         (["--radios", "3"], "unknown option --radios: did you mean --radius?"),
         (["--target.radus", "3"], "did you mean --target.radius?"),
-        (["--bogus", "3"], "unknown option --bogus: see --help"),
-        (["--radius"], "'--radius' requires an argument"),
+        (["--bogus", "3"], "unknown option --bogus: see rodshell form --help"),
+        (["--radius"], "'--radius' requires an argument: see rodshell form --help"),
         (["--drape.anchor", "--out", "C/y"], "--drape.anchor needs a value, but --out follows"),
         (["-o", "--quiet"], "-o needs a value, but --quiet follows"),
         (["--rotate", "30"], 'write "30 deg"'),
@@ -744,6 +744,11 @@ def test_help_tells_words_that_may_stand_for_a_value_from_the_only_choices(
 ) -> None:
     assert main(["form", "--help"]) == 0
     assert re.search(rf"{re.escape(option)} {re.escape(values)}\s", capsys.readouterr().out)
+
+
+def test_h_is_help_too(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["form", "-h"]) == 0
+    assert "[target]" in capsys.readouterr().out
 
 
 def test_help_comes_without_arguments(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,7 @@
 
 import tomllib
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from difflib import get_close_matches
 from os import PathLike
@@ -16,6 +16,7 @@ from rodshell.case.keys import BY_KIND, case_keys, case_tables, not_a_table, sen
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.units import shown
+from rodshell.validation import instance
 
 Raw = dict[str, Any]
 
@@ -58,6 +59,9 @@ TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
 
 RENAMED: dict[str, str] = {}
 """Keys that were called otherwise in the last version, old -> new: still read, with a warning, for this version."""
+
+
+NOT_A_WORD = "the keys of a case are words such as target.radius, not {!r}"
 
 
 class RenamedKeyWarning(FutureWarning):
@@ -115,13 +119,13 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
     return changed.model_copy(update={name: getattr(case, name) for name in held})
 
 
-def require_keys_of_rods(paths: Iterable[str]) -> None:
-    """InputError where a key is one that a case about a table of rods does not have."""
-    for path in paths:
+def require_keys_of_rods(changes: Mapping[str, object]) -> None:
+    """InputError for a key that a table of rods does not use; unknown keys are left to the case."""
+    for path, value in changes.items():
         if path in case_keys() and path.partition(".")[0] not in TABLES_OF_RODS:
             raise InputError(
-                f"{path} is not used for a table of rods, which says where they lie and where their pinned ends go: "
-                "leave it out"
+                f"{path} = {shown(value)}: a table of rods does not use this key: leave it out, or change one of "
+                f"{', '.join(f'[{name}]' for name in TABLES_OF_RODS)}"
             )
 
 
@@ -130,6 +134,8 @@ def flattened(changes: Mapping[str, object]) -> dict[str, object]:
 
     def leaves(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, object]]:
         for name, value in table.items():
+            if not isinstance(name, str):
+                raise InputError(NOT_A_WORD.format(name))
             path = prefix + name.replace("__", ".")
             if isinstance(value, Mapping) and path in case_tables():
                 yield from leaves(f"{path}.", value)
@@ -155,6 +161,8 @@ def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
         table.setdefault("kind", kind)
     _drop_for_another_kind(raw, overrides)
     for path, value in overrides.items():
+        if path in case_tables():
+            raise InputError(not_a_table(path, value))
         if path not in case_keys():
             raise InputError(unknown_key(path, value, raw))
         table, _, key = path.rpartition(".")
@@ -226,7 +234,10 @@ def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> Raw:
         return {}
     if isinstance(source, Mapping):
         return _nested(source)
+    instance("the case", source, str | PathLike, "the name of a built-in case, a path, text, or a mapping")
     name, path = str(source), Path(source)
+    if not name.strip():
+        raise InputError(f"the name of the case is empty: give a case file, a surface, or one of {', '.join(BUILT_IN)}")
     if name in BUILT_IN:
         return {"target": {"kind": name}, **deepcopy(BUILT_IN[name])}
     if isinstance(source, str) and ("\n" in source or ("=" in source and not path.exists())):
@@ -260,7 +271,7 @@ def _nested(mapping: Mapping[str, object]) -> Raw:
     raw: Raw = {}
     for path, value in mapping.items():
         if not isinstance(path, str):
-            raise InputError(f"the keys of a case are words such as target.radius, not {path!r}")
+            raise InputError(NOT_A_WORD.format(path))
         table, _, name = path.rpartition(".")
         inner = _table(raw, table) if table else raw
         if not isinstance(inner, dict):

@@ -49,7 +49,7 @@ class AutoTable(Table):
 class CircleTable(Table):
     kind: Literal["circle"] = "circle"
     radius: LengthOrAuto = Field(
-        default="auto", description='radius, or "auto": by the target\'s bends; of a tube: outer radius'
+        default="auto", description='radius (of a tube: outer), or "auto": from the bends on the target'
     )
 
     def build(self) -> "Circle":
@@ -71,8 +71,8 @@ class TubeTable(Table):
 
 class EllipseTable(Table):
     kind: Literal["ellipse"] = "ellipse"
-    a: Length = Field(description="half-axis along the grid's normal; of a target: along x")
-    b: Length = Field(description="half-axis within the grid; of a target: along y")
+    a: Length = Field(description="half-axis along the grid's normal")
+    b: Length = Field(description="half-axis within the grid")
 
     def build(self) -> "Section":
         from rodshell.rods.section import Ellipse
@@ -93,18 +93,18 @@ class RectangleTable(Table):
 
 class GivenTable(Table):
     kind: Literal["given"] = "given"
-    EA: Force = Field(description="stretch stiffness")
-    EI1: BendingStiffness = Field(description="stiffness against bends out of the grid")
-    EI2: BendingStiffness = Field(description="stiffness against bends within the grid")
-    GJ: BendingStiffness = Field(description="twist stiffness")
+    EA: Force = Field(description="axial stiffness")
+    EI1: BendingStiffness = Field(description="bending stiffness out of the grid")
+    EI2: BendingStiffness = Field(description="bending stiffness within the grid")
+    GJ: BendingStiffness = Field(description="torsional stiffness")
     mass: MassPerLength = Field(default=0.0, description="mass per length")
-    rotary_inertia: InertiaPerLength = Field(default=0.0, description="rotary inertia about the rod's line, per length")
+    rotary_inertia: InertiaPerLength = Field(default=0.0, description="rotary inertia about the rod's axis, per length")
     fibre_distances: Lengths | None = Field(
-        default=None, description="from the axis to the outermost fibres, across the grid and within it"
+        default=None, description="distances of the outermost fibres, across the grid and within it"
     )
     fibre_modulus: Stress | None = Field(default=None, description="Young's modulus of the outermost fibres")
     torsion_modulus: SectionModulus | None = Field(
-        default=None, description="twisting moment over the largest shear stress that it causes"
+        default=None, description="torsional section modulus: torque over the largest shear stress"
     )
 
     def build(self) -> "GivenSection":
@@ -119,7 +119,7 @@ class MaterialTable(Table):
     )
     youngs_modulus: Stress | None = Field(default=None, description="Young's modulus")
     poisson_ratio: PoissonRatio | None = Field(default=None, description="Poisson's ratio; default 0.5")
-    shear: Stress | None = Field(default=None, description="shear modulus, in place of Poisson's ratio: timber")
+    shear: Stress | None = Field(default=None, description="shear modulus, in place of Poisson's ratio, as for timber")
     density: Density = Field(default=1000.0, description="density")
 
     @model_validator(mode="before")
@@ -222,24 +222,26 @@ class BallTable(JointTable):
 
 class PinTable(JointTable):
     kind: Literal["pin"] = "pin"
-    eccentricity: Distance = Field(default=0.0, description="distance of the two rods' centre lines at a joint")
+    eccentricity: Distance = Field(default=0.0, description="distance between the two rods' centre lines at a joint")
 
 
 class RigidTable(PinTable):
     kind: Literal["rigid"] = "rigid"  # type: ignore[assignment]
-    rest_angle: Angle | None = Field(default=None, description="between the rods at rest; without: as laid out flat")
+    rest_angle: Angle | None = Field(
+        default=None, description="angle between the rods at rest; default: as in the flat grid"
+    )
 
 
 class SpringTable(RigidTable):
     kind: Literal["spring"] = "spring"  # type: ignore[assignment]
-    shear: Stiffness = Field(default=0.0, description='of the joint about its normal, or "rigid"')
-    out_of_plane: Stiffness = Field(default=0.0, description="of a corner across its bisector")
-    twist: Stiffness = Field(default=0.0, description="of a corner about its bisector")
+    shear: Stiffness = Field(default=0.0, description="stiffness of the joint about its normal")
+    out_of_plane: Stiffness = Field(default=0.0, description="stiffness of a corner across its bisector")
+    twist: Stiffness = Field(default=0.0, description="stiffness of a corner about its bisector")
 
 
 class LinkerTable(JointTable):
     kind: Literal["linker"] = "linker"
-    corners: Corners = Field(default=2, description="corners of a crossing with a linker: 2 as in the paper, or 4")
+    corners: Corners = Field(default=2, description="corners of a crossing that have a linker: 2 as in the paper, or 4")
 
 
 JointKinds = BallTable | PinTable | SpringTable | LinkerTable | RigidTable

@@ -41,14 +41,18 @@ if TYPE_CHECKING:
 
 
 class LayoutTable(Table):
-    rods: Counts = Field(default="auto", description='rods along x and y: 17x17, or "auto" for all that touch')
+    rods: Counts = Field(default="auto", description='numbers of rods along x and y: 17x17, or "auto": all that touch')
     spacing: LengthsOrAuto = Field(
-        default="auto", description='between neighbouring rods: one length, or u,v, or "auto"'
+        default="auto", description='distance between neighbouring rods: one length, or u,v, or "auto"'
     )
     length: LengthOrAuto = Field(default="auto", description='length of every rod before trimming, or "auto"')
     edge: LengthOrAuto = Field(default="auto", description='longest edge of the mesh, or "auto"')
-    rotate: AngleOrAuto = Field(default=0.0, description='turn of the grid seen from above, or "auto": the best found')
-    offset: Point = Field(default=(0.0, 0.0), description="shift x,y of the lattice against the axes")
+    rotate: AngleOrAuto = Field(
+        default=0.0, description='angle of the grid, seen from above, or "auto": the best found'
+    )
+    offset: Point = Field(
+        default=(0.0, 0.0), description="shift x,y of the grid lines from the axes through the anchor"
+    )
 
     def build(self, target: "Target | None" = None) -> "GridLayout":
         """The layout; a spacing "auto" stands for some 17 rods each way over the target."""
@@ -68,26 +72,36 @@ IDLE: dict[str, tuple[str, ...]] = {"bound": ("gravity", *FALLING), "gravity": F
 
 class DrapeTable(Table):
     method: Literal["bound", "gravity", "paper"] = Field(
-        default="bound", description="slide on the target, hang on it at rest, or fall on it in time"
+        default="bound", description="bound to the target; hung on it by gravity; or dropped on it (paper)"
     )
     anchor: PointOrAuto | None = Field(
-        default=None, description='point x,y where the axes cross; default: the highest; or "auto"'
+        default=None, description='point x,y where the axes cross; default: the highest point; or "auto"'
     )
     objective: Literal["shear", "curvature", "gap"] = Field(
-        default="shear", description='what an "auto" anchor or rotate makes smallest'
+        default="shear", description='what the search for an "auto" anchor or angle minimises'
     )
     gravity: Acceleration = Field(default=9.81, description="acceleration of gravity, for methods gravity and paper")
-    height: Length = Field(default=0.05, description="of a fall (paper); an equilibrium does not depend on it")
+    height: Length = Field(default=0.05, description="height from which the rods fall (method paper)")
     coupling: Literal["shared", "implicit", "explicit"] = Field(
-        default="shared", description="how falling rods hold together: one node at a joint, or springs"
+        default="shared", description="joints of falling rods: a shared node, or springs (method paper)"
     )
-    C1: NodeStiffness | None = Field(default=None, description="of the springs between nodes; default from the rods")
-    C2: AngleStiffness | None = Field(default=None, description="of the springs between twist angles; default as C1")
-    time_step: Duration | None = Field(default=None, description="of a fall; default 10 ms, or the stability limit")
-    duration: Duration | None = Field(default=None, description="longest fall; default 6 s at a size of 0.2 m")
-    friction: Share = Field(default=0.0, description="Coulomb's coefficient between falling rods and target")
-    drag: Share = Field(default=0.0, description="rate in 1/s at which falling rods lose velocity to the air")
-    frames: str | None = Field(default=None, description="folder below --out for the frames of a fall; default: none")
+    C1: NodeStiffness | None = Field(
+        default=None, description="stiffness of the springs between nodes; default: from the rods"
+    )
+    C2: AngleStiffness | None = Field(
+        default=None, description="stiffness of the springs between twists; default: from the rods"
+    )
+    time_step: Duration | None = Field(
+        default=None, description="time step of a fall; default: 10 ms, or by the stability limit"
+    )
+    duration: Duration | None = Field(
+        default=None, description="longest duration of a fall; default: 6 s at a size of 0.2 m"
+    )
+    friction: Share = Field(default=0.0, description="coefficient of friction between falling rods and target")
+    drag: Share = Field(default=0.0, description="air drag: rate in 1/s at which falling rods lose velocity")
+    frames: str | None = Field(
+        default=None, description="subfolder of the result for the steps of a fall; default: none"
+    )
 
     @field_validator("frames")
     @classmethod
@@ -134,7 +148,9 @@ class DrapeTable(Table):
 
 
 class PopUpTable(Table):
-    ends: Literal["pinned", "clamped", "both"] = Field(default="both", description="how the rod ends are held")
+    ends: Literal["pinned", "clamped", "both"] = Field(
+        default="both", description="supports: free to turn, with fixed direction, or one form with each"
+    )
 
 
 class PatchTable(Table):
@@ -142,8 +158,10 @@ class PatchTable(Table):
 
     name: str = Field(description="name of the patch: A, B, ... from left to right")
     anchor: Point | None = Field(default=None, description="point x,y where its axes cross; default: its middle")
-    rotate: Angle | None = Field(default=None, description="turn of its grid seen from above; default: as the whole's")
-    spacing: Lengths | None = Field(default=None, description="between neighbouring rods: one length, or u,v")
+    rotate: Angle | None = Field(
+        default=None, description="angle of its grid, seen from above; default: that of the whole grid"
+    )
+    spacing: Lengths | None = Field(default=None, description="distance between neighbouring rods: one length, or u,v")
 
     def build(self) -> "PatchLayout":
         from rodshell.formfinding.patches import PatchLayout
@@ -152,10 +170,12 @@ class PatchTable(Table):
 
 
 class SeamsTable(Table):
-    lines: Polylines = Field(default=(), description='lines x,y; x,y that cut the target, prolonged; "|" between two')
-    file: str | None = Field(default=None, description="OBJ or DXF with such lines")
-    unit: Unit = Field(default=1.0, description="the unit of that file, such as mm")
-    patches: tuple[PatchTable, ...] = Field(default=(), description="what patches, by their names, have of their own")
+    lines: Polylines = Field(default=(), description='cuts "x,y; x,y" through the whole target; "|" between two')
+    file: str | None = Field(default=None, description="OBJ or DXF file with such lines")
+    unit: Unit = Field(default=1.0, description="unit of that file, such as mm")
+    patches: tuple[PatchTable, ...] = Field(
+        default=(), description="overrides for patches, by name; in a case file only"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -195,17 +215,21 @@ class SeamsTable(Table):
 
 
 class ChecksTable(Table):
-    strength: Stress | None = Field(default=None, description="of the rods' material, by which utilisation is counted")
-    stages: Whole = Field(default=8, description="equilibria of the deployment from flat; 0: it is not followed")
-    shear_strength: Stress | None = Field(default=None, description="in shear along the fibres; default: by von Mises")
+    strength: Stress | None = Field(
+        default=None, description="bending strength, for the utilisation; default: a preset's"
+    )
+    stages: Whole = Field(default=8, description="equilibria of the deployment from flat; 0: it is not computed")
+    shear_strength: Stress | None = Field(
+        default=None, description="shear strength along the fibres; default: a preset's, or von Mises"
+    )
 
 
 class FabricationTable(Table):
-    end_allowance: Coordinate = Field(default=0.0, description="added to each end of a rod, to be held by its support")
+    end_allowance: Coordinate = Field(default=0.0, description="length added to each end of a rod, for its support")
     stock_length: Length | None = Field(
-        default=None, description="of the bars that rods are cut from; default: no limit"
+        default=None, description="length of the bars that rods are cut from; default: no limit"
     )
-    kerf: Coordinate = Field(default=0.0, description="lost at each saw cut")
+    kerf: Coordinate = Field(default=0.0, description="width of a saw cut; needs stock_length")
 
 
 class LayersTable(Table):
@@ -221,11 +245,15 @@ class LayersTable(Table):
 
 
 class DrawingsTable(Table):
-    paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(default="A3", description="of the PDF's sheets, landscape")
-    project: str = Field(default="", description="for the title block")
-    revision: str = Field(default="", description="for the title block")
-    tolerance: Length | None = Field(default=None, description="of lengths; they are shown to a tenth of it or finer")
+    paper: Literal["A4", "A3", "A2", "A1", "A0"] = Field(
+        default="A3", description="size of the PDF's sheets, landscape"
+    )
+    project: str = Field(default="", description="project, for the title block")
+    revision: str = Field(default="", description="revision, for the title block")
+    tolerance: Length | None = Field(
+        default=None, description="tolerance of lengths, which are shown to a tenth of it or finer"
+    )
     layers: LayersTable = LayersTable()
     name: str = Field(default="", description="title of the drawings; default: the target's name")
-    author: str = Field(default="", description="for the title block: who drew or answers for the drawings")
-    date: IsoDate = Field(default="", description='for the title block, "2026-11-22"; default: the day of writing')
+    author: str = Field(default="", description="who drew them or is responsible for them, for the title block")
+    date: IsoDate = Field(default="", description='date for the title block, such as "2026-11-22"; default: today')

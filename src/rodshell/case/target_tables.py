@@ -23,7 +23,9 @@ class HemisphereTable(Table):
 class CapTable(Table):
     kind: Literal["cap"] = "cap"
     radius: Length = Field(default=0.25, description="radius")
-    base: Coordinate = Field(default=0.1, description="z of the base plane, the sphere's centre being z = 0")
+    base: Coordinate = Field(
+        default=0.1, description="z of the plane at which the shell ends; of a cap: from its centre"
+    )
 
     def build(self) -> "Target":
         from rodshell.targets import Cap
@@ -34,7 +36,7 @@ class CapTable(Table):
 class ParaboloidTable(Table):
     kind: Literal["paraboloid"] = "paraboloid"
     radius: Length = Field(default=0.2, description="radius")
-    height: Length = Field(default=0.12, description="height of the top above the base")
+    height: Length = Field(default=0.12, description="height of the top; of a CSV: of its unit; of an image: of white")
 
     def build(self) -> "Target":
         from rodshell.targets import Paraboloid
@@ -57,8 +59,10 @@ class EllipsoidTable(Table):
 class HeightFieldTable(Table):
     kind: Literal["heightfield"] = "heightfield"
     formula: str = Field(description='height z = f(x, y) in metres, such as "0.1 - 2*x**2 - y**2"')
-    domain: Literal["disc", "rectangle"] = Field(default="disc", description="the plan, centred on the origin")
-    radius: Length | None = Field(default=None, description="radius; of a height field: of its disc")
+    domain: Literal["disc", "rectangle"] = Field(
+        default="disc", description="plan of the target, centred on the origin"
+    )
+    radius: Length | None = Field(default=None, description="radius of the disc")
     size: Size | None = Field(default=None, description="width along x and depth along y of a rectangle")
 
     @model_validator(mode="before")
@@ -89,10 +93,14 @@ class PlacedTable(Table):
     """Keys of every target that comes from a file."""
 
     file: str = Field(description="path of the file; in a case file from the case file's folder")
-    base: Coordinate | None = Field(default=None, description="z of the base plane; of a cap: its sphere's centre is 0")
-    boundary: str | None = Field(default=None, description="OBJ or DXF with closed curves: the shell's edge, openings")
-    scale: Factor = Field(default=1.0, description="factor, about the origin")
-    turn: Angles = Field(default=(0.0, 0.0, 0.0), description="angles about x, y, z, in that order")
+    base: Coordinate | None = Field(default=None, description="z of the plane at which the shell ends")
+    boundary: str | None = Field(
+        default=None, description="OBJ or DXF file with closed curves: the shell's edge, openings"
+    )
+    scale: Factor = Field(default=1.0, description="factor by which it is scaled about the origin")
+    turn: Angles = Field(
+        default=(0.0, 0.0, 0.0), description="angles by which it is turned about x, y, z, in that order"
+    )
     move: Point3 = Field(default=(0.0, 0.0, 0.0), description="shift along x, y, z")
 
     def options(self) -> dict[str, Any]:
@@ -106,7 +114,7 @@ class PlacedTable(Table):
 class SurfaceTable(PlacedTable):
     unit: Unit | None = Field(default=None, description="the file's unit, such as mm")
     object: str | None = Field(
-        default=None, description="object or layer name, if the file has several; STEP: face number"
+        default=None, description="name of an object or layer; of a STEP face: its name or number"
     )
 
     def build(self) -> "Target":
@@ -126,9 +134,7 @@ class NurbsTable(SurfaceTable):
 class HeightsTable(PlacedTable):
     kind: Literal["heights"] = "heights"
     size: Size = Field(description="width along x and depth along y of a rectangle")
-    height: Length | None = Field(
-        default=None, description="of a paraboloid; of an image: of white; of a CSV: its unit"
-    )
+    height: Length | None = Field(default=None, description="height of a CSV's unit; of an image: of white")
 
     def build(self) -> "Target":
         from rodshell.targets import heights_from

@@ -11,11 +11,11 @@ from rodshell.cli.interruption import Interrupted
 from rodshell.errors import InputError, OutOfTimeError, OutputWarning, RodshellError
 
 COMMANDS = {
-    "form": "From a target to the flat grid that pops up into it.",
+    "form": "Find the flat grid that pops up into a target.",
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
     "export": "Write drawings, schedules, models or the report of an earlier result again.",
-    "warmup": "Compile all kernels ahead, once, so that no job waits for it.",
-    "paper": "Make a figure of the paper again, with its errors.",
+    "warmup": "Compile all kernels in advance, once.",
+    "paper": "Compute a figure of the paper again, with the errors.",
 }
 
 
@@ -28,6 +28,11 @@ class LazyGroup(click.Group):
             return super().invoke(ctx)
         except KeyboardInterrupt as stopped:
             raise Interrupted(str(stopped)) from stopped
+        except click.UsageError as error:
+            name = ctx.invoked_subcommand
+            if error.ctx is None and name and (command := self.get_command(ctx, name)):
+                error.ctx = click.Context(command, parent=ctx, info_name=name)  # so that its --help is named
+            raise
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -61,7 +66,11 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
         ctx.exit()
 
 
-@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"max_content_width": 110})
+@click.group(
+    cls=LazyGroup,
+    invoke_without_command=True,
+    context_settings={"max_content_width": 110, "help_option_names": ["-h", "--help"]},
+)
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
     help="Print the version and exit.",
@@ -99,14 +108,18 @@ def failed(error: BaseException) -> int:
     if isinstance(error, click.NoSuchOption):
         names = {name.lstrip("-"): name for name in error.possibilities or ()}  # dashes alone make none alike
         near = get_close_matches(error.option_name.lstrip("-"), names, n=1)
-        hint = f": did you mean {names[near[0]]}?" if near else ": see --help"
+        hint = f": did you mean {names[near[0]]}?" if near else f": see {_command(error)} --help"
         return _fail(f"unknown option {error.option_name}{hint}", 2)
     if isinstance(error, click.UsageError):
-        where = error.ctx.command_path if error.ctx else "rodshell"
-        return _fail(f"{error.format_message().rstrip('.')}: see {where} --help", 2)
+        return _fail(f"{error.format_message().rstrip('.')}: see {_command(error)} --help", 2)
     if isinstance(error, click.ClickException):
         return _fail(error.format_message(), 2)
     raise error
+
+
+def _command(error: click.UsageError) -> str:
+    """The command that was called, such as "rodshell form"."""
+    return error.ctx.command_path if error.ctx else "rodshell"
 
 
 def _fail(message: str, code: int) -> int:

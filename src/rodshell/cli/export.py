@@ -23,13 +23,13 @@ SCHEMA = "Print the JSON Schema of result.json and exit."
 
 @click.command()
 @click.argument("folder", metavar="DIR")
-@click.option("--only", metavar="KINDS", help="Such as dxf,csv; default: all but 3dm.")
-@click.option("--out", "-o", metavar="DIR", help="Where to write; default: into the result itself.")
+@click.option("--only", metavar="KINDS", help="Kinds of files, such as dxf,csv; default: all but 3dm.")
+@click.option("--out", "-o", metavar="DIR", help="Folder to write to; default: the result itself.")
 @click.option("--schema", is_flag=True, is_eager=True, expose_value=False, callback=print_schema, help=SCHEMA)
 @FORCE
 @QUIET
 def command(folder: str, only: str | None, out: str | None, force: bool, quiet: bool) -> int:
-    """Write drawings, schedules, models or the report of the result in DIR again.
+    """Write drawings, schedules, models or the report again, from the result in DIR.
 
     KINDS are dxf, svg, pdf, csv, obj, gltf, vtp, compas, png, report, and 3dm, which needs the package rhino3dm.
     """

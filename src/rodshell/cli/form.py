@@ -20,15 +20,15 @@ SEARCH = "search.svg"
 @click.command(
     cls=CaseCommand,
     params=case_options(),
-    epilog='Lengths and so on take a unit, "200 mm", "45 deg", "25 GPa"; a plain number is in SI.',
+    epilog='Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.',
 )
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE")
 @output_options("Folder for the results; default out/NAME.")
 def command(name: str, **values: Any) -> int:
-    """From a target to the flat grid that pops up into it: drape, trim, map back, pop up, compare.
+    """Find the flat grid that pops up into a target: drape, trim, map back, pop up, compare.
 
-    NAME is a built-in case, {names}; CASE.toml a case file; SURFACE a mesh (OBJ, STL, PLY, OFF,
-    glTF), a Rhino file (3dm), or heights (CSV, PNG). Each key of a case is an option too.
+    NAME is a built-in case: {names}. CASE.toml is a case file. SURFACE is a mesh (OBJ, STL, PLY, OFF,
+    glTF), a surface from Rhino (3dm) or from STEP, or heights (CSV, PNG). Each key of a case file is also an option.
     """
     output = read_output_options(values)
     case = load_case(name, overrides_of(values))

@@ -127,11 +127,11 @@ class RunOptions:
 FORCE = click.option(
     "--force",
     is_flag=True,
-    help="Replace files in DIR that rodshell did not write, or that were changed since, where it has to write.",
+    help="Also replace files that rodshell did not write, or that were changed since.",
 )
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-ONLY = "Files in addition to the archive, such as dxf,csv; see rodshell export --help."
-TIME_LIMIT = 'Longest time such as "60 s" for all but the files; what was found until then is written.'
+ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
+TIME_LIMIT = 'Time limit, such as "60 s", for everything but the files; what was found by then is written.'
 
 
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -18,16 +18,20 @@ if TYPE_CHECKING:
 
 @click.command(epilog="Figures: " + "; ".join(f"{name}: {what}" for name, what in FIGURES.items()))
 @click.argument("figure", metavar="FIGURE|all")
-@click.option("--out", "-o", metavar="DIR", help="Folder for the figure; default out/FIGURE; of all: DIR/FIGURE each.")
+@click.option(
+    "--out", "-o", metavar="DIR", help="Folder for the figure; default: out/FIGURE; for all: DIR/FIGURE for each."
+)
 @FORCE
-@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, a line for each figure.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, one line for each figure.")
 @QUIET
 @click.option("--seed", type=click.IntRange(min=0), help="genetic: start from this seed, or continue its search.")
-@click.option("--target", metavar="NAME", help="genetic: this target only.")
-@click.option("--jobs", type=click.IntRange(min=1), help="genetic: processes of a search; default 1.")
-@click.option("--generations", type=click.IntRange(min=1), help="genetic: the most of a search; default 300.")
+@click.option("--target", metavar="NAME", help="genetic: only this target.")
+@click.option("--jobs", type=click.IntRange(min=1), help="genetic: number of processes of a search; default 1.")
+@click.option(
+    "--generations", type=click.IntRange(min=1), help="genetic: largest number of generations of a search; default 300."
+)
 def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: bool, **options: int | str | None) -> int:
-    """Make a figure of the paper again, or all of them: pictures, tables, errors."""
+    """Compute a figure of the paper again, or all of them: pictures, tables, errors."""
     if figure not in (*FIGURES, "all"):
         raise InputError(f"there is no figure {figure} here: the figures are {', '.join(FIGURES)}; or all")
     given = {name: value for name, value in options.items() if value is not None}

@@ -15,17 +15,16 @@ TABLES = ("rod", "checks", "fabrication", "drawings")  # of the case that a tabl
 @click.command(cls=CaseCommand, params=case_options(*TABLES))
 @click.argument("source", metavar="RODS.csv|DIR")
 @click.option(
-    "--unit", metavar="UNIT", help="Of the table's coordinates: m, mm, in, ...; columns that end in _mm need none."
+    "--unit", metavar="UNIT", help="Unit of the table's coordinates: m, mm, in, ...; columns that end in _mm need none."
 )
 @output_options("Folder for the results; default out/NAME-popup.")
 def command(source: str, unit: str | None, **values: Any) -> int:
-    """Pop up rods from flat, their ends pinned: where does the shell go?
+    """Find the shape of given rods, popped up from flat with pinned ends.
 
     RODS.csv has a row for each rod, with the columns flat_x0, flat_y0, flat_x1, flat_y1, final_x0, final_y0,
     final_z0, final_x1, final_y1, final_z1 and, optionally, id; or with all coordinates in mm and _mm after each name,
-    as in schedule/rods.csv. DIR is an earlier result, whose joints are kept; those of a table are balls. The rod
-    is the result's, or for a table one that is chosen to fit; each key of [rod] replaces it. So do those of [checks],
-    [fabrication] and [drawings] what is checked, made and drawn.
+    as in schedule/rods.csv. A table has ball joints and a rod that is chosen to fit. DIR is an earlier result: its
+    joints and its rod are kept. Each key of [rod], [checks], [fabrication] and [drawings] is an option.
     """
     output = read_output_options(values)
     from rodshell.job import Job

@@ -108,7 +108,7 @@ def announce_compilation(*, quiet: bool = False) -> None:
     if not kernels_are_kept():
         click.echo(f"rodshell: compiling kernels again, about 20 s: {UNKEPT}", err=True)
     elif not compiled_before():
-        click.echo("rodshell: compiling kernels, once, about 20 s (rodshell warmup compiles all ahead)", err=True)
+        click.echo("rodshell: compiling kernels, once, about 20 s (rodshell warmup compiles all in advance)", err=True)
 
 
 def compiled_before() -> bool:

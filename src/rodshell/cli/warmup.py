@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 def command(quiet: bool) -> int:
     """Compile all kernels now, once, instead of in the first job of each kind.
 
-    It takes one or two minutes after an installation, and nothing later. Jobs work without it: each then compiles what
-    it needs.
+    It takes one or two minutes after an installation; later there is nothing to compile. It is optional: without it,
+    each job compiles what it needs.
     """
     if not kernels_are_kept():
         raise InputError(f"kernels compiled now would be lost: {UNKEPT}")
