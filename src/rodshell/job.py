@@ -28,8 +28,8 @@ from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output.options import OutputOptions
+from rodshell.results.archive import read_inputs
 from rodshell.results.folder import reading
-from rodshell.results.inputs import read_inputs
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run
 from rodshell.targets import Target
