@@ -226,8 +226,9 @@ class Job:
             again, see `STAGES`; `Form.reused` names the others. Where a stage runs again, the earlier form is its first
             guess: its net is where the new net is looked for (with `Bound()`), and where its shells went from their
             draped states is where the new ones start, rods being matched by their place in the lattice. Any form is
-            accepted; what does not help is left, and the result is the same as without, to the solver's tolerance. A
-            shell that has several equilibria stays in its own.
+            accepted; what does not help is left, and the shapes are the same as without, to the solver's tolerance. A
+            shell that has several equilibria stays in its present one. The search for other stable shapes may take half
+            of the factorisations that the form took, so that it tries fewer starts after a warm start.
         progress : called as progress(stage, detail, residual) at every iteration.
         time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
         announce : called with a sentence for each value that the job chose itself, before the form is computed.

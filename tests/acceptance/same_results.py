@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 RELATIVE = 1e-9  # of numbers in result.json, against the largest number of the same list
-LOOSER = {"force": 1e-8, "load_factor": 1e-8}  # differences of large axial forces; the end of a path of equilibria
-ROUND_OFF = 1e-7  # below this, residuals and imbalances (relative, by their definition) are round-off
+LOOSER = {"force": 1e-7, "load_factor": 1e-8}  # differences of large axial forces; the end of a path of equilibria
+ROUND_OFF = 1e-7  # by which residuals and imbalances (relative, by their definition) may differ
 STRAIGHT = 1e9  # [m] a radius of curvature beyond which a rod is straight
 UNTIMED = frozenset({"seconds", "version", "versions", "version_rodshell"})  # differ from run to run, or by intention
 RESIDUALS = frozenset({"force_residual", "force_imbalance", "moment_imbalance", "max_gap", "max_strain"})
 SUMS = frozenset({"force_sum", "moment_sum"})  # zero but for round-off; *_imbalance is their relative size
-BUDGETS = frozenset({"tried", "searched"})  # how far a search came within its share of the factorisations
 REWORDED = frozenset({"warnings", "reasons", "status"})  # sentences: the same count and the same numbers
 PLACES = frozenset({"rod", "rods", "at", "where"})  # of a largest value
 RENAMED = {"own_ends": "net_deviation"}  # key in result.json of c7aa8f6 -> its name now, wherever it stands
@@ -87,7 +86,7 @@ Scales = Mapping[str, float]  # the largest number that a list of records holds 
 def _differences(old: Any, new: Any, path: str, key: str, scales: Scales) -> Iterator[Difference]:
     if isinstance(old, dict) and isinstance(new, dict):
         old = {RENAMED.get(name, name): value for name, value in old.items()}
-        for name in sorted({*old, *new} - UNTIMED - BUDGETS):
+        for name in sorted({*old, *new} - UNTIMED):
             if name not in old or name not in new:
                 yield Difference(f"{path}.{name}", old.get(name, "(no such key)"), new.get(name, "(no such key)"))
             else:
@@ -115,7 +114,7 @@ def _same(old: object, new: object, key: str, scale: float) -> bool:
     if isinstance(old, float) and isinstance(new, float):
         if key in SUMS:
             return True
-        if key in RESIDUALS and max(abs(old), abs(new)) <= ROUND_OFF:
+        if key in RESIDUALS and abs(old - new) <= ROUND_OFF:
             return True
         if key == "min_radius" and min(old, new) > STRAIGHT:
             return True
