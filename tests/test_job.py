@@ -127,6 +127,33 @@ def test_equality_of_targets_from_python_is_by_the_object() -> None:
         rs.Job(target, LAYOUT, ROD).changed(target__radius=1)
 
 
+@pytest.mark.parametrize("rotate", [0.1, "auto"])
+def test_a_heading_in_place_of_that_of_a_layout_that_no_key_describes_counts(rotate: float | str) -> None:
+    layout = replace(LAYOUT, left_out=("U01",), rotate=0.3)
+    form = rs.Job(rs.Ellipsoid(0.2, 0.15, 0.12), layout, ROD, rotate=rotate, ends="pinned").run(until="pop-up")
+    decided = form.case.layout.rotate
+    assert decided == (rotate if form.search is None else form.search.best.heading)
+    assert form.layout == form.case.build().layout == replace(layout, rotate=decided)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("hemisphere", {"rod.material.shear": "1 MPa"}),
+        ("pavilion", {"rod.material.poisson_ratio": 0.3}),
+        ("pavilion", {"rod.material.shear": "1 GPa"}),
+    ],
+)
+def test_shear_modulus_and_poisson_ratio_replace_each_other(name: str, changes: dict[str, object]) -> None:
+    job = rs.Job.load(name).changed(changes)
+    assert job == rs.Job.load(name, changes)
+    material = job.case.rod.material
+    assert (material.shear is None) == ("rod.material.poisson_ratio" in changes)
+    both = {"rod.material.shear": "1 MPa", "rod.material.poisson_ratio": 0.3}
+    with pytest.raises(InputError, match="leave one of them out"):
+        job.changed(both)
+
+
 def test_a_job_of_python_objects_runs_with_them(tmp_path: Path) -> None:
     form = rs.Job(FUNCTION, LAYOUT, ROD, ends="clamped", options=rs.OutputOptions(stages=0)).run()
     assert form.target is FUNCTION
@@ -244,11 +271,43 @@ def test_checks_that_were_not_made_are_not_reused() -> None:
     assert first.checks.bending.keys() == again.checks.bending.keys()
 
 
+def test_checks_of_other_options_are_not_taken_for_those_of_the_case(earlier: rs.Form) -> None:
+    other = replace(earlier.options, stages=1, fabrication=rs.Fabrication(end_allowance=0.05))
+    form = earlier.with_options(other)
+    assert form.case == earlier_job().changed({"checks.stages": 1, "fabrication.end_allowance": "50 mm"}).case
+    assert form != earlier
+    assert len(form.checks.deployment.share) < len(earlier.checks.deployment.share)
+    assert form.fabrication.cut_length[0] > earlier.fabrication.cut_length[0]
+    again = earlier_job().run(warm_start=form)
+    assert again.reused == ALL[:4]
+    np.testing.assert_array_equal(again.checks.deployment.share, earlier.checks.deployment.share)
+    np.testing.assert_array_equal(again.fabrication.cut_length, earlier.fabrication.cut_length)
+    assert earlier.with_options(earlier.options) == earlier
+
+
+def write_roof(file: Path, height: float) -> None:
+    x = np.linspace(-SIZE, SIZE, 21)
+    rows = [",".join(f"{height * (1 - a * a / SIZE**2) * (1 - b * b / SIZE**2):.6f}" for a in x) for b in x]
+    file.write_text("\n".join(rows))
+
+
+def test_a_target_object_whose_file_changes_stays_with_what_the_file_held(tmp_path: Path) -> None:
+    file = tmp_path / "roof.csv"
+    write_roof(file, 0.1)
+    before = file.read_bytes()
+    target = rs.heights_from(file, size=(0.4, 0.4), height=1.0)
+    job = rs.Job(target, LAYOUT, ROD, ends="pinned", options=rs.OutputOptions(stages=0))
+    write_roof(file, 0.08)
+    form = job.changed(drawings__author="Ada").run(until="pop-up")
+    assert list(form.inputs.values()) == [before]
+    other = rs.Job.load(job.to_toml()).run(warm_start=form, until="pop-up")
+    assert other.reused == ()
+    assert np.ptp(other.popped["pinned"].positions[:, 2]) < np.ptp(form.popped["pinned"].positions[:, 2]) - 0.01
+
+
 def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
     def write(height: float) -> None:
-        x = np.linspace(-SIZE, SIZE, 21)
-        rows = [",".join(f"{height * (1 - a * a / SIZE**2) * (1 - b * b / SIZE**2):.6f}" for a in x) for b in x]
-        (tmp_path / "roof.csv").write_text("\n".join(rows))
+        write_roof(tmp_path / "roof.csv", height)
 
     write(0.1)
     tables = {"target": {"kind": "heights", "file": str(tmp_path / "roof.csv"), "size": "0.4, 0.4", "height": "1 m"}}
@@ -318,11 +377,6 @@ def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
     job = rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job == rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job != rs.Job.of_table(folder, rod__section__radius="1 mm", checks__stages=1)
-    for key, value in {"layout.rotate": 0.1, "pop_up.ends": "clamped", "target.radius": 1.0}.items():
-        with pytest.raises(InputError, match=f"{key} = .*: a table of rods does not use this key"):
-            job.changed({key: value})
-        with pytest.raises(InputError, match="does not use this key"):
-            rs.Job.of_table(folder, {key: value})
     form = job.run()
     assert form.from_table
     assert form.agreement == {}
@@ -337,6 +391,17 @@ def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
             read()
     with pytest.raises(InputError, match="no case file can describe a table of"):
         job.to_toml()
+
+
+@pytest.mark.parametrize("changes", [{"pop_up.ends": "clamped"}, {"layout.rotate": 1}, {"drape.method": "gravity"}])
+def test_keys_that_a_table_of_rods_does_not_have_are_refused(
+    changes: dict[str, object], earlier: rs.Form, tmp_path: Path
+) -> None:
+    table = earlier.save(tmp_path / "dome", kinds=["csv"]) / "schedule" / "rods.csv"
+    job = rs.Job.of_table(table)
+    for make in (lambda: rs.Job.of_table(table, changes), lambda: job.changed(changes)):
+        with pytest.raises(InputError, match=f"{next(iter(changes))} is not used for a table of rods"):
+            make()
 
 
 def test_the_command_line_runs_the_job(tmp_path: Path) -> None:

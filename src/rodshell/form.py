@@ -203,7 +203,10 @@ class Form:
         instance("options", options, OutputOptions)
         same = options.stages == self.options.stages and self._weight(options) == self._weight(self.options)
         known = self.known_checks if same else None
-        return replace(self, options=options, _known_checks=known, _known_fabrication=None)
+        asked = Case.model_validate(options.parameters())
+        tables = {name: getattr(asked, name) for name in ("checks", "fabrication", "drawings")}
+        case = self.case.model_copy(update=tables)
+        return replace(self, case=case, options=options, _known_checks=known, _known_fabrication=None)
 
     def finished(self, progress: Progress = silent) -> "Form":
         """This form, its checks and fabrication made now; a progress may end the checks early."""
@@ -317,10 +320,4 @@ class Form:
         )  # fmt: skip
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
         states = states_of(self.stages) | checked_states(checks)
-        return Archive(results, states, self._case_with_options().text(), self.inputs)
-
-    def _case_with_options(self) -> Case:
-        """The case with the tables of the options."""
-        asked = Case.model_validate(self.options.parameters())
-        tables = {name: getattr(asked, name) for name in ("checks", "fabrication", "drawings")}
-        return self.case.model_copy(update=tables)
+        return Archive(results, states, self.case.text(), self.inputs)

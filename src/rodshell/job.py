@@ -13,10 +13,10 @@ from typing import Literal, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rodshell.case import Case, case_keys, load_case
+from rodshell.case import Case, load_case
 from rodshell.case.case import built
 from rodshell.case.from_objects import case_of, case_of_rod_ends
-from rodshell.case.load import changed_case, flattened
+from rodshell.case.load import changed_case, flattened, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
 from rodshell.errors import InputError
 from rodshell.form import Form
@@ -29,6 +29,7 @@ from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output.options import OutputOptions
+from rodshell.results.archive import read_inputs
 from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
 from rodshell.run import Announce, Run
@@ -40,8 +41,6 @@ Auto = Literal["auto"]
 AskedEnds = Literal["pinned", "clamped", "both"]
 
 FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
-OF_TABLE = ("rod", "joint", "checks", "fabrication", "drawings")
-"""Tables of the case that a job of a table of rods uses."""
 OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
 
 
@@ -73,9 +72,10 @@ class Job:
     InputError : a value is of the wrong kind; a target too is missing.
     """
 
-    __slots__ = ("_case", "_target")
+    __slots__ = ("_case", "_inputs", "_target")
     _case: Case
-    _target: Target | None
+    _target: Target | None  # as it was given
+    _inputs: Mapping[str, bytes] | None  # what its files held then: they may change on disk
 
     def __init__(
         self,
@@ -111,7 +111,7 @@ class Job:
             objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
             seams=seams, patches=patches or {}, options=options or OutputOptions(),
         )  # fmt: skip
-        self._set(case, target)
+        self._set(case, target, read_inputs(case.text()))
 
     @classmethod
     def load(
@@ -173,7 +173,7 @@ class Job:
         if rod is not None:
             instance("rod", rod, Rod)
         changes = flattened({**(overrides or {}), **more})
-        _require_of_table(changes)
+        require_keys_of_rods(changes)
         ends, case = _ends_and_case(source, unit, changes)
         given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
@@ -188,11 +188,9 @@ class Job:
             that a table of rods does not use.
         """
         changes = flattened({**(overrides or {}), **more})
-        if self._case.of_table:
-            _require_of_table(changes)
         job = type(self).of_case(changed_case(self._case, changes))
         if job._case.target == self._case.target:
-            job._set(job._case, self._target)
+            job._set(job._case, self._target, self._inputs)
         return job
 
     @property
@@ -250,7 +248,8 @@ class Job:
         choice("until", until, ("pop-up", "fabrication"))
         if time_limit is not None:
             instance("time_limit", time_limit, Real, "a number in s")
-        run = Run(self._case, self._target, warm_start, limited(progress, time_limit), announce, Path(frames_in))
+        limit = limited(progress, time_limit)
+        run = Run(self._case, self._target, self._inputs, warm_start, limit, announce, Path(frames_in))
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
         with entered:
             form = run.table_form() if self._case.of_table else run.form()
@@ -286,25 +285,16 @@ class Job:
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Job is a value: use job.changed(...) in place of setting {name}")
 
-    def _set(self, case: Case, target: Target | None) -> None:
+    def _set(self, case: Case, target: Target | None, inputs: Mapping[str, bytes] | None = None) -> None:
         object.__setattr__(self, "_case", case)
         object.__setattr__(self, "_target", target)
+        object.__setattr__(self, "_inputs", inputs)
 
 
 def _ends(given: AskedEnds | Sequence[AskedEnds]) -> tuple[Ends, ...]:
     """The end conditions asked for, in their order."""
     words = choices_of("ends", given, ("pinned", "clamped", "both"))
     return ENDS if "both" in words else tuple(end for word in words for end in ENDS if end == word)
-
-
-def _require_of_table(changes: Mapping[str, object]) -> None:
-    """InputError for a key that a table of rods does not use; unknown keys are left to the case."""
-    for path, value in changes.items():
-        if path in case_keys() and path.partition(".")[0] not in OF_TABLE:
-            raise InputError(
-                f"{path} = {shown(value)}: a table of rods does not use this key: leave it out, or change one of "
-                f"{', '.join(f'[{name}]' for name in OF_TABLE)}"
-            )
 
 
 def _ends_and_case(

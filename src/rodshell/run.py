@@ -1,6 +1,6 @@
 """One run of a case: what is left open is decided, and each stage runs or is taken over from an earlier form."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -40,12 +40,14 @@ DECIDED_BY = ("target", "layout", "rod", "joint", "drape", "seams", "checks")
 
 
 class Run:
-    """One run of a case; parameters as of `Job.run`, with the target where it was built before."""
+    """One run of a case; parameters as of `Job.run`, with the target where it was built before, and what its files held
+    then."""
 
     def __init__(
         self,
         case: Case,
         target: Target | None,
+        inputs: Mapping[str, bytes] | None,
         warm_start: Form | None,
         progress: Progress,
         announce: Announce | None,
@@ -53,7 +55,7 @@ class Run:
     ) -> None:
         self.asked, self.target, self.progress = case, target, progress
         self.announce, self.frames_in = announce, frames_in
-        self.inputs = read_inputs(case.text())
+        self.inputs = read_inputs(case.text()) if inputs is None else dict(inputs)
         self.options = case.output_options()
         self.earlier = warm_start
         if warm_start is not None and warm_start.from_table != case.of_table:

@@ -223,6 +223,7 @@ STATES = {
     "a node that is not there": ("rod_nodes", lambda rows: np.append(rows[:-1], 10**6), "1000000, but there are"),
     "a node before the first": ("rod_nodes", lambda rows: np.append(rows[:-1], -1), "rod_nodes holds -1"),
     "rods that begin nowhere": ("rod_start", lambda rows: rows[::-1], "rod_start must ascend"),
+    "unsigned starts that descend": ("rod_start", lambda rows: (-rows % rows.max()).astype("u8"), "must ascend"),
     "a rod too few": ("rod_start", lambda rows: rows[:-1], "rod_start has the shape (17,), not (18,)"),
     "half a node": ("rod_nodes", lambda rows: rows + 0.5, "rod_nodes must be an array of whole numbers"),
     "places that are not finite": ("draped", lambda rows: rows * np.nan, "draped holds a number that is not finite"),

@@ -200,3 +200,16 @@ def test_what_memory_held_before_does_not_matter(monkeypatch):
             found.append(factors.solve(right))
     np.testing.assert_array_equal(found[1], found[0])
     np.testing.assert_array_equal(found[2], found[0])
+
+
+def test_scratch_memory_that_another_thread_takes_first_is_no_fault():
+    class TakenMeanwhile(list):
+        def __bool__(self):
+            return True  # it was still there when it was looked for
+
+    matrix, places = grid_matrix(9)
+    triangle, right = upper(matrix), RANDOM.standard_normal(matrix.shape[0])
+    solver = Multifrontal(triangle.indptr, triangle.indices, places)
+    before = solver.factor(triangle.data).solve(right)
+    solver._spare = TakenMeanwhile()
+    np.testing.assert_array_equal(solver.factor(triangle.data).solve(right), before)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -149,7 +150,11 @@ class Case(Table):
 
     def headed(self, rotate: float) -> "Case":
         """The same case with its heading [rad]."""
-        return self.model_copy(update={"layout": self.layout.model_copy(update={"rotate": rotate})})
+        layout = self.layout.model_copy(update={"rotate": rotate})
+        if layout.held is not None:
+            held = layout.held
+            layout = layout.holding(replace(held, value=replace(held.value, rotate=rotate)))
+        return self.model_copy(update={"layout": layout})
 
     @property
     def ends(self) -> "tuple[Ends, ...]":

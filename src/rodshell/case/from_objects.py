@@ -123,7 +123,8 @@ def _layout_table(layout: GridLayout, rotate: float | Auto) -> LayoutTable:
     heading = "auto" if rotate == "auto" else _within_a_turn(rotate)
     table = LayoutTable.model_validate({**layout.parameters(), "rotate": heading})
     if any(layout.lines) or layout.left_out:
-        return table.holding(Held(layout, "a layout with lines at unequal spacing or rods left out"))
+        turned = layout if rotate == "auto" else replace(layout, rotate=rotate)
+        return table.holding(Held(turned, "a layout with lines at unequal spacing or rods left out"))
     return table
 
 

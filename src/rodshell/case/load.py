@@ -2,7 +2,7 @@
 
 import tomllib
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from difflib import get_close_matches
 from os import PathLike
@@ -54,6 +54,9 @@ CASE_FILE = ".toml"
 FILES = f"a case ({CASE_FILE}) or a surface ({', '.join(BY_SUFFIX)})"
 FILE_KEYS = {"target": ("file", "boundary"), "seams": ("file",)}
 
+TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
+"""What a case about a table of rods has, in place of a target with its layout and drape."""
+
 RENAMED: dict[str, str] = {}
 """Keys that were called otherwise in the last version, old -> new: still read, with a warning, for this version."""
 
@@ -102,6 +105,8 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
     InputError : as of `load_case`; also a key of a table that was made from an object which keys do not describe.
     """
     held = case.held_objects
+    if case.of_table:
+        require_keys_of_rods(overrides)
     for path in overrides:
         table = path.partition(".")[0]
         if table in held and path in case_keys():
@@ -112,6 +117,16 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
     tables = case.model_dump(exclude_none=True, exclude=set(held))
     changed = _validated(tables, dict(overrides))
     return changed.model_copy(update={name: getattr(case, name) for name in held})
+
+
+def require_keys_of_rods(paths: Iterable[str]) -> None:
+    """InputError where a key is one that a case about a table of rods does not have."""
+    for path in paths:
+        if path in case_keys() and path.partition(".")[0] not in TABLES_OF_RODS:
+            raise InputError(
+                f"{path} is not used for a table of rods, which says where they lie and where their pinned ends go: "
+                "leave it out"
+            )
 
 
 def flattened(changes: Mapping[str, object]) -> dict[str, object]:
@@ -200,6 +215,9 @@ def _drop_for_another_kind(raw: Raw, overrides: Mapping[str, object]) -> None:
                     table.pop(key.name, None)
     if "rod.material.preset" in overrides:
         raw["rod"]["material"] = {}
+    for name, instead in (("shear", "poisson_ratio"), ("poisson_ratio", "shear")):
+        if overrides.get(f"rod.material.{name}") is not None and f"rod.material.{instead}" not in overrides:
+            _table(raw, "rod.material").pop(instead, None)
     method = overrides.get("drape.method")
     if method is not None and method != raw["drape"].get("method", "bound"):
         for name in IDLE.get(str(method), ()):

@@ -301,5 +301,5 @@ def state_faults(states: Mapping[str, NDArray[Any]], results: Results) -> Iterat
             yield f"rod_nodes holds {nodes.min()} to {nodes.max()}, but there are {count} nodes"
         if starts is None:
             yield "rod_nodes is there, but rod_start is missing"
-        elif starts.size and (starts[0] != 0 or np.any(np.diff(starts) < 1) or starts[-1] >= nodes.size):
+        elif starts.size and (starts[0] != 0 or np.any(starts[1:] <= starts[:-1]) or starts[-1] >= nodes.size):
             yield f"rod_start must ascend from 0 to below the {nodes.size} entries of rod_nodes"

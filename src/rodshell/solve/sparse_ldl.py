@@ -149,7 +149,10 @@ class Multifrontal:
     def factor(self, data: Floats, *, reuse: Factors | None = None) -> "MultifrontalFactors":
         memory = reuse.given_away() if isinstance(reuse, MultifrontalFactors) else None
         panels, pivots = memory or (room(self.fill), np.empty(len(self.indptr) - 1))
-        scratch = self._spare.pop() if self._spare else self._new_scratch()
+        try:  # popped at once: another thread may take the last
+            scratch = self._spare.pop()
+        except IndexError:
+            scratch = self._new_scratch()
         regular = _eliminate_parts(self.plan, data, scratch, panels, pivots)
         self._spare.append(scratch)
         if not regular:
