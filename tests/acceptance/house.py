@@ -56,7 +56,7 @@ SUFFIXES = (
 )  # one of each kind
 FEWEST_FILES, MOST_FILES = 120, 160
 SYMMETRIC = ("hemisphere", "ellipsoid", "patches", "laths", "gravity", "fall")  # jobs whose shells have mirror images
-DERIVED = 1e-9  # positions to 1e-16 of the size make strains of 1e-13, which stiff edges turn into stress
+DERIVED = 1e-10  # positions to 1e-16 of the size make strains of 1e-13, which stiff edges turn into stress
 POSITIONS = 1e-12  # of the size: the same operations in the same order
 
 

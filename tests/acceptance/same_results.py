@@ -19,7 +19,7 @@ SUMS = frozenset({"force_sum", "moment_sum"})  # zero but for round-off; *_imbal
 BUDGETS = frozenset({"tried", "searched"})  # how far a search came within its share of the factorisations
 REWORDED = frozenset({"warnings", "reasons", "status"})  # sentences: the same count and the same numbers
 PLACES = frozenset({"rod", "rods", "at", "where"})  # of a largest value
-RENAMED: dict[str, str] = {}  # key in result.json of c7aa8f6 -> its name now, wherever it stands
+RENAMED = {"own_ends": "net_deviation"}  # key in result.json of c7aa8f6 -> its name now, wherever it stands
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 

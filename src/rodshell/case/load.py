@@ -2,7 +2,7 @@
 
 import tomllib
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from difflib import get_close_matches
 from os import PathLike
@@ -119,13 +119,13 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
     return changed.model_copy(update={name: getattr(case, name) for name in held})
 
 
-def require_keys_of_rods(paths: Iterable[str]) -> None:
-    """InputError where a key is one that a case about a table of rods does not have."""
-    for path in paths:
+def require_keys_of_rods(changes: Mapping[str, object]) -> None:
+    """InputError for a key that a table of rods does not use; unknown keys are left to the case."""
+    for path, value in changes.items():
         if path in case_keys() and path.partition(".")[0] not in TABLES_OF_RODS:
             raise InputError(
-                f"{path} is not used for a table of rods, which says where they lie and where their pinned ends go: "
-                "leave it out"
+                f"{path} = {shown(value)}: a table of rods does not use this key: leave it out, or change one of "
+                f"{', '.join(f'[{name}]' for name in TABLES_OF_RODS)}"
             )
 
 

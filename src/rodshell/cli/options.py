@@ -130,7 +130,7 @@ FORCE = click.option(
     help="Also replace files that rodshell did not write, or that were changed since.",
 )
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-ONLY = "Kinds of files besides the archive, such as dxf,csv; see rodshell export --help."
+ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
 TIME_LIMIT = 'Time limit, such as "60 s", for everything but the files; what was found by then is written.'
 
 
