@@ -377,11 +377,6 @@ def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
     job = rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job == rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
     assert job != rs.Job.of_table(folder, rod__section__radius="1 mm", checks__stages=1)
-    for key, value in {"layout.rotate": 0.1, "pop_up.ends": "clamped", "target.radius": 1.0}.items():
-        with pytest.raises(InputError, match=f"{key} = .*: a table of rods does not use this key"):
-            job.changed({key: value})
-        with pytest.raises(InputError, match="does not use this key"):
-            rs.Job.of_table(folder, {key: value})
     form = job.run()
     assert form.from_table
     assert form.agreement == {}

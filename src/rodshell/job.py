@@ -41,7 +41,6 @@ Auto = Literal["auto"]
 AskedEnds = Literal["pinned", "clamped", "both"]
 
 FOUND = "a form that Job.run or find_form returned (one read from a folder: run its case.toml again)"
-"""Tables of the case that a job of a table of rods uses."""
 OBJECTS = 'a job needs target, layout and rod; for a case by its name or its file use rodshell.Job.load("...")'
 
 
