@@ -8,6 +8,7 @@ lint:      ## ruff, format, and the import contract
 	ruff check .
 	ruff format --check .
 	lint-imports
+	python .ci/words.py
 
 words:     ## words that the project does not use, with what it says instead
 	python .ci/words.py
