@@ -5,7 +5,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.cli import main
-from rodshell.formfinding.section_limits import is_flat, least_rise, rise
+from rodshell.formfinding.finite_sections import is_flat, least_rise, rise
 from tests.acceptance.targets_broken import as_obj
 from tests.targets.meshes import sheet
 

@@ -9,7 +9,7 @@ from numpy.linalg import norm
 import rodshell as rs
 from rodshell.case.rod_ends import read_result
 from rodshell.checks.bending import bending_of
-from rodshell.formfinding.section_limits import strong_bending
+from rodshell.formfinding.finite_sections import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.frames import unit
 from rodshell.nets.chebyshev import crossing_angle

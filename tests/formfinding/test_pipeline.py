@@ -12,7 +12,7 @@ import pytest
 import rodshell as rs
 from rodshell.errors import InputError
 from rodshell.formfinding import bound_drape, pipeline
-from rodshell.formfinding.section_limits import section_rotation
+from rodshell.formfinding.finite_sections import section_rotation
 from rodshell.results import read
 from rodshell.results.records import json_text
 from rodshell.results.verdict import verdict

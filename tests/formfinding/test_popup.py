@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 import rodshell as rs
 from rodshell.errors import InputError
-from rodshell.formfinding.layers import node_normals
+from rodshell.formfinding.finite_sections import node_normals
 from rodshell.model import Shell
 from rodshell.solve import newton_step
 from rodshell.solve.equilibrium import find_equilibrium, find_stable

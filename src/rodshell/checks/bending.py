@@ -26,7 +26,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
-from rodshell.formfinding.layers import node_normals
+from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell

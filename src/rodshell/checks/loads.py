@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.layers import joint_normals, joint_tangents
+from rodshell.formfinding.finite_sections import joint_normals, joint_tangents
 from rodshell.formfinding.popup import Ends
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.crossings import LinkerBend, RodNodes

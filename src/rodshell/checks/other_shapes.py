@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
 from rodshell.checks.deployment import SAME, Deployment
-from rodshell.formfinding.layers import middle_surface
+from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.geometry.frames import parallel_transport, signed_angle, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell

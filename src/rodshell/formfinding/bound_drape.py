@@ -15,10 +15,9 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.contact.static import BoundToTarget
-from rodshell.formfinding.layers import thickness_warnings
+from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.section_limits import strong_bending
 from rodshell.geometry.frames import dot
 from rodshell.joints import Joint
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid

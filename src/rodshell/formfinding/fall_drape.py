@@ -13,8 +13,8 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.contact.modified_mass import ModifiedMass, Touching
 from rodshell.errors import ConvergenceError, OutOfTimeError, StabilityError
+from rodshell.formfinding.finite_sections import middle_surface
 from rodshell.formfinding.gravity_drape import anchor_point, initial_grid, lost_contact, middle_marks, placed_over
-from rodshell.formfinding.layers import middle_surface
 from rodshell.formfinding.methods import Draped, DrapeFigures, Fall, smallest_joint_angle
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.rest import Rest, joint_gap, lowest_modes, out_of_balance, rest_advice, unbalanced_force

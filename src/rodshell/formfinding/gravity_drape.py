@@ -16,7 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.contact.static import UnilateralContact
 from rodshell.errors import InputError
-from rodshell.formfinding.layers import middle_surface, node_normals, place_in_layers
+from rodshell.formfinding.finite_sections import middle_surface, node_normals, place_in_layers
 from rodshell.formfinding.methods import Draped, DrapeFigures, Gravity, smallest_joint_angle
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.joints import Joint

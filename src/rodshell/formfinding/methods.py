@@ -15,8 +15,7 @@ import numpy as np
 from rodshell.arrays import Bools, Floats
 from rodshell.contact.modified_mass import Stopped
 from rodshell.errors import InputError
-from rodshell.formfinding.layers import joint_tangents
-from rodshell.formfinding.section_limits import StrongBending
+from rodshell.formfinding.finite_sections import StrongBending, joint_tangents
 from rodshell.geometry.frames import cross, dot
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, SharedDofs
 from rodshell.layout import FlatRod, GridLayout, GridMesh

@@ -15,7 +15,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.formfinding.layers import node_normals
+from rodshell.formfinding.finite_sections import node_normals
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.formfinding.trim import Boundary, Footprint, in_layers
 from rodshell.geometry.curves import on_curve

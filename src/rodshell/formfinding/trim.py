@@ -6,7 +6,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.formfinding.layers import node_normals, place_in_layers
+from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
 from rodshell.geometry.frames import unit
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid

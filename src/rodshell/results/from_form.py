@@ -20,9 +20,9 @@ from rodshell.checks import Checks
 from rodshell.formfinding import Agreement as FoundAgreement
 from rodshell.formfinding import Draped, Footprint, PatchForm
 from rodshell.formfinding.bound_drape import shape_of_net
+from rodshell.formfinding.finite_sections import is_flat
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
-from rodshell.formfinding.section_limits import is_flat
 from rodshell.joints import joint_parameters
 from rodshell.joints.joint import Joint as JointModel
 from rodshell.nets import ChebyshevNet
