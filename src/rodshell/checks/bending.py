@@ -256,7 +256,15 @@ class Bending:
 
 
 def bending_of(shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = VON_MISES) -> Bending:
-    """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis."""
+    """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
+
+    Parameters
+    ----------
+    shell : of equal rods.
+    state : (N, 3) node positions [m] and twist angles [rad].
+    rod : the section and material of every rod.
+    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
+    """
     mesh, positions = shell.mesh, shell.positions(state)
     normals = shell_normals(mesh, positions)
     if shell.node_count != mesh.node_count:  # rods a distance apart at their joints: each has its own line
@@ -319,7 +327,14 @@ def rod_frames(shell: Shell) -> BendTwist | None:
 
 
 def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
-    """(e, 3) first material director m1 of each edge in a `state` (N, 3)."""
+    """(e, 3) first material director m1 of each edge in a `state` (N, 3).
+
+    Parameters
+    ----------
+    shell : whose edges are meant.
+    frames : the shell's bending and twist, whose frames are transported to the state.
+    state : (N, 3) node positions [m] and twist angles [rad].
+    """
     m1 = frames.refreshed(state).material_directors(state)
     result = np.zeros((len(shell.mesh.edges) + len(shell.ghosts), 3))  # of ghost edges, too
     for side in range(2):
@@ -328,19 +343,38 @@ def edge_directors(shell: Shell, frames: BendTwist, state: Floats) -> Floats:
 
 
 def shell_normals(mesh: GridMesh, positions: Floats) -> Floats | None:
-    """(k, 3) normal of the shell at each entry of `rod_nodes`; None where some rod crosses no other."""
+    """(k, 3) normal of the shell at each entry of `rod_nodes`; None where some rod crosses no other.
+
+    Parameters
+    ----------
+    mesh : the rods.
+    positions : (n, 3) of its nodes [m].
+    """
     if (mesh.grid.joint_counts() == 0).any():
         return None
     return node_normals(mesh, positions)[mesh.rod_nodes]
 
 
 def curvatures(mesh: GridMesh, positions: Floats, *, clamps: Floats | None = None) -> Floats:
-    """(k,) curvature [1/m] at each entry of `rod_nodes`."""
+    """(k,) curvature [1/m] at each entry of `rod_nodes`.
+
+    Parameters
+    ----------
+    mesh : the rods.
+    positions : (n, 3) of its nodes [m].
+    clamps : (2m, 3) outward unit tangents that hold both ends of each rod in turn, or None (pinned).
+    """
     return np.asarray(np.linalg.norm(_turns(mesh, positions, clamps)[0], axis=1))
 
 
 def axial_strains(mesh: GridMesh, positions: Floats) -> Floats:
-    """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one."""
+    """(k,) axial strain at each entry of `rod_nodes`: the mean over its edges, which at an end is one.
+
+    Parameters
+    ----------
+    mesh : the rods, with their rest lengths.
+    positions : (n, 3) of its nodes [m].
+    """
     lengths = np.linalg.norm(positions[mesh.edges[:, 1]] - positions[mesh.edges[:, 0]], axis=1)
     return _mean_of_edges(mesh, lengths / mesh.edge_lengths - 1.0)
 

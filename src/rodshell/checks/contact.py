@@ -57,7 +57,14 @@ class Contact:
 
 
 def contact_of(shell: Shell, state: Floats, rod: Rod) -> Contact:
-    """Contact of a shell of equal rods in a `state` (N, 3)."""
+    """Contact of a shell of equal rods in a `state` (N, 3).
+
+    Parameters
+    ----------
+    shell : of equal rods.
+    state : (N, 3) node positions [m] and twist angles [rad].
+    rod : the section of every rod.
+    """
     frames = rod_frames(shell)
     directors = None if frames is None else edge_directors(shell, frames, state)
     return contact(shell.mesh, state[shell.node_blocks], rod, directors=directors)
@@ -309,6 +316,11 @@ def nearest_points(a: Floats, a_end: Floats, b: Floats, b_end: Floats) -> tuple[
     """(p, 3) nearest points of segments a and b, pair by pair [Ericson, Real-Time Collision Detection, section 5.1.9].
 
     Where segments are parallel over a stretch, one pair of points of that stretch.
+
+    Parameters
+    ----------
+    a, a_end : (p, 3) ends of the first segment of each pair.
+    b, b_end : (p, 3) ends of the second segment of each pair, in the same unit.
     """
     u, v, w = a_end - a, b_end - b, a - b
     uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)

@@ -136,7 +136,13 @@ class JointLoads:
 
 
 def joint_loads(shell: Shell, state: Floats) -> JointLoads:
-    """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric."""
+    """Of a shell in equilibrium at `state` (N, 3), its source frames being there; with shared DOFs or eccentric.
+
+    Parameters
+    ----------
+    shell : with shared DOFs or eccentric joints, its source frames being at the state.
+    state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
+    """
     mesh, positions = shell.mesh, shell.positions(state)
     met = RodNodes(mesh, shell.node_blocks, shell.first_angle).at_crossings
     normals = joint_normals(mesh, positions)

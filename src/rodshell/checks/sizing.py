@@ -72,6 +72,11 @@ class Fit:
     ) -> Self:
         """By the net of a layout on its target.
 
+        Parameters
+        ----------
+        target : the surface.
+        layout : of the rods on it.
+        anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
         joint : ball joints without; where it does not hold the rods' normals, laths roll towards their thin side.
         """
         slender = SLENDER * target.size
@@ -87,7 +92,14 @@ class Fit:
     @classmethod
     def between(cls, lengths: Floats, ends: Floats, joints: ArrayLike) -> Self:
         """By rods of `lengths` (m,) whose ends come to lie at `ends` (m, 2, 3) [m]: each bends like a sine, and more
-        sharply by the number of `joints` (m,) along it."""
+        sharply by the number of `joints` (m,) along it.
+
+        Parameters
+        ----------
+        lengths : (m,) of the rods [m].
+        ends : (m, 2, 3) where their ends come to lie [m].
+        joints : (m,) number of joints along each rod.
+        """
         chords = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         ring = float(lengths.max()) / np.pi  # of a rod whose ends meet
         width = max(float(np.ptp(ends[:, :, :2], axis=(0, 1)).max()), ring)
@@ -145,6 +157,13 @@ class Fit:
         """Why `section` was chosen, in words: by what, the share of the strength expected, and what keeps it thin.
 
         Other parameters as for `section`, which chose it.
+
+        Parameters
+        ----------
+        section : the one that was chosen.
+        material : of the rods; a preset has its own strength and the sizes in which it is sold.
+        strength : in place of the preset's [Pa].
+        shape : a circle or a tube, if one was asked for.
         """
         strength = strength or material.bending_strength
         if strength is None:
@@ -174,7 +193,14 @@ class Fit:
 
 
 def bends_of(target: Target, layout: GridLayout, anchor: tuple[float, float] | None = None) -> Bends:
-    """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature."""
+    """The bends of a layout's rods on its target; where no net covers it, bounds from the target's own curvature.
+
+    Parameters
+    ----------
+    target : the surface.
+    layout : of the rods on it.
+    anchor : x, y of the point of the target where the two axes cross [m]; default: the target's highest point.
+    """
     try:
         return net_bends(chebyshev_net(target, layout, anchor=anchor))
     except NetLimitError:  # it is cut by seams, or another anchor is looked for
@@ -198,7 +224,13 @@ def net_bends(net: ChebyshevNet) -> Bends:
 
 
 def largest_strain(section: Section, bends: Bends) -> float:
-    """Largest bending strain of the section by such bends [-]."""
+    """Largest bending strain of the section by such bends [-].
+
+    Parameters
+    ----------
+    section : of the rods.
+    bends : curvatures (k,) of the rods [1/m].
+    """
     return float(np.max(fibre_strain(Rod(section, ANY), bends.normal, bends.geodesic), initial=0.0))
 
 

@@ -215,7 +215,18 @@ def _stencil(rod_nodes: RodNodes, pairs: Ints, has_edge: Bools) -> tuple[Ints, I
 
 @nb.njit(cache=True, error_model="numpy")
 def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore[no-untyped-def]
-    """Length of an edge; its tangent, material directors, spin w, and (source + t) / (1 + source.t)."""
+    """Length of an edge; its tangent, material directors, spin w, and (source + t) / (1 + source.t).
+
+    Parameters
+    ----------
+    x : (N, 3) node positions [m] and twist angles [rad].
+    blocks : (k,) nodes and twist angles of the joint.
+    leg : (4,) the edge, see `Stencils`.
+    source, director : (3,) tangent and first director of the edge's source frame.
+    t, m1, m2 : (3,) filled with the unit tangent and the material directors.
+    w : (3,) filled with the spin of the frame by the edge vector [1/m].
+    half : (3,) filled with (source + t) / (1 + source.t).
+    """
     square, both, along = 0.0, 1.0, 0.0
     for k in range(3):
         t[k] = x[blocks[leg[1]], k] - x[blocks[leg[0]], k]
@@ -241,7 +252,15 @@ def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore
 
 @nb.njit(cache=True, error_model="numpy")
 def by_edge(weight, length, t, m1, m2, w, jacobian):  # type: ignore[no-untyped-def]
-    """(6, 4) derivatives of the edge's share of T and N by (e, theta); dm1 = -(m1.dt) t + m2 (dtheta - w.de)."""
+    """(6, 4) derivatives of the edge's share of T and N by (e, theta); dm1 = -(m1.dt) t + m2 (dtheta - w.de).
+
+    Parameters
+    ----------
+    weight : share of the edge in its rod's section.
+    length : of the edge [m].
+    t, m1, m2, w : (3,) tangent, material directors and spin of the edge, see `frame`.
+    jacobian : (6, 4), filled; its rows are the components of T and N.
+    """
     for i in range(3):
         for j in range(3):
             delta = 1.0 if i == j else 0.0
@@ -257,6 +276,14 @@ def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ign
 
     As in `bend_twist`: first for a frame that does not spin, then the spin dtheta -> dtheta - w.de, then the
     symmetric part of the derivative of w; what is antisymmetric cancels.
+
+    Parameters
+    ----------
+    weight : share of the edge in its rod's section.
+    by_t, by_n : (3,) derivatives of the energy by T and N [J].
+    length : of the edge [m].
+    t, m1, m2, w, half : (3,) see `frame`.
+    local : (4, 4), to which is added, by the edge vector and the twist angle.
     """
     tt, nt, n1, n2 = 0.0, 0.0, 0.0, 0.0
     for k in range(3):
@@ -284,7 +311,14 @@ def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ign
 
 @nb.njit(cache=True, error_model="numpy")
 def spread(local, leg, other, hessian):  # type: ignore[no-untyped-def]
-    """Add `local` (4, 4), by (e, theta) of two edges, to the rows and columns of their nodes and angles."""
+    """Add `local` (4, 4), by (e, theta) of two edges, to the rows and columns of their nodes and angles.
+
+    Parameters
+    ----------
+    local : (4, 4) second derivatives by the edge vector and twist angle of one edge (rows) and of another (columns).
+    leg, other : (4,) the edges of the rows and of the columns, see `Stencils`.
+    hessian : (3k, 3k) of the joint, to which is added.
+    """
     for i in range(3):
         for j in range(3):
             value = local[i, j]
@@ -396,7 +430,14 @@ class LinkerBend:
         return LinkerBend(np.ascontiguousarray(blocks), corners.signs, bends)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
+        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
+        """
         local = _signed(state, self.blocks, self.signs)
         by_local = np.zeros_like(local)
         energy = self.bends.evaluate(local, by_local, hessians)

@@ -142,7 +142,14 @@ class Ties:
     __repr__ = brief
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
+        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
+        """
         apart = state[self.blocks[:, 0]] - state[self.blocks[:, 1]]
         force = self.stiffness[:, None] * apart
         np.add.at(gradient, self.blocks[:, 0], force)
@@ -185,7 +192,14 @@ class OffsetTie:
     __repr__ = brief
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
+        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
+        """
         return float(
             _offset_tie(
                 state, self.blocks, self.legs, self.middles, self.weights, self.stiffness, self.offsets,

@@ -44,12 +44,28 @@ class FlatRod:
 
     @staticmethod
     def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
-        """A rod of family "u", along x at y = `offset` [m], from x = `start` to `end` [m]."""
+        """A rod of family "u", along x.
+
+        Parameters
+        ----------
+        name : label such as "U09".
+        offset : y of the rod's line [m].
+        start, end : x of the ends [m].
+        virtual : whether the line only shapes the net and is not built.
+        """
         return FlatRod(name, "u", offset, start, end, (0.0, offset), (1.0, 0.0), virtual)
 
     @staticmethod
     def v(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
-        """A rod of family "v", along y at x = `offset` [m], from y = `start` to `end` [m]."""
+        """A rod of family "v", along y.
+
+        Parameters
+        ----------
+        name : label such as "V09".
+        offset : x of the rod's line [m].
+        start, end : y of the ends [m].
+        virtual : whether the line only shapes the net and is not built.
+        """
         return FlatRod(name, "v", offset, start, end, (offset, 0.0), (0.0, 1.0), virtual)
 
     @property
@@ -72,7 +88,12 @@ class FlatRod:
         return self.line == piece.line and self.start - tiny <= piece.start and piece.end <= self.end + tiny
 
     def cut(self, start: float, end: float) -> "FlatRod":
-        """The same rod with other ends, given by their material coordinates [m]."""
+        """The same rod with other ends.
+
+        Parameters
+        ----------
+        start, end : material coordinates of the new ends [m].
+        """
         return replace(self, start=start, end=end)
 
 

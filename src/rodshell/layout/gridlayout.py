@@ -123,7 +123,13 @@ class GridLayout:
         return self.offset[1 - side] + half * self.spacing[side]
 
     def lattice(self, family: Family, low: float, high: float) -> Floats:
-        """Offsets of the lines of a family [m], from at most a spacing below `low` to at most one above `high` [m]."""
+        """Offsets of the lines of a family [m], from at most a spacing below `low` to at most one above `high` [m].
+
+        Parameters
+        ----------
+        family : "u" or "v".
+        low, high : ends of the range of offsets that the lines have to cover [m].
+        """
         spacing, given = self.spacing[0 if family == "u" else 1], self.lines[0 if family == "u" else 1]
         if given:
             before = given[0] + spacing * np.arange(min(np.floor((low - given[0]) / spacing), 0), 0)

@@ -46,7 +46,14 @@ class RodLine:
 
     @staticmethod
     def of(rest: ArrayLike, *, closed: bool, clamped: Clamps) -> "RodLine":
-        """The line through the nodes `rest` (n, 3) [m], clamped at some ends.
+        """The line through nodes, clamped at some ends.
+
+        Parameters
+        ----------
+        rest : (n, 3) nodes of the unloaded rod [m].
+        closed : a ring: the last edge leads back to the first node.
+        clamped : "start" and "end" as far as they are clamped, or these with a tangent (3,) along the rod; without, the
+            tangent is extrapolated from the last two edges.
 
         Raises
         ------

@@ -324,7 +324,13 @@ def _in_pieces(names: list[str]) -> str:
 
 
 def piece_names(rod: str, count: int) -> list[str]:
-    """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several."""
+    """Names of the pieces of a rod: U07, or U07a, U07b, ... if there are several.
+
+    Parameters
+    ----------
+    rod : name of the whole rod.
+    count : number of its pieces.
+    """
     return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
 
 

@@ -98,7 +98,14 @@ def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
 
 
 def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
-    """Unit tangents (4, 3) at the anchor towards +u, -u, +v and -v; see `march`."""
+    """Unit tangents (4, 3) at the anchor towards +u, -u, +v and -v; see `march`.
+
+    Parameters
+    ----------
+    target : the surface.
+    anchor : (3,) point of the surface where the axes cross [m].
+    heading : (3,) direction of the u axis there; its part in the tangent plane is used.
+    """
     normal = target.on_surface(anchor[None]).normal[0]
     along = unit(heading - (heading @ normal) * normal)
     across = cross(normal, along)
@@ -305,6 +312,14 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
 
     `by_x` and `by_y` are the gradients of x^2/2 and y^2/2 by P: x and y themselves, except for layers. The inverse of
     the three gradients consists of their cross products.
+
+    Parameters
+    ----------
+    x, y : vectors from A and from B to P [m].
+    by_x, by_y : gradients of x^2/2 and y^2/2 by P [m].
+    g : gradient of f at P.
+    from_a, from_b : wanted lengths of x and y [m].
+    level : f at P.
     """
     normal, along, across = _cross(by_x, by_y), _cross(by_y, g), _cross(g, by_x)
     volume = _dot(normal, g)
@@ -320,7 +335,18 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
 
 @nb.njit(cache=True, error_model="numpy")
 def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: ignore[no-untyped-def]
-    """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers."""
+    """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers.
+
+    Parameters
+    ----------
+    p : the point P of the surface [m].
+    a, b : points A and B of their layers [m].
+    g : gradient of f at P.
+    hessian : (3, 3) second derivatives of f at P.
+    heights : (2,) h_u and h_v, of the layers above the surface [m].
+    from_a, from_b : wanted lengths of x and y [m].
+    level : f at P.
+    """
     steep = np.sqrt(_dot(g, g))
     n = (g[0] / steep, g[1] / steep, g[2] / steep)
     x, y = less(p, a), less(p, b)

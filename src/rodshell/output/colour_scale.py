@@ -60,7 +60,11 @@ class Scale:
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
     """The scale of a shape, the same for all shapes of an archive; None where its rods have the colours of families.
 
-    colour : "stress", or "gap": signed distance to the target, or height where there is none.
+    Parameters
+    ----------
+    archive : the result that the shape belongs to.
+    shape : the one whose rods are coloured.
+    colour : "stress", or "gap": signed distance to the target, or height where there is no target.
     """
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
@@ -81,6 +85,9 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
     """The largest gap [mm], signed, and its place (3,) [m], from the agreement, which looks between nodes too.
 
+    Parameters
+    ----------
+    archive : the result that the shape belongs to.
     shape : one whose gaps are known.
     """
     assert shape.gap is not None
@@ -131,7 +138,12 @@ def _rounded_up(largest: float) -> float:
 def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
     """Draw the map with ticks and caption.
 
-    right : x at which it ends; y : baseline of the numbers [drawing units].
+    Parameters
+    ----------
+    pencil : draws it.
+    scale : the map, its range and its caption.
+    right : x at which the bar ends [drawing units].
+    y : baseline of the numbers [drawing units].
     """
     length = 200.0
     left, step = right - length, length / BINS
@@ -149,7 +161,10 @@ def colour_bar(pencil: Pencil, scale: Scale, right: float, y: float) -> None:
 def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
     """Colours "#rrggbb" in a map of evenly spaced control points.
 
-    shares : (k,) 0 (its first point) to 1 (its last).
+    Parameters
+    ----------
+    points : colours "#rrggbb" of the control points.
+    shares : (k,) places in the map, from 0 (its first point) to 1 (its last).
     """
     table = np.array([[int(point[i : i + 2], 16) for i in (1, 3, 5)] for point in points], dtype=float)
     at = np.linspace(0.0, 1.0, len(points))
@@ -159,7 +174,13 @@ def hex_colours(points: tuple[str, ...], shares: Floats) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def mixed(colour: str, other: str, share: float) -> str:
-    """`colour` with a `share` of the `other`, 0 to 1."""
+    """A mixture of two colours, as "#rrggbb".
+
+    Parameters
+    ----------
+    colour, other : the two colours, "#rrggbb".
+    share : of the other colour, 0 to 1.
+    """
     pairs = ((int(colour[k : k + 2], 16), int(other[k : k + 2], 16)) for k in (1, 3, 5))
     return "#" + "".join(f"{round(a + share * (b - a)):02x}" for a, b in pairs)
 

@@ -226,7 +226,9 @@ class Drawing:
     def clipped(self, low: Floats, high: Floats) -> "Drawing":
         """The part within a rectangle; marks and texts that cross its border, and paths in space, are left out.
 
-        low, high : (2,) its lower left and upper right corner [mm].
+        Parameters
+        ----------
+        low, high : (2,) lower left and upper right corner of the rectangle [mm].
         """
         paths = [
             replace(path, points=part, closed=False)
@@ -257,24 +259,62 @@ class Pencil:
     left_out: list[str] = field(default_factory=list)
 
     def line(self, points: Iterable[Iterable[float]], layer: str, **look: object) -> None:
-        """Add a polyline through points (k, 2) or (k, 3) [mm]."""
+        """Add a polyline.
+
+        Parameters
+        ----------
+        points : (k, 2), or (k, 3) in space [mm].
+        layer : a key of `LAYERS`.
+        look : further fields of `Path`, such as its pen.
+        """
         self.paths.append(Path(np.array(points, dtype=float), layer, **look))  # type: ignore[arg-type]
 
     def mark(self, at: Iterable[float], radius: float, layer: str, **look: object) -> None:
-        """Add a circle around a point (2,) [mm]."""
+        """Add a circle.
+
+        Parameters
+        ----------
+        at : (2,) its middle [mm].
+        radius : [mm].
+        layer : a key of `LAYERS`.
+        look : further fields of `Mark`, such as its pen.
+        """
         self.marks.append(Mark(np.array(at, dtype=float), radius, layer, **look))  # type: ignore[arg-type]
 
     def write(self, text: str, at: Iterable[float], size: float, layer: str, **look: object) -> None:
-        """Add a line of text at a point (2,) [mm]."""
+        """Add a line of text.
+
+        Parameters
+        ----------
+        text : what it says.
+        at : (2,) where its baseline starts, is centred or ends, as `anchor` says [mm].
+        size : of the font [mm].
+        layer : a key of `LAYERS`.
+        look : further fields of `Text`, such as its anchor.
+        """
         self.texts.append(Text(text, np.array(at, dtype=float), size, layer, **look))  # type: ignore[arg-type]
 
     def leave_out(self, count: int, of: int, what: str) -> None:
-        """Record that `count` of so many texts, which are `what`, found no room."""
+        """Record that texts found no room.
+
+        Parameters
+        ----------
+        count : number of texts that were left out; nothing is recorded for 0.
+        of : number of all such texts.
+        what : what the texts are, in words.
+        """
         if count:
             self.left_out.append(f"{count if count < of else 'all'} of {of} {what}")
 
     def done(self, name: str, title: str, text: float) -> Drawing:
-        """The drawing, with the usual size of its texts [mm]."""
+        """The drawing of all that was added.
+
+        Parameters
+        ----------
+        name : of the drawing.
+        title : of the drawing, in words.
+        text : usual size of its texts [mm].
+        """
         return Drawing(name, title, text, tuple(self.paths), tuple(self.marks), tuple(self.texts), tuple(self.left_out))
 
 

@@ -105,6 +105,11 @@ class Content:
 def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
     """Names in the result's folder and contents of the files of some kinds; default: all but 3dm.
 
+    Parameters
+    ----------
+    archive : the result.
+    kinds : of files, keys of `KINDS`; default: all but 3dm.
+
     Raises
     ------
     InputError : an unknown kind, or one that needs a package that is not installed.

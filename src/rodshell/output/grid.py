@@ -212,6 +212,11 @@ def shape_names(archive: Archive) -> list[str]:
 def shape_of(archive: Archive, name: str) -> Shape:
     """A shape by its name.
 
+    Parameters
+    ----------
+    archive : the result.
+    name : one of `shape_names`.
+
     Raises
     ------
     OutputError : the archive has no such shape.

@@ -112,6 +112,10 @@ def place(texts: Sequence[str], rods: Floats, size: float, *, at: Bools | None =
 
     A rod that finds room at neither end has its label next to its first end; where there is none it goes without.
 
+    Parameters
+    ----------
+    texts : the label of each rod.
+    rods : (m, 2, 2) both ends of each rod.
     size : of the text, in the unit of `rods`.
     at : (m, 2) whether an end is to have one; default: all.
     """
@@ -140,7 +144,14 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 
     The text covers none of the lines (m, 2, 2) either, the line to it may cross them.
 
+    Parameters
+    ----------
+    text : of the label.
+    end : (2,) the rod's end that it belongs to.
     way : (2,) to the side that is tried first.
+    size : of the text, in the unit of `end`.
+    room : what is taken.
+    lines : (m, 2, 2) lines that the text must not cover.
     """
     first = float(np.arctan2(way[1], way[0]))
     half = 0.5 * size * np.array([LETTER * len(text), LINE])
@@ -155,7 +166,14 @@ def nearby(text: str, end: Floats, way: Floats, size: float, room: Room, lines: 
 
 
 def take(label: Label, size: float, room: Room) -> None:
-    """Take the label's room, and that of the line to it."""
+    """Take the label's room, and that of the line to it.
+
+    Parameters
+    ----------
+    label : that was placed.
+    size : of its text, in the unit of its coordinates.
+    room : in which its box is taken.
+    """
     room.take(label.box(size))
     if label.moved:
         room.take(thin(label.leader(size), THIN * size))
@@ -176,14 +194,26 @@ def fits(label: Label, size: float, room: Room, lines: Floats) -> bool:
 
 
 def off_its_mark(line: Floats, size: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is."""
+    """(4, 2) corners of the room of a line (2, 2), without its beginning, where the mark that it leads from is.
+
+    Parameters
+    ----------
+    line : (2, 2) from the mark to the label.
+    size : of the text, in the unit of the line; half of it is left out at the mark.
+    """
     a, b = line
     share = min(0.5 * size / max(float(np.linalg.norm(b - a)), 1e-12), 0.9)
     return thin(np.array([a + share * (b - a), b]), THIN * size)
 
 
 def thin(line: Floats, width: float) -> Floats:
-    """(4, 2) corners of the room of a line (2, 2)."""
+    """(4, 2) corners of the room of a line (2, 2).
+
+    Parameters
+    ----------
+    line : (2, 2) its two ends.
+    width : of the room, in the unit of the line.
+    """
     a, b = line
     along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
     side = 0.5 * width * np.array([-along[1], along[0]])

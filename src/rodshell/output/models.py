@@ -155,6 +155,11 @@ def compas_json(archive: Archive, state: str) -> str:
 def rhino_bytes(archive: Archive, plan: FlatPlan) -> bytes:
     """The whole model.
 
+    Parameters
+    ----------
+    archive : the result.
+    plan : its flat plan.
+
     Raises
     ------
     InputError : rhino3dm is not installed.

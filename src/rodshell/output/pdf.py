@@ -86,7 +86,14 @@ def _register_fonts() -> None:
 
 
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
-    """Width of a line of text, in the unit of its `size`."""
+    """Width of a line of text, in the unit of its `size`.
+
+    Parameters
+    ----------
+    text : a single line.
+    size : of the font; the width has the same unit.
+    bold : whether the font is bold.
+    """
     from reportlab.pdfbase.pdfmetrics import stringWidth
 
     _register_fonts()

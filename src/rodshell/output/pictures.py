@@ -51,7 +51,13 @@ class View:
 
     @staticmethod
     def of(points: Floats, width: float) -> "View":
-        """The view of all points (n, 3) [m] and of the ground below them."""
+        """The view of all points (n, 3) [m] and of the ground below them.
+
+        Parameters
+        ----------
+        points : (n, 3) all that is to be seen [m].
+        width : of the picture [drawing units].
+        """
         low, high = points.min(axis=0), points.max(axis=0)
         corners = np.array([[x, y, low[2]] for x in (low[0], high[0]) for y in (low[1], high[1])])
         corners = np.concatenate([corners, points])

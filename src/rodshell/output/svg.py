@@ -17,7 +17,13 @@ SANS = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sa
 
 
 def number(value: float, digits: int = 2) -> str:
-    """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0"."""
+    """A number with at most `digits` decimals, without zeros at its end: "2.5", "-0.01", "0".
+
+    Parameters
+    ----------
+    value : any finite number.
+    digits : most decimals that are shown.
+    """
     text = f"{value:.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")

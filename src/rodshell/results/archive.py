@@ -34,6 +34,9 @@ PARTS = ".gltf"
 def read_inputs(case_toml: str, where: Callable[[str], Path] = Path) -> dict[str, bytes]:
     """The contents of the files that a case names and that are to be kept with its result, by the path in the case.
 
+    Parameters
+    ----------
+    case_toml : text of the case.
     where : the place of a file by its path in the case.
     """
     found = {}
@@ -77,7 +80,10 @@ def shown_case(case_toml: str, inputs: Mapping[str, bytes]) -> str:
 def opened_case(case_toml: str, where: Callable[[str], Path]) -> tuple[str, dict[str, bytes]]:
     """The case of a result folder and the contents of its inputs; files that were not copied are named absolutely.
 
-    where : as of `read_inputs`.
+    Parameters
+    ----------
+    case_toml : text of the case.
+    where : the place of a file by its path in the case.
     """
     inputs = read_inputs(case_toml, where)
     outside = {name: str(where(name).absolute()) for name in _names(case_toml) if name not in inputs}
@@ -227,6 +233,11 @@ def archive_names(archive: Archive) -> list[str]:
 
 def put_archive(archive: Archive, place: ResultFolder) -> None:
     """Stage result.json, case.toml, states.npz and the copied inputs in a folder.
+
+    Parameters
+    ----------
+    archive : the result.
+    place : the folder in which the files are staged.
 
     Raises
     ------

@@ -69,6 +69,11 @@ class ResultFolder:
     def put(self, name: str, content: str | bytes) -> None:
         """Stage a file.
 
+        Parameters
+        ----------
+        name : path of the file within the folder.
+        content : text, written as UTF-8, or bytes.
+
         Raises
         ------
         OutputError : it cannot be written.

@@ -63,17 +63,35 @@ class Record(BaseModel):
 
 
 def key(meaning: str, unit: str = "") -> Any:
-    """A key that may be absent, with what it means and its unit."""
+    """A key that may be absent, with what it means and its unit.
+
+    Parameters
+    ----------
+    meaning : of the key, in words.
+    unit : of its value; "" without.
+    """
     return Field(default=None, description=f"{meaning} [{unit}]" if unit else meaning)
 
 
 def required(meaning: str, *, alias: str) -> Any:
-    """A key that must be there, and that Python cannot have as a name."""
+    """A key that must be there, and that Python cannot have as a name.
+
+    Parameters
+    ----------
+    meaning : of the key, in words.
+    alias : name of the key in the file.
+    """
     return Field(alias=alias, description=meaning)
 
 
 def rows(meaning: str, unit: str = "") -> Any:
-    """A list that may be absent."""
+    """A list that may be absent.
+
+    Parameters
+    ----------
+    meaning : of the list's entries, in words.
+    unit : of their values; "" without.
+    """
     return Field(default=(), description=f"{meaning} [{unit}]" if unit else meaning)
 
 

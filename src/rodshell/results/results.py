@@ -310,7 +310,13 @@ class Results(Record):
 
     @classmethod
     def from_text(cls, text: str, *, source: str) -> Self:
-        """Results from the text of a result.json of the present version; as `of`."""
+        """Results from the text of a result.json of the present version; as `of`.
+
+        Parameters
+        ----------
+        text : of a result.json.
+        source : what messages call it.
+        """
         try:
             found = cls.model_validate_json(text)
         except ValidationError as error:
@@ -346,6 +352,11 @@ def upgraded(content: Mapping[str, Any], *, source: str) -> dict[str, Any]:
     """The content of a result.json with the keys of the present version.
 
     Until November 2026 the format was called gridshell-result. Version 2 renamed drape.own_ends to drape.net_deviation.
+
+    Parameters
+    ----------
+    content : of a result.json of any version.
+    source : what messages call it.
 
     Raises
     ------

@@ -231,6 +231,9 @@ def plain(value: object) -> str:
 def case_rows(table: Record | None, rounding: Rounding = EXACT) -> list[tuple[str, str]]:
     """The entries of a table of the case, in the units of a drawing, files by their names.
 
+    Parameters
+    ----------
+    table : of the case; None has no entries.
     rounding : how finely lengths are shown at most.
     """
     return [

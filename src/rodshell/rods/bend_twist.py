@@ -143,7 +143,14 @@ class BendTwist:
         return np.asarray(np.cos(theta) * d1 + np.sin(theta) * cross(self.source_tangents, d1))
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
+        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
+        """
         return float(
             _bend_twist(
                 state,
@@ -405,7 +412,16 @@ def _bend_twist(  # type: ignore[no-untyped-def]
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def spread(hee, hef, hff, he3, he7, hf3, hf7, h33, h37, h77, h):  # type: ignore[no-untyped-def]
-    """Fill the element Hessian h (15, 15), by x_0, theta_e, x_1, theta_f, x_2, from that by e, theta_e, f, theta_f."""
+    """Fill the element Hessian h (15, 15), by x_0, theta_e, x_1, theta_f, x_2, from that by e, theta_e, f, theta_f.
+
+    Parameters
+    ----------
+    hee, hef, hff : (3, 3) second derivatives by the edge vectors e and e, e and f, f and f.
+    he3, he7 : (3,) by e and theta_e, and by e and theta_f.
+    hf3, hf7 : (3,) by f and theta_e, and by f and theta_f.
+    h33, h37, h77 : by theta_e twice, by both angles, and by theta_f twice.
+    h : (15, 15), filled; rows and columns of the unused components of the angles get zeros.
+    """
     for i in range(15):
         for j in (4, 5, 10, 11):
             h[i, j] = h[j, i] = 0.0

@@ -75,7 +75,14 @@ class Stretch:
 
     @staticmethod
     def elastic(blocks: Ints, rest_lengths: Floats, stiffness: Floats) -> "Stretch":
-        """The paper's elastic edges: no multipliers. Parameters as of the class."""
+        """The paper's elastic edges: no multipliers. Parameters as of the class.
+
+        Parameters
+        ----------
+        blocks : (e, 2) nodes of each edge.
+        rest_lengths : (e,) [m].
+        stiffness : (e,) EA [N].
+        """
         return Stretch(blocks, rest_lengths, stiffness, np.zeros(len(blocks)))
 
     def with_forces(self, forces: Floats | None, *, multipliers: Floats | None = None) -> "Stretch":
@@ -114,7 +121,14 @@ class Stretch:
         _add_axial(state, self.blocks, forces, gradient)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
+        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
+        """
         exact = self.forces is None
         forces = self.rest_lengths if self.forces is None else self.forces
         return float(

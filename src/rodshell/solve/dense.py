@@ -54,7 +54,15 @@ def _place(matrix, row, column):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, error_model="numpy")
 def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
     """Eliminate the pivots of a front: D L^T in `rows` (width, stride), which holds the front's upper triangle before;
-    L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite."""
+    L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite.
+
+    Parameters
+    ----------
+    rows : (width, stride) the front's upper triangle, overwritten with D L^T.
+    panel : (width, stride), filled with L^T.
+    pivots : (width,), filled with D.
+    work : `workspace`.
+    """
     width = len(rows)
     for begin in range(0, width, BLOCK):
         end = min(begin + BLOCK, width)
@@ -182,7 +190,15 @@ def _subtract(rows, registers, c, stride_c, a, stride_a, b, stride_b, depth, kee
 @nb.njit(cache=True)
 def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
     """Add to the rows from `begin` to `end` of a front, whose columns from `begin` on are `target`, what a child's
-    update matrix has for them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to."""
+    update matrix has for them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to.
+
+    Parameters
+    ----------
+    target : the rows of the front from `begin` to `end`, its columns from `begin` on.
+    update : the child's update matrix, of which the upper triangle is read.
+    runs : (k, 2) rows of the update matrix that stay contiguous: the first, and its row in the front.
+    begin, end : first row of the front that is added to, and the row after the last.
+    """
     count = len(runs)
     for low in range(count):
         past = runs[low + 1, 0] if low + 1 < count else len(update)
@@ -197,7 +213,14 @@ def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, error_model="numpy")
 def forward(panel, values, aside):  # type: ignore[no-untyped-def]
     """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
-    what that takes. `aside` (width,) is scratch."""
+    what that takes. `aside` (width,) is scratch.
+
+    Parameters
+    ----------
+    panel : (width, stride) L^T.
+    values : (stride,) b, overwritten with y; from those behind the pivots, the product with L is subtracted.
+    aside : (width,) scratch.
+    """
     width, stride = panel.shape
     for k in range(width):
         value, row = values[k], panel[k]
@@ -216,7 +239,15 @@ def forward(panel, values, aside):  # type: ignore[no-untyped-def]
 @nb.njit(cache=True, error_model="numpy")
 def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
     """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the padding
-    of the panel itself is 0. `aside` (2 width,) is scratch."""
+    of the panel itself is 0. `aside` (2 width,) is scratch.
+
+    Parameters
+    ----------
+    panel : (width, stride) L^T, its padding 0.
+    pivots : (width,) D.
+    values : (stride,) y, overwritten with x; behind the pivots, the x that is already known.
+    aside : (2 width,) scratch.
+    """
     width, stride = panel.shape
     begin = width // LANES * LANES
     for k in range(width):

@@ -259,6 +259,10 @@ def find_stable(
 
     Parameters are those of `find_equilibrium`.
 
+    Parameters
+    ----------
+    problem, state, forces, limit_steps, most_modes, most_iterations, progress : see `find_equilibrium`.
+
     Returns
     -------
     The stable equilibrium; the saddle, with its negative modes counted, where neither side leads to one. The report

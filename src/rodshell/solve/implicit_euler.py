@@ -217,20 +217,44 @@ class ContactLaw(Protocol[P]):
     """What `contact.modified_mass.ModifiedMass` offers."""
 
     def touching(self, supports: Constraint, state: Floats) -> P:
-        """The constraint that a step from `state` (N, 3) begins with."""
+        """The constraint that a step from `state` (N, 3) begins with.
+
+        Parameters
+        ----------
+        supports : what holds the structure without the contact.
+        state : (N, 3) at the start of the step [m, at twist angles rad].
+        """
         ...
 
     def below(self, state: Floats, touching: P) -> P | None:
-        """With the nodes that `state` (N, 3) has below the target, too; None where there are no new ones."""
+        """With the nodes that `state` (N, 3) has below the target, too; None where there are no new ones.
+
+        Parameters
+        ----------
+        state : (N, 3) at the end of the step [m, at twist angles rad].
+        touching : the constraint of the step.
+        """
         ...
 
     def released(self, touching: P, reactions: Floats) -> tuple[P, Floats] | None:
         """With the nodes free to slip that stick by more than friction can hold, by the `reactions` (N, 3) [N], and
-        the friction (N, 3) on them [N]; None where there are none."""
+        the friction (N, 3) on them [N]; None where there are none.
+
+        Parameters
+        ----------
+        touching : the constraint of the step.
+        reactions : (N, 3) at its end [N].
+        """
         ...
 
     def landed(self, velocity: Floats, touching: P) -> Floats:
-        """(N, 3) `velocity` at the end of a step, without what the contact takes of it [m/s]."""
+        """(N, 3) `velocity` at the end of a step, without what the contact takes of it [m/s].
+
+        Parameters
+        ----------
+        velocity : (N, 3) at the end of the step [m/s].
+        touching : the constraint of the step.
+        """
         ...
 
 
@@ -252,7 +276,16 @@ class ContactEuler:
         self.last: P | None = None
 
     def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
-        """One step; parameters as of `ImplicitEuler.take`."""
+        """One step.
+
+        Parameters
+        ----------
+        motion : its source frames being at the state.
+        state : (N, 3) at the start [m, at twist angles rad].
+        velocity : (N, 3) at the start [m/s, rad/s].
+        time : of the start [s].
+        step : its length [s].
+        """
         law = self._law
         touching = law.touching(motion.constraint_at(time + step), state)
         rubbing = np.zeros_like(state)

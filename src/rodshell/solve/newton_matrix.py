@@ -58,7 +58,13 @@ class SummedMatrix(Protocol):
         ...
 
     def solve(self, field: Floats, free: Freedom) -> Floats:
-        """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them."""
+        """(N, 3) solution for the part of `field` (N, 3) in the free directions; zero across them.
+
+        Parameters
+        ----------
+        field : (N, 3) right-hand side, of which the part in the free directions is used.
+        free : the free directions.
+        """
         ...
 
 
@@ -101,7 +107,15 @@ class Banded:
         self.values[:] = 0.0
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
-        """Add element Hessians (m, 3k, 3k); the number of their set does not matter."""
+        """Add element Hessians (m, 3k, 3k); the number of their set does not matter.
+
+        Parameters
+        ----------
+        number : of the set of elements; unused.
+        hessians : (m, 3k, 3k) of each element.
+        blocks : (m, k) of each element.
+        free : the free directions.
+        """
         self._look_at(free)
         _add(hessians, blocks, self._first, self._count, self._axes, self._plain, self.values)
 
@@ -156,6 +170,15 @@ class SparseSum:
         self._data[:] = 0.0
 
     def add(self, number: int, hessians: Floats, blocks: Ints, free: Freedom) -> None:
+        """Add the Hessians of a set of elements.
+
+        Parameters
+        ----------
+        number : of the set, among those that the matrix was made for.
+        hessians : (m, 3k, 3k) of each element.
+        blocks : (m, k) of each element.
+        free : the free directions.
+        """
         self._assembly.add(number, hessians, blocks, free, self._data)
 
     def add_blocks(self, diagonal: Floats, full: Floats, free: Freedom) -> None:

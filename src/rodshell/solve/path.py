@@ -176,7 +176,12 @@ def going_on(problem: Problem, last: Equilibrium) -> Problem:
 
 def unaccounted(here: Equilibrium, there: Equilibrium) -> bool:
     """Whether the energies of two equilibria differ by other than the work done on the prescribed blocks between them,
-    by the trapezoidal rule; parameters as for `surplus`."""
+    by the trapezoidal rule; parameters as for `surplus`.
+
+    Parameters
+    ----------
+    here, there : equilibria of one structure under one load, the second with prescribed `Supports`.
+    """
     return abs(surplus(here, there)) > UNACCOUNTED
 
 
@@ -195,7 +200,12 @@ def surplus(here: Equilibrium, there: Equilibrium) -> float:
 
 
 def farthest(here: Equilibrium, there: Equilibrium) -> float:
-    """Largest distance of a node between two equilibria of one structure [m]."""
+    """Largest distance of a node between two equilibria of one structure [m].
+
+    Parameters
+    ----------
+    here, there : equilibria of one structure.
+    """
     nodes = np.unique(here.problem.stretch.blocks)
     return float(np.linalg.norm(there.state[nodes] - here.state[nodes], axis=1).max())
 

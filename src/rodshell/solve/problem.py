@@ -276,6 +276,13 @@ class GravityForce:
     acceleration: tuple[float, float, float] = (0.0, 0.0, -9.81)
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
+        """The weight of the nodes.
+
+        Parameters
+        ----------
+        time, state, velocity : unused.
+        mass : (N, 3) lumped mass of each component [kg, kg m2].
+        """
         force = np.zeros_like(mass)
         force[self.nodes] = mass[self.nodes] * self.acceleration
         return force
@@ -290,10 +297,23 @@ class PointLoads:
 
     @classmethod
     def on(cls, block: int, *force: float) -> "PointLoads":
-        """One force (fx, fy, fz) [N] on a node, or one moment [N m] on a twist angle."""
+        """One load on a single block.
+
+        Parameters
+        ----------
+        block : a node or a twist angle.
+        force : (fx, fy, fz) on a node [N], or one moment on a twist angle [N m].
+        """
         return cls(np.array([block]), np.array([[*force, 0.0, 0.0][:3]]))
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
+        """The sum of the loads on each block.
+
+        Parameters
+        ----------
+        time, state, velocity : unused.
+        mass : (N, 3) lumped mass of each component, for its shape.
+        """
         force = np.zeros_like(mass)
         _check_blocks(self.blocks, len(mass))
         np.add.at(force, self.blocks, self.forces)
@@ -339,6 +359,14 @@ class ExplicitForce:
     force: Callable[[float, Floats, Floats], Floats]
 
     def held(self, time: float, state: Floats, velocity: Floats, mass: Floats) -> Floats:
+        """The force, evaluated once for the step.
+
+        Parameters
+        ----------
+        time : of the step's end [s].
+        state, velocity : (N, 3) at its start [m, m/s].
+        mass : (N, 3) lumped mass of each component, for its shape.
+        """
         return _checked(self.force(time, state, velocity), mass.shape, self.force, time)
 
 

@@ -78,7 +78,12 @@ class RodLoads:
     gravity: ArrayLike | None = None
 
     def on(self, rod: ElasticRod, spinning: Sequence[End]) -> Floats:
-        """(N, 3) load on each block [N, at angles N m], the clamps `spinning` being free to spin.
+        """(N, 3) load on each block [N, at angles N m].
+
+        Parameters
+        ----------
+        rod : that carries the loads.
+        spinning : clamped ends that are free to spin.
 
         Raises
         ------
@@ -116,7 +121,14 @@ class SupportPath:
 
     @staticmethod
     def of(rod: ElasticRod, state: Floats, wanted: RodSupports) -> "SupportPath":
-        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted."""
+        """From where the rod's blocks are in `state` (N, 3) to where the supports are wanted.
+
+        Parameters
+        ----------
+        rod : that is held.
+        state : (N, 3) node positions [m] and twist angles [rad] at the start.
+        wanted : the supports at the end.
+        """
         wanted.require(rod)
         goals = dict[int, Floats]()
         for k, node in enumerate(rod.clamped_nodes):
@@ -206,7 +218,14 @@ def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) ->
 
 
 def index_of(given: int, count: int, what: str) -> int:
-    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`."""
+    """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`.
+
+    Parameters
+    ----------
+    given : the index; a negative one counts from the end.
+    count : number of all that there are.
+    what : is counted, for messages: "node" or "edge".
+    """
     if not isinstance(given, int | np.integer):
         raise InputError(f"a {what} is a whole number, not {given!r}")
     if not -count <= given < count:

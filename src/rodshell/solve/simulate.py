@@ -162,7 +162,18 @@ def _written(times: Floats) -> int:
 class Stepper(Protocol):
     """Takes single steps."""
 
-    def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused: ...
+    def take(self, motion: Motion, state: Floats, velocity: Floats, *, time: float, step: float) -> Step | Refused:
+        """One step, or why it was refused.
+
+        Parameters
+        ----------
+        motion : its source frames being at the state.
+        state : (N, 3) at the start [m, at twist angles rad].
+        velocity : (N, 3) at the start [m/s, rad/s].
+        time : of the start [s].
+        step : its length [s].
+        """
+        ...
 
 
 def simulate(

@@ -49,13 +49,26 @@ class Blocks(NamedTuple):
 
 
 def blocks_of(indptr: Longs, indices: Longs, begin: Longs) -> Blocks:
-    """The graph of blocks of a pattern (upper triangle, compressed columns)."""
+    """The graph of blocks of a pattern (upper triangle, compressed columns).
+
+    Parameters
+    ----------
+    indptr, indices : the pattern of the upper triangle, in compressed columns.
+    begin : (b + 1,) first unknown of each block, and the number of unknowns.
+    """
     begin = np.asarray(begin, dtype=np.int64)
     return Blocks(begin, *_coupled(indptr.astype(np.int64), indices.astype(np.int64), begin))
 
 
 def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan:
-    """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open."""
+    """Of a pattern whose `blocks` are eliminated in `order` (b,), except what the tree leaves open.
+
+    Parameters
+    ----------
+    indptr, indices : the pattern of the upper triangle, in compressed columns.
+    blocks : its graph, see `blocks_of`.
+    order : (b,) blocks in the order of elimination.
+    """
     order, tree, weight, count = _tree(blocks.begin, blocks.start, blocks.neighbours, order.astype(np.int64))
     first = _supernodes(tree, count, weight)
     up, child_start, children = _children(tree, first)
@@ -345,7 +358,14 @@ WORTHWHILE = 1e8  # multiplications from which on work is shared
 
 @nb.njit(cache=True)
 def parts_of(up, width, below):  # type: ignore[no-untyped-def]
-    """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them."""
+    """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them.
+
+    Parameters
+    ----------
+    up : (n_s,) parent of each supernode, negative for a root; children come before their parents.
+    width : (n_s,) number of pivots of each supernode.
+    below : (n_s,) number of rows of each update matrix.
+    """
     supers = len(up)
     lowest, work = np.arange(supers), np.empty(supers)
     for s in range(supers):
@@ -380,6 +400,12 @@ def stacks_of(up, below, child_start, children, part_start, parts):  # type: ign
     Each part has two stacks, for even and for odd depths of the tree: what a supernode reads, its children's, and what
     it writes are then never on the same stack, and the children's lie on top of theirs. The last that a part writes
     stays there for the part that needs all.
+
+    Parameters
+    ----------
+    up : (n_s,) parent of each supernode, negative for a root.
+    below : (n_s,) number of rows of each update matrix.
+    child_start, children, part_start, parts : see `Plan`.
     """
     supers = len(up)
     odd, part = np.zeros(supers, dtype=np.int64), np.zeros(supers, dtype=np.int64)

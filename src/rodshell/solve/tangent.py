@@ -199,7 +199,14 @@ class TangentAssembly:
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
 
     def gradient(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Floats:
-        """(N, 3) gradient [N] of the elements and of edges that carry the axial forces (e,) [N]; without loads."""
+        """(N, 3) gradient [N] of the elements and of edges that carry the axial forces (e,) [N]; without loads.
+
+        Parameters
+        ----------
+        elements : with their source frames at, or near, the state.
+        state : (N, 3) node positions [m] and twist angles [rad].
+        forces : (e,) axial forces of the edges [N].
+        """
         gradient = np.zeros_like(state)
         for element in elements:
             element.evaluate(state, gradient)
@@ -227,6 +234,12 @@ class TangentAssembly:
 
     def tangent(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Tangent:
         """The tangent at a state; parameters as for `values`.
+
+        Parameters
+        ----------
+        elements : with their source frames at, or near, the state.
+        state : (N, 3) node positions [m] and twist angles [rad].
+        forces : (e,) axial forces of the edges [N].
 
         Raises
         ------

@@ -115,7 +115,13 @@ def _joint(joint: Joint | None) -> str:
 
 
 def with_title(drawing: Drawing, block: TitleBlock) -> Drawing:
-    """The drawing with its title block and a scale bar below: for a sheet without a frame."""
+    """The drawing with its title block and a scale bar below: for a sheet without a frame.
+
+    Parameters
+    ----------
+    drawing : without a frame.
+    block : entries and notes of the title block.
+    """
     (left, bottom), (right, _) = drawing.box()
     size, pencil = drawing.text, Pencil()
     y = bottom - 2.6 * size
@@ -237,6 +243,10 @@ def fitted(compose: Compose, paper: tuple[float, float]) -> Sheet:
 def parts(compose: Compose, paper: tuple[float, float], whole: Sheet, *, true_size: bool = False) -> Iterator[Sheet]:
     """What a drawing's one sheet leaves out, on several: at the smallest scale that shows all, or the largest there is.
 
+    Parameters
+    ----------
+    compose : makes the drawing for a text size [mm at 1:1].
+    paper : width and height of the sheet [mm].
     whole : its one sheet; nothing is yielded where that leaves nothing out.
     true_size : at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """

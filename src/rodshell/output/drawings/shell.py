@@ -118,7 +118,14 @@ def thinned(curve: Floats) -> Floats:
 
 
 def seen_from_above(pencil: Pencil, archive: Archive, text: float) -> None:
-    """The rods of the final shape, pale."""
+    """The rods of the final shape, pale.
+
+    Parameters
+    ----------
+    pencil : draws them.
+    archive : a result with a final shape.
+    text : size of the drawing's texts [mm], by which the line width is chosen.
+    """
     assert archive.final is not None
     for curve in rod_curves(archive, archive.states[archive.final]):
         pencil.line(thinned(curve)[:, :2], "CUT", pen=Pen(PALE, 0.08 * text))
@@ -140,7 +147,13 @@ def _span(
 
 
 def axes(pencil: Pencil, text: float) -> None:
-    """Ticks of x and y [mm] along two sides of all that is there."""
+    """Ticks of x and y [mm] along two sides of all that is there.
+
+    Parameters
+    ----------
+    pencil : draws them, around what it has drawn so far.
+    text : size of the drawing's texts [mm].
+    """
     low, high = pencil.done("", "", text).box()
     low, high = low - text, high + text
     pencil.line([(low[0], high[1]), low, (high[0], low[1])], "DIM")
