@@ -64,6 +64,12 @@ class PopUp:
     shell: Shell
     equilibrium: Equilibrium
 
+    def __repr__(self) -> str:
+        rods, state = len(self.footprint.rods), self.report.status.value
+        if self.report.converged:
+            state = "stable" if self.report.stable else "unstable"
+        return f"<PopUp: {rods} rods, {self.ends} from {self.start}, {state}>"
+
     @cached_property
     def positions(self) -> Floats:
         """(n, 3) of the footprint's nodes [m]."""
