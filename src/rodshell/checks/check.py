@@ -94,6 +94,11 @@ class Checks:
         ------
         KeyError : there is no such shell, or it did not converge.
         """
+        if ends not in self.bending:
+            known = " and ".join(map(str, self.bending)) or "none"
+            raise KeyError(
+                f"no shell with {ends} ends was checked: it was not asked for or did not converge; checked: {known}"
+            )
         return ShellChecks(
             self.bending[ends],
             self.reactions[ends],
