@@ -436,7 +436,7 @@ def test_a_form_of_patches_means_the_same_by_the_same_names() -> None:
     assert two.meetings
     with pytest.raises(InputError, match=r"this form has 2 patches: take patches\[k\].draped"):
         two.draped  # noqa: B018
-    with pytest.raises(KeyError):
+    with pytest.raises(KeyError, match=r"no shell with clamped ends was checked: .*; checked: pinned"):
         one.checks["clamped"]
 
 

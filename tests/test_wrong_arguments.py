@@ -9,6 +9,9 @@ from rodshell.cli import main
 TARGET = rs.Hemisphere(radius=0.2)
 METHODS = r"method must be rodshell.Bound\(\), rodshell.Gravity\(\) or rodshell.Fall\(\)"
 LAYOUT = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=1.0)
+CROSS = rs.straight_rods([[(-1.0, 0.0), (1.0, 0.0)], [(0.0, -1.0), (0.0, 1.0)]])
+FOOTPRINT = rs.Footprint(rs.mesh_grid(CROSS, 0.5))
+BOUNDARY = rs.Boundary(np.zeros((4, 3)), np.zeros((4, 3)))
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
 
 
@@ -73,6 +76,15 @@ ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3
         (lambda: rs.pop_up(None, None, ROD, ends="clampd"), 'ends must be "pinned" or "clamped", not "clampd"'),
         (lambda: rs.pop_up(None, None, ROD, start="drapped"), 'not "drapped": did you mean "draped"?'),
         (lambda: rs.pop_up(None, None, ROD, warm_start="flat"), "what an earlier rodshell.pop_up returned"),
+        (lambda: rs.pop_up(None, ROD, None), "footprint must be a rodshell Footprint, not None"),
+        (lambda: rs.pop_up(FOOTPRINT, ROD, BOUNDARY), "boundary must be a rodshell Boundary, not a Rod"),
+        (lambda: rs.pop_up(BOUNDARY, FOOTPRINT, ROD), "footprint must be a rodshell Footprint, not a Boundary"),
+        (lambda: rs.pop_up(FOOTPRINT, BOUNDARY, TARGET), "rod must be a rodshell Rod, not a Hemisphere"),
+        (lambda: rs.OutputOptions(fabrication=3), "fabrication must be a rodshell Fabrication, not 3"),
+        (lambda: rs.OutputOptions(drawings="A3"), 'drawings must be a rodshell DrawingStyle, not "A3"'),
+        (lambda: rs.OutputOptions(stages="3"), 'stages must be a whole number, 0 to 1000, not "3"'),
+        (lambda: rs.OutputOptions(stages=True), "stages must be a whole number, 0 to 1000, not true"),
+        (lambda: rs.OutputOptions(strength="3"), 'the strength must be a number in Pa, not "3"'),
         (lambda: rs.Rod(ROD.material, ROD.section), "section must be a circle, .* section, not a Material"),
         (lambda: rs.Rod(ROD.section, 1e9), "material must be a rodshell Material, not 1000000000.0"),
         (lambda: rs.Hemisphere(radius="20"), 'target radius must be a number in m, not "20"'),

@@ -25,7 +25,7 @@ from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
-from rodshell.output.files import save
+from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
 from rodshell.output.pictures import picture_svg
 from rodshell.results import Archive, Results, Verdict
@@ -238,7 +238,7 @@ class Form:
         folder: str | PathLike[str],
         *,
         options: OutputOptions | None = None,
-        kinds: Iterable[str] | None = None,
+        kinds: str | Iterable[str] | None = None,
         force: bool = False,
     ) -> Path:
         """Write archive, drawings, schedules, models and report; the folder's absolute path.
@@ -246,14 +246,17 @@ class Form:
         Parameters
         ----------
         options : as of `archive`.
-        kinds : of files in addition to the archive, such as "dxf", "csv"; default: all that every installation can.
+        kinds : of files in addition to the archive, such as ["dxf", "csv"] or "dxf, csv"; default: all that every
+            installation can.
         force : also replace files that rodshell did not write, or that were changed since, where it has to write.
 
         Raises
         ------
-        OutputError : the folder cannot be written, or such files are there and `force` is False.
+        InputError : an unknown kind. OutputError : the folder cannot be written, or such files are there and `force` is
+            False.
         """
-        return save(self.archive(options=options), folder, kinds, force=force)
+        wanted = wanted_kinds(kinds)  # before the checks, which take time
+        return save(self.archive(options=options), folder, wanted, force=force)
 
     # Python manners
 

@@ -1,6 +1,7 @@
 """The whole job: what it says of itself, what it keeps, and the table of rods that stands for a form."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache, partial
 from math import pi
@@ -561,3 +562,24 @@ def test_a_table_whose_rods_would_all_swing_is_refused():
     grid = rs.straight_rods(SQUARE)
     with pytest.raises(InputError, match="no rod of the table has 3 joints"):
         rs.pop_up_table(grid, np.zeros((3, 2, 3)), ROD)
+
+
+def test_every_stage_shows_itself_in_one_short_line():
+    target, layout = rs.Hemisphere(radius=0.2), rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=1.0)
+    rod = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+    form = rs.find_form(target, layout, rod, ends="pinned")
+    trimmed, footprint, popped = form.trimmed, form.footprint, form.popped["pinned"]
+    rods = len(footprint.rods)
+    shown = {
+        form.draped: rf"<Draped by bound: {rods} rods, largest gap to the target \S+ mm, converged>",
+        trimmed: rf"<Trimmed: {rods} rods, 0 left out>",
+        form.boundary: f"<Boundary: ends of {rods} rods>",
+        footprint: rf"<Footprint: {rods} rods, \d+ nodes>",
+        popped: rf"<PopUp: {rods} rods, pinned from draped, stable>",
+    }
+    for stage, line in shown.items():
+        assert re.fullmatch(line, repr(stage)), repr(stage)
+    gap = rs.agreement(popped, target)
+    assert repr(gap) == f"<Agreement: {gap}>"
+    assert re.fullmatch(r"gap to the target: max \S+ mm \(\S+ % of its size\) at .* mm, rms \S+ mm \(\S+ %\)", str(gap))
+    assert repr(form.checks) == "<Checks of pinned, 9 stages of deployment>"

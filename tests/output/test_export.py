@@ -215,3 +215,32 @@ def test_form_writes_only_what_is_asked_for(tmp_path: Path, capsys: pytest.Captu
     assert main(["form", "hemisphere", "--only", "cvs", "--out", str(tmp_path / "none")]) == 2
     assert 'unknown kind of file "cvs"' in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize(
+    ("kinds", "sentence"),
+    [("cvs", '^unknown kind of file "cvs": use dxf, svg'), (["dxff"], '^unknown kind of file "dxff": use dxf, svg'),
+     ([3], "^unknown kind of file 3: use dxf"), (3, "^kinds must be kinds of files, such as dxf, .*, not 3$")],
+)  # fmt: skip
+def test_an_unknown_kind_is_refused_in_python_as_by_the_command(kinds: object, sentence: str, tmp_path: Path) -> None:
+    for write in (save, export):
+        with pytest.raises(InputError, match=sentence):
+            write(sample_archive(), tmp_path / "none", kinds)
+    with pytest.raises(InputError, match=sentence):
+        form("dome").save(tmp_path / "none", kinds=kinds)
+    assert not (tmp_path / "none").exists()
+
+
+def test_one_text_is_one_kind_or_several(tmp_path: Path) -> None:
+    tables = set(export(sample_archive(), tmp_path / "one", "csv"))
+    assert tables
+    assert set(export(sample_archive(), tmp_path / "two", "csv, report")) == tables | {"report.html"}
+    save(sample_archive(), tmp_path / "saved", "csv")
+    assert set(contents(tmp_path / "saved")) >= tables
+
+
+def test_a_form_in_place_of_its_archive_is_refused(tmp_path: Path) -> None:
+    for write in (save, export):
+        with pytest.raises(InputError, match=r"not a Form: a form is written with form.save, or give form.archive\(\)"):
+            write(form("dome"), tmp_path / "none")
+    assert not (tmp_path / "none").exists()

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rodshell.errors import OutputError
+from rodshell.errors import InputError, OutputError
 from rodshell.output import export, save
 from rodshell.output.files import KINDS, NAMES, Content
 from rodshell.results import Archive, folder, read
@@ -313,3 +313,14 @@ def test_a_result_reads_the_same_with_another_file_beside_it(tmp_path: Path) -> 
     out = save(archive, tmp_path / "full", [])
     assert contents(out).keys() == {*ARCHIVE, "manifest.json", "chapter.tex"}
     assert read(out).case_toml == "# a case"
+
+
+@pytest.mark.parametrize("folder", ["", " "])
+def test_an_empty_folder_is_not_the_current_one(folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for write in (save, export):
+        with pytest.raises(InputError, match=r'^folder must be the path of a folder, not "": "." is the current one$'):
+            write(sample_archive(), folder)
+        with pytest.raises(InputError, match=r"^folder must be the path of a folder, not None$"):
+            write(sample_archive(), None)  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())

@@ -441,6 +441,16 @@ def test_reading_what_is_no_result_says_so(out: Path, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="version 99"):
         read(tmp_path)
     (tmp_path / "result.json").write_bytes((out / "result.json").read_bytes())
-    (tmp_path / "states.npz").write_bytes(b"PK broken")
-    with pytest.raises(OutputError, match="cannot read"):
+    damaged = r"states.npz cannot be read: it is damaged or not written by rodshell; run case.toml again$"
+    for content in (b"PK broken", b"", b"no archive", (out / "states.npz").read_bytes()[:1000]):
+        (tmp_path / "states.npz").write_bytes(content)
+        with pytest.raises(OutputError, match=damaged):
+            read(tmp_path)
+    np.savez(tmp_path / "states.npz", flat=np.array([{}], dtype=object))
+    with pytest.raises(OutputError, match=damaged):
         read(tmp_path)
+    (tmp_path / "states.npz").unlink()
+    with pytest.raises(OutputError, match=r"states.npz is missing: run case.toml again$"):
+        read(tmp_path)
+    with pytest.raises(OutputError, match=r"result.json is a file: give the folder of a rodshell result$"):
+        read(tmp_path / "result.json")

@@ -49,7 +49,9 @@ def test_gltf_is_in_metres_and_others_must_say_their_unit(bowl, tmp_path):
     write_glb(tmp_path / "bowl.glb", (MM * bowl[0], bowl[1]))
     assert rs.surface_from(tmp_path / "bowl.glb").size == pytest.approx(0.2, rel=1e-5)
     (tmp_path / "bowl.obj").write_bytes(WRITERS["obj"](*bowl))
-    with pytest.raises(rs.InputError, match=r"its unit \(it is 400 x 400 x [0-9.]+ units wide\).* --unit mm"):
+    with pytest.raises(
+        rs.InputError, match=r"its unit \(it is 400 x 400 x [0-9.]+ units wide\).* --unit mm \(in Python unit=0.001\)"
+    ):
         rs.surface_from(tmp_path / "bowl.obj")
     (tmp_path / "wide.obj").write_bytes(WRITERS["obj"](30 * bowl[0], bowl[1]))
     with pytest.raises(rs.InputError, match=r"its unit \(it is 12000 x 12000 x [0-9.]+ units wide\)"):

@@ -82,6 +82,11 @@ class Checks:
     stopped: str = ""
     missing: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        stages = 0 if self.deployment is None else len(self.deployment.share)
+        late = f", {self.stopped}" if self.stopped else ""
+        return f"<Checks of {' and '.join(self.bending) or 'no shell'}, {stages} stages of deployment{late}>"
+
     def __getitem__(self, ends: Ends) -> ShellChecks:
         """The checks of the shell with these ends.
 
@@ -89,6 +94,11 @@ class Checks:
         ------
         KeyError : there is no such shell, or it did not converge.
         """
+        if ends not in self.bending:
+            known = " and ".join(map(str, self.bending)) or "none"
+            raise KeyError(
+                f"no shell with {ends} ends was checked: it was not asked for or did not converge; checked: {known}"
+            )
         return ShellChecks(
             self.bending[ends],
             self.reactions[ends],

@@ -203,6 +203,10 @@ class Draped:
     rest: "Rest | None" = None
     warnings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        gap = f"largest gap to the target {1e3 * self.figures.max_gap:.3g} mm"
+        return f"<Draped by {self.method.name}: {len(self.rods)} rods, {gap}, {self.report.status.value}>"
+
     @property
     def dropped(self) -> tuple[tuple[str, str], ...]:
         """Names of the rods that have no place on the target, each with the reason."""

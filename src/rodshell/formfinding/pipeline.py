@@ -67,6 +67,9 @@ class Agreement:
     def rms_relative(self) -> float:
         return self.rms / self.size
 
+    def __repr__(self) -> str:
+        return f"<Agreement: {self}>"
+
     def __str__(self) -> str:
         x, y, z = (1e3 * value for value in self.where)
         return (

@@ -64,6 +64,12 @@ class PopUp:
     shell: Shell
     equilibrium: Equilibrium
 
+    def __repr__(self) -> str:
+        rods, state = len(self.footprint.rods), self.report.status.value
+        if self.report.converged:
+            state = "stable" if self.report.stable else "unstable"
+        return f"<PopUp: {rods} rods, {self.ends} from {self.start}, {state}>"
+
     @cached_property
     def positions(self) -> Floats:
         """(n, 3) of the footprint's nodes [m]."""
@@ -113,8 +119,8 @@ def pop_up(
 
     Raises
     ------
-    InputError : `start` is "draped" and the boundary has no draped state; `warm_start` has other ends, or comes with
-        start="flat"; the joints do not fit the grid.
+    InputError : an argument of the wrong kind; `start` is "draped" and the boundary has no draped state; `warm_start`
+        has other ends, or comes with start="flat"; the joints do not fit the grid.
     """
     choice("ends", ends, ENDS)
     choice("start", start, STARTS)
@@ -124,6 +130,9 @@ def pop_up(
         raise InputError('an earlier pop-up can only be used with start="draped": leave out warm_start, or start')
     if warm_start is not None and warm_start.ends != ends:
         raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {ends}: give one with the same ends")
+    instance("footprint", footprint, Footprint)
+    instance("boundary", boundary, Boundary)
+    instance("rod", rod, Rod)
     require_joint(joint)
     joint = joint or Ball()
     joints = joint if isinstance(joint, Sequence) else (joint,)

@@ -33,6 +33,9 @@ class Boundary:
     draped: Floats | None = None
     normals: Floats | None = None
 
+    def __repr__(self) -> str:
+        return f"<Boundary: ends of {len(self.points) // 2} rods>"
+
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
@@ -44,6 +47,9 @@ class Footprint:
     """
 
     mesh: GridMesh
+
+    def __repr__(self) -> str:
+        return f"<Footprint: {len(self.rods)} rods, {self.mesh.node_count} nodes>"
 
     @property
     def rods(self) -> tuple[FlatRod, ...]:
@@ -74,6 +80,9 @@ class Trimmed:
     positions: Floats
     boundary: Boundary
     dropped: tuple[tuple[str, str], ...]
+
+    def __repr__(self) -> str:
+        return f"<Trimmed: {len(self.mesh.grid.rods)} rods, {len(self.dropped)} left out>"
 
 
 def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:

@@ -12,6 +12,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.results.archive import SHELLS, Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
+from rodshell.validation import described
 
 if TYPE_CHECKING:
     from rodshell.output.drawing import Drawing
@@ -23,7 +24,7 @@ Files = Iterator[tuple[str, str | bytes]]
 def save(
     archive: Archive,
     folder: str | os.PathLike[str] | ResultFolder,
-    kinds: Iterable[str] | None = None,
+    kinds: str | Iterable[str] | None = None,
     *,
     force: bool = False,
     more: Mapping[str, str] | None = None,
@@ -33,16 +34,18 @@ def save(
 
     Parameters
     ----------
-    kinds : of files in addition to the archive (see `KINDS`); default: all but 3dm.
+    kinds : of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
     force : also replace files that rodshell did not write, or that were changed since, where it has to write.
     more : other files, by name.
     progress : called for each file; a time limit does not apply, since what was found is to be kept.
 
     Raises
     ------
-    ForeignFileError : such files are there, and `force` is False. OutputError : the folder cannot be written.
+    InputError : an unknown kind, or a form in place of its archive. ForeignFileError : such files are there, and
+        `force` is False. OutputError : the folder cannot be written.
     """
-    wanted = None if kinds is None else list(kinds)
+    _require_archive(archive)
+    wanted = wanted_kinds(kinds)
     names = [*archive_names(archive), *reserved(wanted), *(more or ())]
     with open_folder(folder, reserved=names, force=force) as place:
         put_archive(archive, place)
@@ -56,7 +59,7 @@ def save(
 def export(
     archive: Archive,
     folder: str | os.PathLike[str],
-    kinds: Iterable[str] | None = None,
+    kinds: str | Iterable[str] | None = None,
     *,
     force: bool = False,
     progress: Progress = silent,
@@ -65,15 +68,16 @@ def export(
 
     Parameters
     ----------
-    kinds : see `KINDS`; default: all but 3dm.
+    kinds : as of `save`, without the archive.
     force, progress : as of `save`.
 
     Raises
     ------
-    InputError : a kind needs a package that is not installed. OutputError : as of `save`.
+    InputError : as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
     """
+    _require_archive(archive)
     names = list[str]()
-    wanted = None if kinds is None else list(kinds)
+    wanted = wanted_kinds(kinds)
     with open_folder(folder, reserved=reserved(wanted), force=force) as place:
         for name, content in files_of(archive, wanted):
             progress("files", f"{len(names) + 1} written, {name}", 0.0)
@@ -137,10 +141,42 @@ def read_kinds(words: str) -> list[str]:
     words : in any case, with commas.
     """
     kinds = [word.strip().lower() for word in words.split(",") if word.strip()]
-    unknown = [word for word in kinds if word not in KINDS]
-    if unknown or not kinds:
-        raise InputError(f'unknown kind of file "{unknown[0] if unknown else words}": use {", ".join(KINDS)}')
-    return kinds
+    return [_known(word) for word in kinds or [words]]
+
+
+def wanted_kinds(kinds: object) -> list[str] | None:
+    """The kinds of files that are wanted, None for the default ones.
+
+    Parameters
+    ----------
+    kinds : one text, as of `read_kinds`, or several kinds, maybe none.
+
+    Raises
+    ------
+    InputError : an unknown kind.
+    """
+    if kinds is None:
+        return None
+    if isinstance(kinds, str):
+        return read_kinds(kinds)
+    if not isinstance(kinds, Iterable):
+        raise InputError(f"kinds must be kinds of files, such as {', '.join(KINDS)}, not {described(kinds)}")
+    return [_known(kind) for kind in kinds]
+
+
+def _known(kind: object) -> str:
+    if not isinstance(kind, str) or kind not in KINDS:
+        what = f'"{kind}"' if isinstance(kind, str) else described(kind)
+        raise InputError(f"unknown kind of file {what}: use {', '.join(KINDS)}")
+    return kind
+
+
+def _require_archive(value: object) -> None:
+    if not isinstance(value, Archive):
+        raise InputError(
+            f"archive must be a rodshell Archive, not {described(value)}: a form is written with form.save, or give "
+            "form.archive()"
+        )
 
 
 def _dxf(content: Content) -> Files:

@@ -3,6 +3,7 @@
 import datetime
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from numbers import Integral
 from typing import Any
 
 from rodshell.checks.bending import VON_MISES, require_known_stress
@@ -12,6 +13,7 @@ from rodshell.joints import Joint
 from rodshell.output.drawing import LAYERS
 from rodshell.output.dxf import FORBIDDEN
 from rodshell.rods.section import Rod
+from rodshell.validation import described, instance, positive
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 MOST_STAGES = 1000
@@ -88,13 +90,17 @@ class OutputOptions:
 
     def __post_init__(self) -> None:
         for name, value in (("strength", self.strength), ("shear strength", self.shear_strength)):
-            if value is not None and not value > 0:
-                raise InputError(f"the {name} must be positive, not {value} Pa")
+            if value is not None:
+                positive(f"the {name}", value, "Pa")
         if self.shear_strength is not None and self.strength is None:
             raise InputError(
                 f"a shear strength of {self.shear_strength:g} Pa does not say what bending may be: "
                 "give the strength too (checks.strength), or leave it out"
             )
+        if isinstance(self.stages, bool) or not isinstance(self.stages, Integral):
+            raise InputError(f"stages must be a whole number, 0 to {MOST_STAGES}, not {described(self.stages)}")
+        instance("fabrication", self.fabrication, Fabrication)
+        instance("drawings", self.drawings, DrawingStyle)
         if not 0 <= self.stages <= MOST_STAGES:
             raise InputError(f"the deployment can have 0 to {MOST_STAGES} stages, not {self.stages}")
 

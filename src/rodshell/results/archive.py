@@ -261,18 +261,39 @@ def read(folder: str | os.PathLike[str]) -> Archive:
     OutputError : there is no result, or it cannot be read; the sentence names the file and the key.
     """
     where = Path(folder).expanduser()
+    if where.is_file():
+        raise OutputError(f"{where} is a file: give the folder of a rodshell result")
     with reading(folder) as file:
         results = read_results(file("result.json"))
+        states = _read_states(file("states.npz"))
         try:
-            with np.load(file("states.npz"), allow_pickle=False) as stored:
-                states = {name: stored[name] for name in stored.files}
             case = file("case.toml")
             case_toml, inputs = opened_case(case.read_text(encoding="utf-8") if case.exists() else "", file)
-        except Exception as error:  # numpy and zipfile have many ways to say that a file is broken
+        except (OSError, ValueError) as error:
             raise OutputError(f"cannot read the result in {where}: {error}") from error
     for fault in state_faults(states, results):
         raise OutputError(f"{where / 'states.npz'}: {fault}")
     return Archive(results, states, case_toml, inputs)
+
+
+def _read_states(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays of a states.npz, not checked.
+
+    Raises
+    ------
+    OutputError : it is missing, not to be opened, or broken.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except FileNotFoundError:
+        raise OutputError(f"{path} is missing: run case.toml again") from None
+    except (PermissionError, IsADirectoryError) as error:
+        raise OutputError(f"cannot read {path}: {error.strerror}") from None
+    except Exception as error:  # numpy and zipfile have many ways to say that a file is broken; some advise pickles
+        raise OutputError(
+            f"{path} cannot be read: it is damaged or not written by rodshell; run case.toml again"
+        ) from error
 
 
 def state_faults(states: Mapping[str, NDArray[Any]], results: Results) -> Iterator[str]:

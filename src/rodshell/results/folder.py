@@ -23,7 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from rodshell.errors import OutputError
+from rodshell.errors import InputError, OutputError
+from rodshell.validation import instance
 
 try:
     import fcntl
@@ -150,11 +151,15 @@ def open_folder(
 
     Raises
     ------
-    OutputError : it cannot be written. ForeignFileError : as of `ResultFolder.check`, of `reserved`.
+    InputError : `folder` is empty, or no path. OutputError : it cannot be written. ForeignFileError : as of
+        `ResultFolder.check`, of `reserved`.
     """
     if isinstance(folder, ResultFolder):
         yield folder
         return
+    instance("folder", folder, str | os.PathLike, "the path of a folder")
+    if isinstance(folder, str) and not folder.strip():
+        raise InputError('folder must be the path of a folder, not "": "." is the current one')
     path = Path(folder).expanduser().resolve()
     made = list[Path]()
     stage, lock = None, None

@@ -107,7 +107,10 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
     size = " x ".join(f"{float(f'{side:.4g}'):.10g}" for side in extent)
     if unit is None:
         if path.suffix.lower() not in IN_METRES:
-            raise InputError(f"{path} does not state its unit (it is {size} units wide): give it, such as --unit mm")
+            raise InputError(
+                f"{path} does not state its unit (it is {size} units wide): give it, such as --unit mm (in Python "
+                "unit=0.001)"
+            )
         unit = 1.0
     largest = float(extent.max()) * unit
     if np.isfinite(largest) and largest > 0 and not SMALLEST <= largest <= LARGEST:
