@@ -22,7 +22,7 @@ test-fast: ## tests that are not marked slow, over every kind of input and outpu
 test:      ## all tests
 	python -m pytest
 
-accept:    ## print the acceptance table (and install into a new environment)
+accept:    ## print the acceptance table
 	python -m tests.acceptance.accept
 
 accept-targets: ## print the table of targets of any kind (some minutes)

@@ -129,12 +129,6 @@ def startup(*, fresh: bool = False, cpu: bool = False, runs: int = RUNS) -> Star
     return Startup(**{name: median(values) for name, values in seconds.items()}, stages=each)
 
 
-def startup_ratio(*, fresh: bool) -> tuple[float, float, float]:
-    """Seconds of the whole process with every default file, of the bare imports, and of the solve."""
-    found = startup(fresh=fresh)
-    return found.whole, found.bare, found.solve
-
-
 def _seconds(command: Sequence[str], folder: str, cpu: bool) -> float:
     start = _clock(cpu)
     _output(command, folder)

@@ -195,7 +195,7 @@ def test_frames_of_a_case_are_files_of_its_result(tmp_path: Path, monkeypatch: p
 
 @pytest.mark.parametrize("frames", ["/tmp/frames", "../frames", "a/../../b", "C:\\frames", "C:frames", ".", ""])
 def test_a_case_writes_frames_nowhere_else(frames: str) -> None:
-    with pytest.raises(rs.InputError, match=r"drape\.frames.*result's own folder"):
+    with pytest.raises(rs.InputError, match=r"drape\.frames.*result's folder"):
         load_case("hemisphere", {"drape.method": "paper", "drape.frames": frames})
 
 

@@ -152,7 +152,13 @@ def test_files_that_stand_in_the_way_are_refused_before_the_work(tmp_path: Path)
 
 
 def test_every_name_of_every_kind_is_known_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    costly = ("png.drawing_png", "pictures.picture", "pdf.drawings_pdf", "drawings.sheet_set", "report.report_html")
+    costly = (
+        "pictures.drawing_png",
+        "pictures.picture",
+        "pdf.drawings_pdf",
+        "drawings.sheet_set",
+        "report.report_html",
+    )
     for what in (*costly, "dxf.drawing_dxf", "svg.drawing_svg"):
         monkeypatch.setattr(f"rodshell.output.{what}", lambda *_: (b"", b""))
     content = Content(wished())

@@ -33,6 +33,7 @@ from rodshell.model import Shell
 from rodshell.model.shell import last_edges
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+from rodshell.validation import brief
 
 VON_MISES = sqrt(3.0)
 POINTS = 33  # on a side of a rectangle, from its middle to a corner, and on a quarter of an ellipse: s within 1e-3
@@ -248,6 +249,8 @@ class Bending:
     geodesic_curvature: Floats | None
     twist_rate: Floats
     torsion_stress: Floats | None
+
+    __repr__ = brief
 
     @property
     def bending_strain(self) -> Floats | None:

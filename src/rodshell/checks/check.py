@@ -31,6 +31,7 @@ from rodshell.rods.section import Rod
 from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.units import length_text, stress_text
+from rodshell.validation import brief
 
 WORTH = 0.01  # of the stress: less torsion is not worth a word
 
@@ -50,6 +51,8 @@ class ShellChecks:
     contact: Contact
     self_weight: SelfWeight | None
     other_shapes: OtherShapes | None
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from rodshell.model import Shell
 from rodshell.rods.elements import Elements
 from rodshell.solve.critical import first_critical
 from rodshell.solve.equilibrium import Equilibrium
+from rodshell.validation import brief
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Reactions:
     points: Floats
     forces: Floats
     moments: Floats
+
+    __repr__ = brief
 
     @property
     def sum_of_forces(self) -> Floats:
@@ -113,6 +116,8 @@ class JointLoads:
     moments: Floats
     flat_angles: Floats
     angles: Floats
+
+    __repr__ = brief
 
     @property
     def scissor(self) -> Floats:

@@ -23,6 +23,7 @@ from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.problem import half_width
+from rodshell.validation import brief
 
 MODES = 4
 MODE_SWEEPS = 4  # enough for directions to search in: the last eigenvalue may be a quarter too high
@@ -55,6 +56,8 @@ class OtherShape:
     from_flat: bool | None
     mirror: bool
     positions: Floats
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)
