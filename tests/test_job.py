@@ -208,6 +208,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_only_stages_from_the_first_changed_one_run_again_and_give_the_cold_result(
     change: str, earlier: rs.Form

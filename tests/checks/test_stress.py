@@ -182,6 +182,7 @@ def test_ball_joints_twist_no_round_rods() -> None:
     np.testing.assert_allclose(np.median(np.abs(bent.normal_curvature)), 5.0, rtol=2e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["laths with pins", "tubes with pins", "square battens with pins"])
 def test_stress_of_a_shell_is_that_of_the_twin(name: str) -> None:
     rod, form = twisted_shells()[name]

@@ -82,6 +82,7 @@ def test_the_check_sees_labels_that_cover_each_other() -> None:
     assert covered(pencil.done("", "", 10)) == [("U01", "V01")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dome", "ridge"])
 def test_every_rod_and_joint_is_labelled_on_the_plan(name: str) -> None:
     plan = flat_plan(archive(name))
@@ -287,6 +288,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
 
 
+@pytest.mark.slow
 def test_allowances_lengthen_the_cut_and_not_the_footprint(tmp_path: Path) -> None:
     export(wished(), tmp_path, ["dxf"])
     entities = read_dxf(tmp_path / "drawings/plan.dxf")

@@ -63,6 +63,7 @@ def test_numbers_of_the_files_come_from_the_archive(tmp_path: Path) -> None:
     assert b'"name":"LONG"' in (tmp_path / "model/popped_clamped.glb").read_bytes()
 
 
+@pytest.mark.slow
 def test_command_writes_what_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = save(sample_archive(), tmp_path / "dome")
     before = contents(folder)

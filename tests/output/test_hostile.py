@@ -27,6 +27,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: folder / name for name in export(hostile_archive(), folder, KINDS)}
 
 
+@pytest.mark.slow
 def test_no_schedule_holds_a_live_formula(written: dict[str, Path]) -> None:
     tables = [path for name, path in written.items() if name.endswith(".csv")]
     assert {path.stem for path in tables} >= {"rods", "joints", "supports", "bracing", "stock", "seams", "end_paths"}

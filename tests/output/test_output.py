@@ -64,6 +64,7 @@ def names_in(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_the_folder_holds_what_the_design_lists(out: Path, table_out: Path) -> None:
     """An archive of the first version, without checks and fabrication: what can be made of it is made."""
     drawings = {f"drawings/{name}.{e}" for name in ("plan", "strips", "supports", "elevations") for e in ("dxf", "svg")}

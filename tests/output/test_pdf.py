@@ -69,6 +69,7 @@ def test_a_line_of_known_length_is_as_long_on_the_rendered_page(paper: str) -> N
     assert line.sum() / line.max() / 5 == pytest.approx(250.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_rod_is_as_long_on_its_strip_as_the_sheet_s_scale_says() -> None:
     """Its thick line on the page as it is rendered, against the scale that is printed there."""
     made = archive("dome")
@@ -86,6 +87,7 @@ def test_a_rod_is_as_long_on_its_strip_as_the_sheet_s_scale_says() -> None:
         assert (inked[-1] - inked[0] + 1) / 10 == pytest.approx(1e3 * rods[path.name].cut_length / scale, abs=0.1)
 
 
+@pytest.mark.slow
 def test_every_sheet_is_a_page_with_a_bookmark_and_the_file_has_a_title(tmp_path: Path) -> None:
     made = wished()
     export(made, tmp_path, ["pdf"])

@@ -35,6 +35,7 @@ def page_of(made: object, folder: Path) -> Path:
 REPORTS = {**{name: lambda name=name: archive(name) for name in TARGETS}, "table": table_archive, "breaking": breaking}
 
 
+@pytest.mark.slow
 @needs_browser
 @pytest.mark.parametrize("name", REPORTS)
 def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent(name: str, tmp_path: Path) -> None:
@@ -81,6 +82,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return page_of(with_deployment(sample_archive(60, 6)), tmp_path_factory.mktemp("large"))
 
 
+@pytest.mark.slow
 @needs_browser
 def test_a_60_by_60_grid_is_usable_in_a_browser(large: Path, tmp_path: Path) -> None:
     found, console = open_report(large, tmp_path)

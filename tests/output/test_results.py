@@ -52,6 +52,7 @@ def records(record: Record) -> list[Record]:
     return found
 
 
+@pytest.mark.slow
 def test_a_file_holds_the_keys_that_were_set_and_no_others(made: Archive, tmp_path: Path) -> None:
     stored = json.loads((save(made, tmp_path / "out", []) / "result.json").read_text(encoding="utf-8"))
     assert stored == made.results.plain()
@@ -78,6 +79,7 @@ def test_every_field_says_what_it_means() -> None:
     assert [kind.__name__ for kind in kinds if not kind.__doc__] == []
 
 
+@pytest.mark.slow
 def test_results_validate_against_the_schema(made: Archive) -> None:
     validator = pytest.importorskip("jsonschema", reason="pip install jsonschema").Draft202012Validator
     validator.check_schema(json_schema())

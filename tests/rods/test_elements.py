@@ -243,6 +243,7 @@ TWINS = {
 }
 
 
+@pytest.mark.slow
 @every_case
 def test_energy_is_that_of_the_slow_twin(name):
     elements, state = CASES[name]
@@ -251,6 +252,7 @@ def test_energy_is_that_of_the_slow_twin(name):
     assert energy == pytest.approx(TWINS[type(elements)](elements, state), rel=1e-12, abs=1e-26)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CASES if "twist" in name])
 def test_strains_are_those_of_the_slow_twin(name):
     elements, state = CASES[name]

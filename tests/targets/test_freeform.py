@@ -36,6 +36,7 @@ def dome(rows: int = 30) -> Mesh:
 # The same form from any mesh of the same surface
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "target"),
     [

@@ -29,6 +29,7 @@ def plan(reach: float) -> Floats:
     return np.random.default_rng(0).uniform(-reach, reach, (200, 2))
 
 
+@pytest.mark.slow
 def test_a_face_is_its_surface(tmp_path):
     pytest.importorskip("OCP", reason="no OpenCASCADE: pip install cadquery-ocp-novtk")
     target = rs.surface_from(written(tmp_path / "saddle.step", saddle()))
