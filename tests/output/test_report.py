@@ -185,7 +185,7 @@ def with_stages(strength_used: float | None, lost: float | None, snaps: list[lis
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "snaps", "words", "note", "head"),
-    [(None, [], "deployment included.", "Every stage is an equilibrium", "deployment"),
+    [(None, [], "deployment included.", "Every stage of the deployment is an equilibrium", "deployment"),
      (None, [[0.14, 0.25]], "the stress during a snap is not known.", "Every stage", "deployment"),
      (0.5625, [], "above 56 % of the deployment; below that share the stress is not known.", "Below 56 %",
       "deployment above 56 %"),
@@ -197,7 +197,7 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
 ) -> None:
     made = with_stages(0.32, lost, snaps)
     (said,) = [sentence for sentence in facts(made.results) if "of their strength" in sentence]
-    assert said.startswith("The rods use 32 % of their strength at most, ")
+    assert said.startswith("Unloaded, the rods use 32 % of their strength at most, ")
     assert said.endswith(words)
     assert ("deployment included" in said) == (lost is None and not snaps)
     page = page_of(made, tmp_path).read_text()
@@ -211,12 +211,14 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "snaps", "guided", "note"),
-    [(None, [], None, "Every stage is an equilibrium of the elastic grid with pinned ends."),
+    [(None, [], None, "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends."),
      (None, [[0.14, 0.15], [0.33, 0.34]], None,
-      "Every stage is an equilibrium of the elastic grid with pinned ends; at 14 %, 33 % of the deployment the shell "
+      "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends; at 14 %, 33 % of the "
+      "deployment the shell "
       "snaps forward."),
      (None, [], [0.25, 0.5625],
-      "Every stage is an equilibrium of the elastic grid with pinned ends; between 25 % and 56 % of the deployment it "
+      "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends; between 25 % and 56 % of the "
+      "deployment it "
       "has to be guided, and its shape is not known."),
      (0.5625, [], None,
       "Below 56 % of the deployment no stage could be found, and the shape is not known. Above it, every stage is an "

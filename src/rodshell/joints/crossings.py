@@ -430,14 +430,7 @@ class LinkerBend:
         return LinkerBend(np.ascontiguousarray(blocks), corners.signs, bends)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
-        """
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         local = _signed(state, self.blocks, self.signs)
         by_local = np.zeros_like(local)
         energy = self.bends.evaluate(local, by_local, hessians)

@@ -91,14 +91,7 @@ class RelativeRotation:
         return cls(rows, legs, weights, stiffness, deviators, rest_angle, tangents, adapted(wanted, tangents))
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
-        """
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _relative_rotation(
                 state, self.blocks, self.legs, self.weights, self.stiffness, self.deviators, self.rest_angle,

@@ -67,6 +67,21 @@ class _Penalty:
             if getattr(self, name) is not None:
                 positive(f"the penalty stiffness {name}", getattr(self, name), unit)
 
+    def with_defaults(self, rod: Rod, edge: float) -> Self:
+        """The same with the defaults for a rod filled in.
+
+        Parameters
+        ----------
+        rod : section and material of the rods.
+        edge : length of their edges [m].
+        """
+        nodes, angles = self._defaults(rod, edge)
+        return replace(self, C1=self.C1 or nodes, C2=self.C2 or angles)
+
+    def _defaults(self, rod: Rod, edge: float) -> tuple[float, float]:
+        """C1 [N/m] and C2 [N m/rad] for rods with edges of the length `edge` [m]."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True)
 class ImplicitPenalty(_Penalty):
@@ -79,19 +94,8 @@ class ImplicitPenalty(_Penalty):
 
     __repr__ = brief
 
-    def with_defaults(self, rod: Rod, edge: float) -> Self:
-        """The same with the defaults for a `rod` with edges of the length `edge` [m] filled in.
-
-        Parameters
-        ----------
-        rod : section and material of the rods.
-        edge : length of their edges [m].
-        """
-        return replace(
-            self,
-            C1=self.C1 or 1e4 * rod.stretch_stiffness / edge,
-            C2=self.C2 or 1e4 * rod.twist_stiffness / edge,
-        )
+    def _defaults(self, rod: Rod, edge: float) -> tuple[float, float]:
+        return 1e4 * rod.stretch_stiffness / edge, 1e4 * rod.twist_stiffness / edge
 
 
 @dataclass(frozen=True)
@@ -107,19 +111,8 @@ class ExplicitPenalty(_Penalty):
 
     __repr__ = brief
 
-    def with_defaults(self, rod: Rod, edge: float) -> Self:
-        """The same with the defaults for a `rod` with edges of the length `edge` [m] filled in.
-
-        Parameters
-        ----------
-        rod : section and material of the rods.
-        edge : length of their edges [m].
-        """
-        return replace(
-            self,
-            C1=self.C1 or (1.5 / edge) ** 3 * min(rod.bend_stiffnesses),
-            C2=self.C2 or rod.twist_stiffness / edge,
-        )
+    def _defaults(self, rod: Rod, edge: float) -> tuple[float, float]:
+        return (1.5 / edge) ** 3 * min(rod.bend_stiffnesses), rod.twist_stiffness / edge
 
 
 Coupling = SharedDofs | ImplicitPenalty | ExplicitPenalty
@@ -142,14 +135,7 @@ class Ties:
     __repr__ = brief
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
-        """
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         apart = state[self.blocks[:, 0]] - state[self.blocks[:, 1]]
         force = self.stiffness[:, None] * apart
         np.add.at(gradient, self.blocks[:, 0], force)
@@ -192,14 +178,7 @@ class OffsetTie:
     __repr__ = brief
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
-        """
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _offset_tie(
                 state, self.blocks, self.legs, self.middles, self.weights, self.stiffness, self.offsets,

@@ -32,7 +32,7 @@ from rodshell.results.verdict import ENDS, facts, unknown_below
 from rodshell.results.wording import Rounding, nice_ticks, percent, rounding_of, whole_percent
 
 IN_PAGE = ("supports", "elevations", "erection")
-FOLLOWED = "Every stage is an equilibrium of the elastic grid with pinned ends{gaps}."
+FOLLOWED = "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends{gaps}."
 PARTLY = (
     "Below {share} of the deployment no stage could be found, and the shape is not known. Above it, every stage is an "
     "equilibrium of the elastic grid with pinned ends{gaps}."
@@ -134,7 +134,13 @@ def _tables(archive: Archive) -> list[tuple[str, Table, str]]:
         ("Joints", joints(archive, brief=True), "Named by the rods that meet, a/b. Final: in the popped-up shell."),
     ]
     if archive.results.boundary:
-        tables.append(("Supports", supports(archive, brief=True), "With reactions: schedule/supports.csv."))
+        tables.append(
+            (
+                "Supports",
+                supports(archive, brief=True),
+                "With the reactions of the unloaded shell: schedule/supports.csv.",
+            )
+        )
     if archive.results.seams:
         tables.append(("Seams", seams_table(archive), "Forces: the sum of both rods' support forces."))
     if archive.results.fabrication and (stock := archive.results.fabrication.stock):
@@ -204,14 +210,14 @@ _BENDING: tuple[Entry, ...] = (
     ("\N{EN DASH} largest curvature within the shell", "geodesic_curvature", wording.curvature),
     ("Largest twist of a rod", "twist_rate", wording.twist_rate),
     ("Largest strain, bending and axial", "max_strain", wording.percent),
-    ("Largest stress, bending, axial and torsion", "max_stress", wording.stress),
+    ("Largest stress, unloaded: bending, axial and torsion", "max_stress", wording.stress),
     ("\N{EN DASH} of torsion alone", "torsion_stress", wording.stress),
     ("Utilisation of the strength", "utilisation", wording.percent),
     ("Sharpest at this share of the deployment", "share", wording.whole_percent),
 )
 _REACTIONS: tuple[Entry, ...] = (
-    ("Largest support force", "largest_force", wording.newtons),
-    ("Largest support moment", "largest_moment", wording.newton_metres),
+    ("Largest support force, unloaded", "largest_force", wording.newtons),
+    ("Largest support moment, unloaded", "largest_moment", wording.newton_metres),
     ("Sum of all forces over the largest", "force_imbalance", wording.small),
     ("Sum of all moments over the largest", "moment_imbalance", wording.small),
 )

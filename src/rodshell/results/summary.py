@@ -160,7 +160,7 @@ def _bending(results: Results, length: Length) -> Iterator[str]:
         name = "stages" if shape in STAGES else shape
         line = f"  bending   {name:<8}smallest radius {length(bent.min_radius)}{_curved(bent, length)}"
         if bent.max_stress is not None:
-            line += f", largest stress {stress(bent.max_stress)}"
+            line += f", largest stress {stress(bent.max_stress)} unloaded"
         if bent.torsion_stress:
             line += f" (torsion alone {stress(bent.torsion_stress)})"
         if bent.utilisation is not None:
@@ -187,7 +187,7 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
         yield line
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
-        yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N; sums of {sums}"
+        yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N unloaded; sums of {sums}"
 
 
 def _deployment(results: Results) -> Iterator[str]:

@@ -278,7 +278,10 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
         else ""
     )
     yield f"with {' and '.join(usable)} ends the shell is stable and carries {weight} times its own weight{near}"
-    yield "loads other than its own weight (snow, wind, people) and imperfections were not checked"
+    yield (
+        "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
+        "people) and imperfections were not checked"
+    )
 
 
 def _mm(results: Results, metres: float | None) -> str:
@@ -324,7 +327,7 @@ def _strength(results: Results) -> Iterator[str]:
     used = utilisation(results)
     if used is not None:
         where = _known(results.deployment, unknown_below(results))
-        yield f"The rods use {percent(used)} of their strength at most, {where}"
+        yield f"Unloaded, the rods use {percent(used)} of their strength at most, {where}"
     elif results.bending:
         yield "No strength was given, so it is not known whether the rods hold (checks.strength)."
 

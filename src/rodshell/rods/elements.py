@@ -121,14 +121,7 @@ class Stretch:
         _add_axial(state, self.blocks, forces, gradient)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
-        """
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         exact = self.forces is None
         forces = self.rest_lengths if self.forces is None else self.forces
         return float(

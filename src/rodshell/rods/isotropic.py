@@ -55,14 +55,7 @@ class IsotropicBend:
         return np.asarray(2 * np.linalg.norm(after - before, axis=1) / np.linalg.norm(after + before, axis=1))
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
-        """
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(_isotropic_bend(state, self.blocks, self.stiffness, gradient, hessians))
 
     def refreshed(self, state: Floats) -> Self:
@@ -81,14 +74,7 @@ class IsotropicBendTwist(BendTwist):
         return replace(self, natural_twist=self.strains(state)[:, 2].copy())
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
-        """Energy [J], gradient and Hessians: see `Elements.evaluate`.
-
-        Parameters
-        ----------
-        state : (N, 3) node positions [m] and twist angles [rad].
-        gradient : (N, 3), to which the energy's gradient is added [N, for angles N m].
-        hessians : (m, 3k, 3k), filled with the element Hessians unless empty.
-        """
+        """Energy [J], gradient and Hessians: see `Elements.evaluate`."""
         return float(
             _isotropic_bend_twist(
                 state,
