@@ -217,8 +217,8 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
       "deployment the shell "
       "snaps forward."),
      (None, [], [0.25, 0.5625],
-      "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends; between 25 % and 56 % of the "
-      "deployment it "
+      "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends; between 25 % and "
+      "56 % of the deployment it "
       "has to be guided, and its shape is not known."),
      (0.5625, [], None,
       "Below 56 % of the deployment no stage could be found, and the shape is not known. Above it, every stage is an "
