@@ -152,3 +152,15 @@ def test_explicit_ties_leave_one_banded_system_for_every_rod_and_linker(kind):
     assert width == 10  # x, theta, x, theta, x: a single rod's
     assert count == len(shell.mesh.grid.rods) + linkers
     assert systems(bent(KINDS[kind], rs.SharedDofs()))[1] == 1
+
+
+def test_defaults_of_penalties_have_the_units_of_their_ties() -> None:
+    """C1 [N/m] is of the order EA over an edge, or EI over its cube; C2 [N m/rad] of the order GJ over an edge."""
+    rod, edge = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3)), 0.015
+    area, inertia = np.pi * 1e-6, np.pi / 4 * 1e-12
+    twist = 1e6 / 3 * 2 * inertia  # GJ, incompressible
+    implicit, explicit = rs.ImplicitPenalty().with_defaults(rod, edge), rs.ExplicitPenalty().with_defaults(rod, edge)
+    assert (implicit.C1, implicit.C2) == pytest.approx((1e4 * 1e6 * area / edge, 1e4 * twist / edge))
+    assert (explicit.C1, explicit.C2) == pytest.approx(((1.5 / edge) ** 3 * 1e6 * inertia, twist / edge))
+    given = rs.ImplicitPenalty(C1=5.0).with_defaults(rod, edge)
+    assert (given.C1, given.C2) == (5.0, implicit.C2)
