@@ -160,7 +160,7 @@ def test_defaults_of_penalties_have_the_units_of_their_ties() -> None:
     area, inertia = np.pi * 1e-6, np.pi / 4 * 1e-12
     twist = 1e6 / 3 * 2 * inertia  # GJ, incompressible
     implicit, explicit = rs.ImplicitPenalty().with_defaults(rod, edge), rs.ExplicitPenalty().with_defaults(rod, edge)
-    assert (implicit.C1, implicit.C2) == pytest.approx((1e4 * 1e6 * area / edge, 1e4 * twist / edge))
-    assert (explicit.C1, explicit.C2) == pytest.approx(((1.5 / edge) ** 3 * 1e6 * inertia, twist / edge))
+    assert pytest.approx((1e4 * 1e6 * area / edge, 1e4 * twist / edge)) == (implicit.C1, implicit.C2)
+    assert pytest.approx(((1.5 / edge) ** 3 * 1e6 * inertia, twist / edge)) == (explicit.C1, explicit.C2)
     given = rs.ImplicitPenalty(C1=5.0).with_defaults(rod, edge)
     assert (given.C1, given.C2) == (5.0, implicit.C2)
