@@ -18,10 +18,10 @@ from rodshell.formfinding.dynamic_pop_up import DynamicPopUpSettings, dynamic_po
 from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.progress import silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
-from rodshell.nets import sphere_net_end
 from rodshell.paper import fig8, genetic
 from tests.acceptance.rows import Row, print_table
 from tests.formfinding.falls import TARGETS, Particles
+from tests.nets.sphere_net import sphere_net_end
 
 ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(1e6, 1e3))
 COUNTS = {"hemisphere": (17, 17), "paraboloid": (15, 15), "ellipsoid": (11, 15)}

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import rodshell as rs
-from rodshell.nets import sphere_net_end
 from tests.acceptance.cases import AUTO, BEYOND, FURTHER, PAPER, ROD, SHARP, AcceptanceCase
 from tests.nets.goursat import goursat_ends
+from tests.nets.sphere_net import sphere_net_end
 
 FOLDER = Path(__file__).parents[2] / "accept"
 

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 
 import rodshell as rs
-from rodshell.nets import sphere_net_end
 from tests.acceptance.cases import ROD, R
 from tests.acceptance.rows import Row
+from tests.nets.sphere_net import sphere_net_end
 from tests.targets.meshes import sheet
 
 TUBE = rs.Rod(rs.Tube(radius=0.021, thickness=0.0035), rs.Material(25e9, 1900.0, 0.3))

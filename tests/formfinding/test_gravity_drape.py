@@ -8,9 +8,9 @@ import pytest
 import rodshell as rs
 from rodshell.contact.static import UnilateralContact
 from rodshell.errors import InputError
-from rodshell.nets import sphere_net_end
 from rodshell.solve.equilibrium import Status
 from tests.formfinding.elastic_twins import ElasticTwin
+from tests.nets.sphere_net import sphere_net_end
 
 RADIUS, GRAVITY = 0.2, 9.81
 HEMISPHERE = rs.Hemisphere(RADIUS)

@@ -12,10 +12,10 @@ from rodshell.checks.bending import bending_of
 from rodshell.formfinding.finite_sections import strong_bending
 from rodshell.formfinding.trim import end_tangents
 from rodshell.geometry.frames import unit
-from rodshell.nets.chebyshev import crossing_angle
 from rodshell.output.grid import joint_places
 from rodshell.solve.equilibrium import Status, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
+from tests.nets.sphere_net import crossing_angle
 
 R, APART = 0.2, 4e-3
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))

@@ -19,9 +19,9 @@ from rodshell.errors import InputError
 from rodshell.formfinding import Draped, DrapeFigures, Gravity, Trimmed, drape, map_back, trim
 from rodshell.formfinding.trim import end_tangents, untrimmed
 from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid
-from rodshell.nets import sphere_net_end, sphere_net_rod
 from rodshell.rods.section import Circle, Material, Rod
 from rodshell.targets import Ellipsoid, Hemisphere, Paraboloid, Target
+from tests.nets.sphere_net import sphere_net_end, sphere_net_rod
 
 Floats = NDArray[np.float64]
 

@@ -18,12 +18,12 @@ from scipy.optimize import brentq
 
 from rodshell.errors import InputError, NetLimitError
 from rodshell.layout import GridLayout
-from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics, sphere_net_end, sphere_net_rod
-from rodshell.nets.chebyshev import LIMIT, crossing_angle
+from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics
 from rodshell.nets.compass import march
 from rodshell.nets.net_ends import Cut, Lines, cut_lines, extrapolated, inside_nodes
 from rodshell.targets import Cap, Disc, Ellipsoid, HeightField, Hemisphere, Paraboloid, Rectangle, Target
 from tests.nets.goursat import goursat_ends
+from tests.nets.sphere_net import LIMIT, crossing_angle, sphere_net_end, sphere_net_rod
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.geometry.frames import unit
-from rodshell.nets import sphere_net_end
+from tests.nets.sphere_net import sphere_net_end
 
 R = 0.2
 LAYOUT = rs.GridLayout.orthogonal(spacing=0.03)

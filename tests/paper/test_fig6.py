@@ -12,12 +12,12 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from rodshell.formfinding.methods import Fall
-from rodshell.nets import sphere_net_end
 from rodshell.output.pictures import TOWARDS
 from rodshell.paper import drapes
 from rodshell.paper.drapes import METHODS, DrapeFigure, DrapeRun, drape_all
 from rodshell.paper.figure import Case, standing
 from tests.formfinding.falls import HEMISPHERE
+from tests.nets.sphere_net import sphere_net_end
 
 pytestmark = pytest.mark.slow
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.nets import sphere_net_end
 from rodshell.targets import Freeform
 from rodshell.targets.trianglemesh import sound_mesh
+from tests.nets.sphere_net import sphere_net_end
 from tests.targets.meshes import PARTS, Floats, Mesh, capped_sphere, disc, lattice, sheet
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
