@@ -239,8 +239,10 @@ def stress_text(pascals: float) -> str:
 
 
 def percent_text(share: float) -> str:
-    """A share as a percentage: with two significant digits below 10 %, else in whole percents."""
-    return f"{100 * share:.0f} %" if share >= 0.095 else f"{100 * share:.2g} %"
+    """A share as a percentage with two significant digits, above 100 % in whole percents."""
+    if abs(share) < 1e-9:
+        return "0 %"
+    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
 
 
 def as_float(value: Real) -> float:

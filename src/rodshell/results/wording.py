@@ -8,7 +8,7 @@ from typing import Any
 
 from rodshell.results.records import Record
 from rodshell.results.results import Results, SelfWeight
-from rodshell.units import stress_text
+from rodshell.units import percent_text, stress_text
 
 FINEST, COARSEST = 1e-3, 1.0  # mm
 OF_ROD = 1e-4  # share of the longest rod to which lengths are shown where no tolerance is given
@@ -142,17 +142,8 @@ def nice_ticks(low: float, high: float, count: int) -> list[float]:
 
 
 def percent(share: float | None) -> str:
-    """A share as a percentage with two significant digits.
-
-    Parameters
-    ----------
-    share : 1 is 100 %; None: not known.
-    """
-    if share is None or not isfinite(share):
-        return UNKNOWN
-    if abs(share) < 1e-9:
-        return "0 %"
-    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+    """A share as `units.percent_text` shows it; None or not finite: not known."""
+    return UNKNOWN if share is None or not isfinite(share) else percent_text(share)
 
 
 def share_of_weight(found: SelfWeight) -> str:
