@@ -155,7 +155,7 @@ def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
 def test_snaps_are_said_to_go_on_to_the_final_shape() -> None:
     _, way = snapping()
     (words,) = way.warnings
-    assert words.startswith("on its way from flat the shell snaps forward by itself, at 99 % of the way, by up to ")
+    assert words.startswith("at 99 % of the deployment from flat the shell snaps forward by itself, by up to ")
     assert words.endswith(" mm, and continues to its final shape")
 
 
@@ -189,7 +189,7 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
     assert way.lost_at == 0.5625
     assert way.reached_from_flat is None
     assert way.warnings == (
-        "the deployment from flat could not be followed below 56 % of the way: stages are missing, and whether the "
+        "the deployment from flat could not be followed below 56 % of the deployment: stages are missing, and whether the "
         "shell reaches its final shape from flat is not known",
     )
 

@@ -29,7 +29,7 @@ def bent(radius: float) -> Bending:
 
 
 def checks(final: dict[str, float], way: list[float]) -> Checks:
-    """Of shells whose rods lie on circles: in their final shapes, and at equal stages of the way up."""
+    """Of shells whose rods lie on circles: in their final shapes, and at equal stages of the deployment."""
     share = np.linspace(0, 1, len(way))
     deployment = Deployment(share, np.zeros((len(way), MESH.node_count, 3)), ()) if way else None
     return Checks({ends: bent(radius) for ends, radius in final.items()}, {}, {}, deployment, tuple(map(bent, way)), {})  # type: ignore[misc]
@@ -51,12 +51,12 @@ def test_rods_break_by_their_thickness_over_the_radius() -> None:
     assert [one.split(" in ")[0] for one in words] == [
         "with pinned ends the rods would break: 200 % of their strength",
         "with clamped ends the rods would break: 400 % of their strength",
-        "during deployment (at 50 % of the way) the rods would break: 250 % of their strength",
+        "at 50 % of the deployment the rods would break: 250 % of their strength",
     ]
 
 
 @pytest.mark.parametrize(("final", "way", "says"), [
-    ({"pinned": 0.2}, [1.0, 0.04, 0.2], "during deployment (at 50 % of the way) the rods would break: 250 % of their"),
+    ({"pinned": 0.2}, [1.0, 0.04, 0.2], "at 50 % of the deployment the rods would break: 250 % of their"),
     ({"pinned": 0.05}, [1.0, 0.2, 0.05], "with pinned ends the rods would break: 200 % of their strength"),
     ({"pinned": 0.0999}, [], "with pinned ends the rods would break: 101 % of their strength"),  # never 100 %
 ])  # fmt: skip
@@ -76,7 +76,7 @@ def test_the_place_that_breaks_is_named(at: int) -> None:
     entry = range(len(stress))[at]
     rod = next(k for k in range(len(MESH.grid.rods)) if entry < MESH.rod_stop[k])
     along = 1e3 * (MESH.stations[entry] - MESH.grid.rods[rod].start)
-    assert words.startswith("during deployment (at 50 % of the way) ")
+    assert words.startswith("at 50 % of the deployment ")
     assert f" in {MESH.grid.rods[rod].name}, {along:.0f}" in words
 
 
@@ -93,7 +93,7 @@ def test_rods_too_thick_for_their_bends_are_warned_of(
     found = checks(
         {"pinned": 10.0 if deployment_bending else radius}, [10.0, radius, 10.0] if deployment_bending else []
     )
-    shape = "during deployment (at 50 % of the way)" if deployment_bending else "with pinned ends"
+    shape = "at 50 % of the deployment" if deployment_bending else "with pinned ends"
     assert [words.split(":")[0] for words in reasons(found, None)] == (
         [] if percent is None else [f"{shape} bending strains the rods by {percent} %"]
     )

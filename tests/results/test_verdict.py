@@ -101,7 +101,7 @@ def test_different_faults_of_all_end_conditions_leave_none_to_build() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [([("bending.deployment", {"utilisation": 1.69, "share": 0.25, "rod": "U03", "at": 0.2})],
-      "during deployment (at 25 % of the way) the rods would break: 169 % of their strength in U03, 200 mm from its"),
+      "at 25 % of the deployment the rods would break: 169 % of their strength in U03, 200 mm from its"),
      ([("bending.deployment.max_bending_strain", 0.08)], "too thick for this curvature"),
      ([("contact.deployment", TOUCHING)], "5 pairs of rods touch or cross, worst: U03 and U04 overlap by 3.00 mm"),
      ([("target.flat", True)], "the target is flat, nothing pops up"),

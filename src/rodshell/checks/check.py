@@ -301,7 +301,7 @@ def _deployed(last: PopUp, stages: int, progress: Progress) -> Deployment:
         last.shell,
         last.equilibrium,
         stages=stages,
-        progress=lambda share: progress("deployment", f"{100 * share:.0f} % of the way", 0.0),
+        progress=lambda share: progress("deployment", f"{100 * share:.0f} %", 0.0),
     )
 
 

@@ -29,12 +29,12 @@ from rodshell.solve.problem import Problem, half_width
 from rodshell.units import length_text, percent_text
 
 Progress = Callable[[float], None]
-Stage = tuple[float, Equilibrium]  # share of the way that the ends have gone, and the shell there
+Stage = tuple[float, Equilibrium]  # share of the deployment, and the shell there
 
 DEGREE = 3  # at most, of the polynomials by which the next shape is guessed
 SAME = 1e-3  # of the shell's size: shapes further apart are different ones
-LOWEST = 1 / 64  # share of the way at which the grid has left its plane: by about an eighth of its final height
-SHORTEST = 0.01  # share of the way: a snap is located to this
+LOWEST = 1 / 64  # share of the deployment at which the grid has left its plane: by about an eighth of its final height
+SHORTEST = 0.01  # share of the deployment: a snap is located to this
 MOST = 1000  # factorisations of a path forwards; those that arrive take 30 to 750
 SHORTEST_TURN = 0.02  # share of the clamps' angles: a snap is located to this
 MOST_TURNING = 400  # factorisations of turning the clamps; the paths that arrive take 3 to 33
@@ -67,11 +67,11 @@ class Deployment:
 
     Parameters
     ----------
-    share : (s,) of the way that the ends have gone, ascending; 0 is the flat grid.
+    share : (s,) of the deployment, ascending; 0 is the flat grid.
     positions : (s, n, 3) of the mesh's nodes [m].
     shells : at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's source
         frames; none where ways of several shells were joined.
-    snaps : between stages, each in shares of the way: there the shell snaps forward by itself.
+    snaps : between stages, each in shares of the deployment: there the shell snaps forward by itself.
     lost_at : share below which no equilibrium was found, or None; only the flat grid then stands before it.
     reached_from_flat : whether the shell comes to its final shape when it is lifted a little towards it and its ends
         are driven on straight lines; None where that could not be followed.
@@ -98,7 +98,7 @@ class Deployment:
             shares = ", ".join(percent_text(snap.start) for snap in self.snaps)
             continues = ", and continues to its final shape" if self.reached_from_flat else ""
             words.append(
-                f"on its way from flat the shell snaps forward by itself, at {shares} of the way, by up to "
+                f"at {shares} of the deployment from flat the shell snaps forward by itself, by up to "
                 f"{length_text(max(snap.moved for snap in self.snaps))}{continues}"
             )
         if self.reached_from_flat is False:
@@ -111,7 +111,7 @@ class Deployment:
             below = (
                 "at all"
                 if len(self.shells) <= 1
-                else f"below {percent_text(self.lost_at)} of the way: stages are missing"
+                else f"below {percent_text(self.lost_at)} of the deployment: stages are missing"
             )
             words.append(
                 f"the deployment from flat could not be followed {below}, and whether the shell reaches its final "
@@ -129,7 +129,7 @@ def deploy(shell: Shell, found: Equilibrium, *, stages: int, progress: Progress 
     found : its equilibrium without loads.
     stages : number of equilibria above the flat grid. They crowd near it, where the rise is proportional to the root of
         the way.
-    progress : called with each share of the way that is looked for.
+    progress : called with each share of the deployment that is looked for.
 
     Returns
     -------
@@ -240,7 +240,7 @@ class _Path:
 
     def lifted(self, like: Stage, share: float) -> Equilibrium:
         """The equilibrium at a small share that is next to the flat grid lifted towards the shape of a stage, whose
-        height is proportional to the root of the way."""
+        height is proportional to the root of the share."""
         part, state = share / like[0], like[1].state.copy()
         way = state[self._nodes] - self._flat_nodes
         state[self._nodes] = self._flat_nodes + way * np.array([part, part, np.sqrt(part)])
@@ -281,7 +281,7 @@ class _Path:
     def _ahead(self, found: Sequence[Stage], share: float) -> Equilibrium | None:
         """The stage after those `found`, from where they lead; None where that does not lead straight there.
 
-        Shapes on a smooth path are nearly polynomials in the root of the way: Newton's method then needs about half
+        Shapes on a smooth path are nearly polynomials in the root of the share: Newton's method then needs about half
         of the steps that it takes from the last shape.
         """
         last = list(takewhile(lambda stage: stage[1].report.iterations <= EASY, reversed(found[-DEGREE - 1 :])))

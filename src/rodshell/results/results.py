@@ -153,7 +153,7 @@ class ClampedDeployment(Record):
 
 
 class Deployment(Record):
-    """The shell on its way from flat to popped up with pinned ends, the ends driven along straight lines."""
+    """The deployment from flat to popped up with pinned ends, the ends driven along straight lines."""
 
     ends: Text | None = key('end condition: "pinned"')
     stages: Rows[Stage] = rows("equilibria from flat to popped up")
@@ -286,7 +286,7 @@ class Results(Record):
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
-    deployment: Deployment | None = key("the shell on its way from flat to popped up")
+    deployment: Deployment | None = key("the shell from flat to popped up")
     contact: Contact | None = key("contact of rods with each other")
     other_shapes: ByEnds[OtherShapes] = by_ends("other stable shapes on the same supports")
     fabrication: Fabrication | None = key("how the rods are cut and braced")

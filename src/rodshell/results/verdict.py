@@ -146,11 +146,7 @@ def _shape(shape: str, found: WorstBent | Clearance) -> str:
     """The shape that a sentence is about."""
     if shape in ENDS:
         return f"with {shape} ends"
-    return (
-        "during deployment"
-        if found.share is None
-        else f"during deployment (at {whole_percent(found.share)} of the way)"
-    )
+    return "during deployment" if found.share is None else f"at {whole_percent(found.share)} of the deployment"
 
 
 def _best(results: Results, usable: list[Ends]) -> tuple[Ends, Agreement] | None:
