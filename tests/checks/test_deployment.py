@@ -189,8 +189,8 @@ def test_a_lost_path_leaves_stages_out_and_says_so(monkeypatch: pytest.MonkeyPat
     assert way.lost_at == 0.5625
     assert way.reached_from_flat is None
     assert way.warnings == (
-        "the deployment from flat could not be followed below 56 % of the deployment: stages are missing, and whether the "
-        "shell reaches its final shape from flat is not known",
+        "the deployment from flat could not be followed below 56 % of the deployment: stages are missing, and whether "
+        "the shell reaches its final shape from flat is not known",
     )
 
 
