@@ -373,6 +373,7 @@ def test_patches_are_taken_over_too() -> None:
     np.testing.assert_allclose(warm.popped["clamped"].positions, cold.popped["clamped"].positions, rtol=0, atol=SAME)
 
 
+@pytest.mark.slow
 def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
     folder = earlier.save(tmp_path / "dome", kinds=["csv"])
     job = rs.Job.of_table(folder / "schedule" / "rods.csv", rod__section__radius="1 mm", checks__stages=1)
@@ -419,6 +420,7 @@ def test_the_command_line_runs_the_job(tmp_path: Path) -> None:
 # The form
 
 
+@pytest.mark.slow
 def test_a_form_of_patches_means_the_same_by_the_same_names() -> None:
     one, two = dome(pop_up__ends="pinned").run(), dome(pop_up__ends="pinned", seams__lines="-1,-1; 1,1").run()
     for form, count in ((one, 1), (two, 2)):

@@ -110,6 +110,7 @@ def test_an_edge_left_out_is_a_sixth_of_the_smaller_spacing():
     assert rs.GridLayout.orthogonal(spacing=0.06, edge="auto") == rs.GridLayout.orthogonal(spacing=0.06)
 
 
+@pytest.mark.slow
 def test_a_saved_form_is_read_again(tmp_path):
     form = rs.find_form(TARGET, LAYOUT, ROD, ends=("clamped",))
     saved = rs.read(form.save(tmp_path / "dome"))

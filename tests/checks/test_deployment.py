@@ -152,6 +152,7 @@ def test_a_snap_forward_is_named_with_its_place_and_its_end() -> None:
     assert moved_by > 5 * jumps[7][1]
 
 
+@pytest.mark.slow
 def test_snaps_are_said_to_go_on_to_the_final_shape() -> None:
     _, way = snapping()
     (words,) = way.warnings

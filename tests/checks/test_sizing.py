@@ -242,6 +242,7 @@ def test_the_thickest_lath_that_is_sold_is_taken_before_thinner_ones_that_are_no
     assert Fit(10.0, 0.025, 0.05, lambda: bends).section(larch) == thin
 
 
+@pytest.mark.slow
 def test_a_given_strength_wins_over_the_presets(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target, layout = half_sphere(5.0)
     rod = rs.Rod(rs.Circle(0.005), rs.Material.preset("gfrp"))

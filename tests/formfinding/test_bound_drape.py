@@ -178,6 +178,7 @@ def test_draped_hemisphere_is_in_equilibrium_between_bending_axial_forces_and_th
     assert held_forces(twin, free, moved)[1] > 1e-5
 
 
+@pytest.mark.slow
 @every_case
 def test_draped_state_is_an_equilibrium(name):
     draped = drape_case(name)

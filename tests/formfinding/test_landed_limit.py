@@ -74,6 +74,7 @@ def explicit_shell(rod: rs.Rod = PAPER_ROD, stiffness: float = C) -> Shell:
     return Shell.of(mesh_grid(layout.flat_grid((7, 7), 0.9), layout.edge), rod, coupling=ties)
 
 
+@pytest.mark.slow
 def test_a_step_that_the_flat_grid_bears_is_refused_once_it_has_landed() -> None:
     shell = explicit_shell()
     step = 0.97 * step_limit(Motion.of(shell), shell.state(shell.mesh.flat))

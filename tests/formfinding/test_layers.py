@@ -104,6 +104,7 @@ def test_two_layers_rise_from_flat_to_the_state_that_the_drape_releases_to():
         assert norm(risen.positions - found.popped[ends].positions, axis=1).max() < 1e-6 * R
 
 
+@pytest.mark.slow
 def test_a_grid_draped_as_one_surface_is_laid_in_layers_for_its_joints():
     """Its lengths are wrong by h/R, 0.1 %: it stands, but far worse than one that was draped in layers."""
     cut = rs.trim(rs.drape(layout(), ROD, TARGETS["hemisphere"]))

@@ -133,6 +133,7 @@ def test_clamped_shell_is_in_equilibrium_by_the_twins_of_its_energies(name):
     assert np.abs(gradient[inner_nodes(mesh)]).max() < 1e-8 * np.abs(gradient).max()  # 2e-10 measured
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hemisphere", "ellipsoid"])
 def test_clamps_hold_the_direction_of_the_drape(name):
     """To second order in the edges, as the cubic shows it; pinned ends turn by some ten degrees."""
@@ -165,6 +166,7 @@ def test_twist_angles_change_nothing_on_isotropic_rods_with_ball_joints(ends):
 # Ways to it
 
 
+@pytest.mark.slow
 @every_target
 @both_ends
 def test_from_flat_and_from_draped_one_arrives_at_the_same_shell(name, ends):

@@ -68,6 +68,7 @@ def joined_rods(draw):
     return [rod for k, rod in enumerate(rods) if k in crossing] or [(0, 0, 2, 0), (1, -1, 1, 1)]
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(joined_rods())
 def test_crossings_are_those_of_exact_arithmetic(rods):
@@ -83,6 +84,7 @@ def test_crossings_are_those_of_exact_arithmetic(rods):
     np.testing.assert_array_equal(grid.joint_counts(), counts)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(integer_rods(1))
 def test_rods_are_refused_for_the_reasons_of_exact_arithmetic(rods):

@@ -104,6 +104,7 @@ def test_kinds_are_read_in_any_case_and_checked() -> None:
         read_kinds("html")
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_replaced_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = save(sample_archive(), tmp_path / "dome")
     before = contents(folder)
@@ -118,6 +119,7 @@ def test_a_file_that_cannot_be_replaced_leaves_the_old_one(tmp_path: Path, monke
     assert contents(folder) == before
 
 
+@pytest.mark.slow
 def test_a_newer_format_is_refused(tmp_path: Path) -> None:
     folder = save(sample_archive(), tmp_path / "dome")
     result = json.loads((folder / "result.json").read_text())

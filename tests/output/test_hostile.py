@@ -41,6 +41,7 @@ def test_numbers_stay_numbers_in_csv() -> None:
     assert row == [str(cell) for cell in cells]
 
 
+@pytest.mark.slow
 @given(st.lists(st.lists(st.text(st.sampled_from("=+-@;, \t\r\n\"'1a.\uff1d")), min_size=2), min_size=1))
 def test_no_text_is_live_in_csv(rows: list[list[str]]) -> None:
     assert live_cells(csv_text(rows)) == []

@@ -415,6 +415,7 @@ def test_read_gives_back_what_was_written(out: Path, archive: Archive) -> None:
         assert again.states[name].dtype == values.dtype
 
 
+@pytest.mark.slow
 def test_json_holds_no_nan(archive: Archive, tmp_path: Path) -> None:
     result = {**archive.results.plain(), "net": {"error_estimate": np.nan, "min_angle_deg": np.float64("inf"),
               "min_angle_at": np.array([np.nan, 0.0, 1.0])}, "count": np.int64(3)}  # fmt: skip
@@ -428,6 +429,7 @@ def test_json_holds_no_nan(archive: Archive, tmp_path: Path) -> None:
     assert stored["count"] == 3
 
 
+@pytest.mark.slow
 def test_the_same_archive_gives_the_same_bytes(archive: Archive, out: Path, tmp_path: Path) -> None:
     again = save(archive, tmp_path / "again")
     for path in out.rglob("*"):

@@ -178,6 +178,7 @@ def test_a_search_from_the_same_seed_is_the_same_and_from_another_is_not(whole: 
     assert course(other) != course(whole)
 
 
+@pytest.mark.slow
 def test_the_best_gets_better_and_is_what_its_variables_give(whole: History) -> None:
     best = [one.best for one in whole.generations]
     assert best == sorted(best, reverse=True)
@@ -224,6 +225,7 @@ def test_an_interrupted_search_goes_on_bit_for_bit_and_makes_no_run_twice(
     assert runs == POPULATION * MOST  # a finished one costs nothing
 
 
+@pytest.mark.slow
 def test_a_search_given_up_goes_on_when_more_generations_are_allowed(whole: History, tmp_path: Path) -> None:
     assert course(find(tmp_path, most=2)) == course(whole)[:2]
     assert course(find(tmp_path)) == course(whole)

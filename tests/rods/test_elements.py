@@ -549,6 +549,7 @@ def test_twist_softens_a_sharp_bend_as_the_averaged_frames_say():
 # Without the compiler
 
 
+@pytest.mark.slow
 def test_kernels_give_the_same_without_the_compiler(tmp_path):
     out = tmp_path / "plain.npz"
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}

@@ -300,6 +300,7 @@ def edge(name: str) -> Floats:
     return np.column_stack([a * np.cos(angle), b * np.sin(angle)])
 
 
+@pytest.mark.slow
 @every_domain
 def test_domain_distance_is_that_of_the_nearest_edge_point(name):
     rng = np.random.default_rng(13)

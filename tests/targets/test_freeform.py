@@ -87,6 +87,7 @@ SAME = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", SAME)
 def test_the_same_surface_written_otherwise_gives_the_same_form(change):
     """Not bit for bit, as patches are chosen in another order: 2e-6 of the size measured; 2e-3 was asked for."""
