@@ -322,5 +322,5 @@ class Form:
             strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
-        states = states_of(self.stages) | checked_states(checks)
+        states = states_of(self.stages) | checked_states(checks, self.rod.stretch_stiffness)
         return Archive(results, states, self.case.text(), self.inputs)
