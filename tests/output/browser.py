@@ -101,18 +101,22 @@ addEventListener("load", () => {
 """
 
 
+def browser_options(folder: Path) -> list[str]:
+    """Without a window, without a network; WebGL is drawn by the processor. The profile lies in `folder`."""
+    return [
+        "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+        "--window-size=1200,900", "--host-resolver-rules=MAP * ~NOTFOUND", "--proxy-server=127.0.0.1:9",
+        "--disable-background-networking", "--virtual-time-budget=30000", "--enable-logging=stderr", "--v=0",
+        f"--user-data-dir={folder / 'profile'}",
+    ]  # fmt: skip
+
+
 def open_report(page: Path, folder: Path) -> tuple[dict[str, Any], list[str]]:
     """What a user finds who moves and clicks everything, and all that the console says."""
     assert CHROMIUM, "no browser, and RODSHELL_BROWSER=required: install Chromium (Debian: apt-get install chromium)"
     probed = folder / "probed.html"
     probed.write_text(page.read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"), encoding="utf-8")
-    command = [
-        str(CHROMIUM), "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-        "--window-size=1200,900",
-        "--host-resolver-rules=MAP * ~NOTFOUND", "--proxy-server=127.0.0.1:9", "--disable-background-networking",
-        "--virtual-time-budget=30000", "--enable-logging=stderr", "--v=0", f"--user-data-dir={folder / 'profile'}",
-        "--dump-dom", probed.as_uri(),
-    ]  # fmt: skip
+    command = [str(CHROMIUM), *browser_options(folder), "--dump-dom", probed.as_uri()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240)
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     match = re.search(r'data-found="([^"]*)"', done.stdout)
