@@ -1,4 +1,4 @@
-"""A form in a notebook: it shows itself in 3D, offline, in little space; a widget tells what was clicked."""
+"""A form in a notebook: it shows itself in 3D, offline, in little space; a widget passes on what was clicked."""
 
 import json
 import re
