@@ -1,7 +1,8 @@
 """The viewer in notebooks: a frame of its own in the output of a cell, or a widget that Python can talk to.
 
 The frame holds script and scene, compressed, so that it needs no network, no kernel and no extension, and is still
-there when the notebook is opened again. The widget (`pip install "rodshell[notebook]"`) passes what is clicked to Python.
+there when the notebook is opened again. The widget (`pip install "rodshell[notebook]"`) passes what is clicked to
+Python.
 """
 
 import base64
