@@ -56,6 +56,7 @@ from rodshell.rods.section import Rod as RodModel
 from rodshell.rods.varied import sizes
 from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
+from rodshell.targets.surface_mesh import surface_mesh
 
 States = dict[str, NDArray[Any]]
 
@@ -107,11 +108,18 @@ def form_states(form: PatchForm) -> States:
     if (draped := form.boundary.draped) is not None:
         states["draped"] = draped
         states["gap_draped"] = form.target.gap(draped).distance - form.footprint.mesh.heights
+        states |= _target_states(form.target, draped)
     for ends, shell in form.popped.items():
         states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:
             states[f"gap_{ends}"] = form.agreement[ends].gaps
     return states
+
+
+def _target_states(target: TargetSurface, around: Floats) -> States:
+    """Triangles of the target under a shell, for pictures."""
+    points, faces = surface_mesh(target, around)
+    return {"target_points": points.astype(np.float32), "target_faces": faces.astype(np.uint32)}
 
 
 def table_results(table: PatchForm, name: str) -> Results:
@@ -161,6 +169,7 @@ def patches_states(form: PatchedForm) -> States:
     states = _mesh_states(form.footprint)
     states["draped"] = form.draped
     states["gap_draped"] = form.target.gap(form.draped).distance
+    states |= _target_states(form.target, form.draped)
     for ends, shell in form.popped.items():
         states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:
