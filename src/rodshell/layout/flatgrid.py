@@ -1,7 +1,7 @@
 """Straight rods in a plane, their crossings, and the layers in which they lie."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from reprlib import repr as short
 from typing import Literal
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
+from rodshell.layout.profile import Profile
 
 Family = Literal["u", "v", "free"]
 
@@ -32,6 +33,7 @@ class FlatRod:
     origin : point of the rod's line at which s is 0 [m].
     direction : unit vector along the rod.
     virtual : whether the line only shapes the net and is not built.
+    profile : how its section changes along it; None: not at all.
     """
 
     name: str
@@ -42,6 +44,7 @@ class FlatRod:
     origin: tuple[float, float]
     direction: tuple[float, float]
     virtual: bool = False
+    profile: Profile | None = None
 
     @staticmethod
     def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
@@ -85,7 +88,8 @@ class FlatRod:
         ----------
         start, end : material coordinates of the new ends [m].
         """
-        return FlatRod(self.name, self.family, self.offset, start, end, self.origin, self.direction, self.virtual)
+        line = self.name, self.family, self.offset, start, end, self.origin, self.direction
+        return FlatRod(*line, self.virtual, self.profile)
 
 
 def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
@@ -208,6 +212,25 @@ class FlatGrid:
     def joint_counts(self) -> Ints:
         """(m,) number of joints on each rod."""
         return np.bincount(self.crossings.rods.ravel(), minlength=len(self.rods))
+
+    def with_profiles(self, profiles: Profile | Sequence[Profile | None] | None) -> "FlatGrid":
+        """The same rods, whose sections change along them.
+
+        Parameters
+        ----------
+        profiles : the same for all rods, or one for each; None: the section does not change.
+
+        Raises
+        ------
+        InputError : not as many profiles as rods.
+        """
+        each = profiles if isinstance(profiles, Sequence) else (profiles,) * len(self.rods)
+        if len(each) != len(self.rods):
+            raise InputError(
+                f"the grid has {len(self.rods)} rods: give one profile for all, or one for each, not {len(each)}"
+            )
+        rods = tuple(replace(rod, profile=profile) for rod, profile in zip(self.rods, each, strict=True))
+        return replace(self, rods=rods)
 
     def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:
         """Remove rods repeatedly, until `leave_out` marks none.

@@ -37,6 +37,7 @@ from rodshell.joints.joint import Elastic, elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
+from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend
@@ -103,7 +104,8 @@ class Shell:
         Parameters
         ----------
         mesh : if joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
-        rod : the same for all, or one for each rod of the grid.
+        rod : the same for all, or one for each rod of the grid; where a rod of the grid has a profile, its section
+            changes along it. Linkers without a rod of their own have the unchanged section.
         clamped : each rod continues to a ghost node past its end that holds its direction there. The end's Voronoi
             length is half its last edge, so that the clamp acts exactly at the end (second order). A rod may spin in
             its clamp.
@@ -238,17 +240,18 @@ class _Builder:
         clamped: bool,
         twist: bool | None,
     ) -> None:
-        for item in rod if isinstance(rod, Sequence) else (rod,):
+        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
+        for item in self.rods:
             instance("rod", item, Rod)
-        self.rods, self.rod_of = _kinds(rod, len(mesh.grid.rods), "rods")
-        self.joints, self.joint_of = _kinds(joint or Ball(), len(mesh.grid.crossings), "crossings")
+        self.joints, self.joint_of = _kinds(_per_item(joint or Ball(), len(mesh.grid.crossings), "crossings"))
         if isinstance(joint, Sequence):
             refuse_mixtures(mesh.joint_nodes, joint)
         eccentricity = max((item.eccentricity for item in self.joints), default=0.0)
         if eccentricity and not mesh.layered:
             mesh = mesh.in_layers(eccentricity)
         self.mesh, self.coupling = mesh, coupling
-        self.stiffness = self._of_rods(lambda item: (*item.bend_stiffnesses, item.twist_stiffness))
+        self.sections = RodSections.of(mesh, self.rods)
+        self.stiffness = self.sections.nodes
         self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
         needed = not self.isotropic or any(item.turns_frames for item in self.joints)
         self.twist = needed if twist is None else twist
@@ -267,18 +270,13 @@ class _Builder:
         rest = shared + np.arange(len(self.ghosts) + self.angles)
         self.like = np.append(mesh.rod_nodes if self.apart else np.arange(shared), rest)
 
-    def _of_rods(self, value: Callable[[Rod], object]) -> Floats:
-        """A value of each rod (m, ...)."""
-        return np.array([value(rod) for rod in self.rods], dtype=float)[self.rod_of]
-
     def _of_joints(self, value: Callable[[Joint], object]) -> NDArray[Any]:
         """A value of each joint (c,)."""
         return np.array([value(joint) for joint in self.joints])[self.joint_of]
 
     def shell(self) -> Shell:
         mesh, parts = self.mesh, self.parts
-        axial = self._of_rods(lambda rod: rod.stretch_stiffness)[mesh.edge_rods]
-        stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, axial)
+        stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, self.sections.stretch)
         bends = self._bends()
         linkers, linker_ties = self._linkers()
         copies = np.bincount(self.like)
@@ -295,19 +293,22 @@ class _Builder:
             return np.empty(0, dtype=np.intp)
         holding = self._of_joints(lambda joint: joint.holds_normals)
         held = np.unique(self.mesh.grid.crossings.rods[holding])
-        loose = np.setdiff1d(np.arange(len(self.rod_of)), held)
+        loose = np.setdiff1d(np.arange(len(self.rods)), held)
         return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
 
     def _bends(self) -> tuple[Elements, ...]:
         """Bending and twist of single rods. Isotropic rods bend without their frames: see `ElasticRod`."""
         mesh, parts = self.mesh, self.parts
-        per_length = self.stiffness[mesh.bend_rods] / mesh.voronoi_lengths[:, None]
+        inner = np.ones(len(mesh.rod_nodes), dtype=bool)
+        inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
+        per_length = self.stiffness[inner] / mesh.voronoi_lengths[:, None]
         edge = self.first_angle + np.arange(len(mesh.edges))
         same_rod = mesh.edge_rods[1:] == mesh.edge_rods[:-1]
         nodes, angles = parts.bends, np.column_stack([edge[:-1][same_rod], edge[1:][same_rod]])
         if len(self.ghosts):
             rows = np.column_stack([_inner_nodes(parts), parts.ends.ravel(), self.ghosts])
-            at_clamps = self.stiffness[np.repeat(np.arange(len(self.rod_of)), 2)] / (0.5 * last_edges(mesh)[:, None])
+            ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
+            at_clamps = self.stiffness[ends] / (0.5 * last_edges(mesh)[:, None])
         if self.isotropic:
             bends, stiffness = nodes, per_length[:, 0]
             if len(self.ghosts):
@@ -317,8 +318,8 @@ class _Builder:
                 return elements
             return (*elements, self._bend_twist(nodes, angles, np.zeros((len(nodes), 2)), per_length[:, 2]))
         if len(self.ghosts):
-            last = np.searchsorted(mesh.edge_rods, np.arange(len(self.rod_of)), side="right") - 1
-            first = np.searchsorted(mesh.edge_rods, np.arange(len(self.rod_of)))
+            last = np.searchsorted(mesh.edge_rods, np.arange(len(self.rods)), side="right") - 1
+            first = np.searchsorted(mesh.edge_rods, np.arange(len(self.rods)))
             ghost_angles = self.first_angle + len(edge) + np.arange(len(self.ghosts))
             pairs = np.column_stack([edge[np.column_stack([first, last]).ravel()], ghost_angles])
             # at a start the ghost comes first: an edge has the direction of its rod
@@ -371,7 +372,8 @@ class _Builder:
             if self.apart:
                 flat[blocks] = flat[corners.blocks]
             if joint.rod is None:
-                stiffness = self.stiffness[corners.rods].mean(axis=1)
+                unchanged = np.array([(*rod.bend_stiffnesses, rod.twist_stiffness) for rod in self.rods])
+                stiffness = unchanged[corners.rods].mean(axis=1)
             else:
                 stiffness = np.tile([*joint.rod.bend_stiffnesses, joint.rod.twist_stiffness], (len(blocks), 1))
             linkers.append(LinkerBend.of(corners, blocks, flat, stiffness))
@@ -409,7 +411,7 @@ class _Builder:
         """Lumped mass of the blocks of the shared form."""
         mesh = self.mesh
         of_nodes = np.zeros(mesh.node_count)
-        half = 0.5 * mesh.edge_lengths * self._of_rods(lambda rod: rod.mass_per_length)[mesh.edge_rods]
+        half = 0.5 * mesh.edge_lengths * self.sections.mass
         of_joints = 0.5 * self._of_joints(lambda joint: joint.mass)
         pairs = mesh.joint_pairs  # half of a joint's mass on either rod
         for nodes, share in (*((end, half) for end in mesh.edges.T), *((joint, of_joints) for joint in pairs.T)):
@@ -418,20 +420,25 @@ class _Builder:
         mass[: mesh.node_count] = of_nodes[:, None]
         if self.twist:
             first = mesh.node_count + len(self.ghosts)
-            rotary = self._of_rods(lambda rod: rod.rotary_inertia)[mesh.edge_rods]
-            mass[first : first + len(mesh.edges), 0] = mesh.edge_lengths * rotary
+            mass[first : first + len(mesh.edges), 0] = mesh.edge_lengths * self.sections.rotary_inertia
         return mass
 
 
-def _kinds(value: Item | Sequence[Item], count: int, items: str) -> tuple[tuple[Item, ...], Ints]:
-    """The different values among `count` of them, and which of these (count,) each is; from one for all or one each."""
+def _per_item(value: Item | Sequence[Item], count: int, items: str) -> tuple[Item, ...]:
+    """A tuple of `count` values, from one for all or one for each."""
     if not isinstance(value, Sequence):
-        return (value,), np.zeros(count, dtype=np.intp)
+        return (value,) * count
     if len(value) != count:
         raise InputError(f"the grid has {count} {items}: give one value for all, or one for each, not {len(value)}")
-    kinds = list(dict.fromkeys(value))
-    number = {kind: k for k, kind in enumerate(kinds)}
-    return tuple(kinds), np.array([number[item] for item in value], dtype=np.intp)
+    return tuple(value)
+
+
+def _kinds(joints: tuple[Joint, ...]) -> tuple[tuple[Joint, ...], Ints]:
+    """The different ones among joints, and which of these each is."""
+    if joints and joints.count(joints[0]) == len(joints):
+        return joints[:1], np.zeros(len(joints), dtype=np.intp)
+    number = {joint: kind for kind, joint in enumerate(dict.fromkeys(joints))}
+    return tuple(number), np.array([number[joint] for joint in joints], dtype=np.intp)
 
 
 def _ties(pairs: Ints, stiffness: float) -> Ties:
