@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from math import cos, degrees, sin
 from string import ascii_lowercase
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, NetLimitError
 from rodshell.geometry.frames import cross
+from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import rod_names
@@ -232,7 +232,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     return float(np.arctan2(np.linalg.norm(cross(along, across)), abs(along @ across))), (x, y, z)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
     """Indices of the inside node with the smallest angle, which has the largest cosine; and whether the net has all
     nodes next to the inside ones."""
@@ -255,7 +255,7 @@ def _nearest(ascending: Floats, values: Floats) -> Ints:
     return np.asarray(np.searchsorted(0.5 * (ascending[1:] + ascending[:-1]), values))
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _interpolate(u, v, points, line, across, start, s, result):  # type: ignore[no-untyped-def]
     """Points `result` (k, 3) at the places `s` (k,) of lines of a net, by cubics through the four nearest known nodes.
 

@@ -12,11 +12,11 @@ The net's points P are on the target, between the layers.
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import cross, unit
+from rodshell.kernels import njit
 from rodshell.targets import Implicit, Target
 
 Heights = tuple[float, float]
@@ -189,7 +189,7 @@ def geodesics(
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
-@nb.njit(cache=True)
+@njit()
 def _still_going(chord, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
     """Of the first `count` geodesics those that have a next chord and were not lost, moved to the front."""
     left = 0
@@ -202,7 +202,7 @@ def _still_going(chord, row, count, here, tangent, turn):  # type: ignore[no-unt
     return left
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # type: ignore[no-untyped-def]
     """Unit normals at the points `here`, unit tangents `flat` across them, and a first guess (n, 3) of the next points:
     chords that `turn` out of the tangent plane as the last ones did."""
@@ -222,7 +222,7 @@ def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # t
     return ahead
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _turn_chords(  # type: ignore[no-untyped-def]
     chord, row, here, flat, normal, value, gradient, tolerance, turn, change, ahead
 ):
@@ -243,7 +243,7 @@ def _turn_chords(  # type: ignore[no-untyped-def]
     return going
 
 
-@nb.njit(cache=True)
+@njit()
 def _end_chords(chord, row, here, ahead, tolerance, turn, change, tangent, reached):  # type: ignore[no-untyped-def]
     """Continue from the points `ahead`, which are also `reached` (k, 3); NaN for chords that found none."""
     for m in range(len(row)):
@@ -275,7 +275,7 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tol
         _keep(nodes, found, chords, change, sine, tolerance, net.points, tried)
 
 
-@nb.njit(cache=True)
+@njit()
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
 
@@ -323,7 +323,7 @@ def _compass(
     return p, change, sine
 
 
-@nb.njit(cache=True)
+@njit()
 def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type: ignore[no-untyped-def]
     """Put the points that were `found` (n, 3) in their places; not those that did not converge, nor where the net
     folds: (P - B) x (P - A) no longer points along the normal."""
@@ -335,7 +335,7 @@ def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type
             points[i, j, k] = found[n, k] if good else np.nan
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, change, sine):  # type: ignore[no-untyped-def]
     """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
     of the crossing angle before it. Returns whether another step is needed.
@@ -361,7 +361,7 @@ def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, chan
     return going
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
     gradient g, to be subtracted from P; and the sine of the crossing angle, y x x along the normal.
@@ -389,7 +389,7 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     return step, -volume / (np.sqrt(_dot(g, g)) * from_a * from_b)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers.
 
@@ -412,7 +412,7 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
     return compass_step(x, y, by_x, by_y, g, from_a, from_b, level)
 
 
-@nb.njit(cache=True)
+@njit()
 def _by_point(x, height, n, hessian):  # type: ignore[no-untyped-def]
     """x (1 + h dn/dP) with dn/dP = (1 - n n) F''/|F'|; the height comes divided by |F'|."""
     out = _dot(x, n)
@@ -424,17 +424,17 @@ def _by_point(x, height, n, hessian):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(cache=True)
+@njit()
 def less(a, b):  # type: ignore[no-untyped-def]
     """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@nb.njit(cache=True)
+@njit()
 def _cross(a, b):  # type: ignore[no-untyped-def]
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@nb.njit(cache=True)
+@njit()
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import lagrange
+from rodshell.kernels import njit
 from rodshell.nets.compass import Net
 from rodshell.targets import Target
 
@@ -59,7 +59,7 @@ def inside_nodes(target: Target, net: Net) -> Bools:
     return reached
 
 
-@nb.njit(cache=True)
+@njit()
 def _connect(region, reached):  # type: ignore[no-untyped-def]
     """Extend the nodes `reached` (nu, nv) to all nodes of the `region` (nu, nv) that are connected with them."""
     nu, nv = region.shape
@@ -90,7 +90,7 @@ def _region(target: Target, net: Net) -> Bools:
     return np.asarray(inside)
 
 
-@nb.njit(cache=True)
+@njit()
 def _squares(points, u, v):  # type: ignore[no-untyped-def]
     """The middle of each square of nodes that are all known: its indices (n, 2) and point (n, 3); and path lengths (n,)
     to the square's corners."""
@@ -112,7 +112,7 @@ def _squares(points, u, v):  # type: ignore[no-untyped-def]
     return middles[:count], at[:count], way[:count]
 
 
-@nb.njit(cache=True)
+@njit()
 def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
     """Indices (m, 2) and points (m, 3) of the known nodes that are in no square whose end is further than its corners;
     and which of the other nodes (nu, nv) are inside."""
@@ -135,7 +135,7 @@ def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
     return asked[:count], at[:count], inside
 
 
-@nb.njit(cache=True)
+@njit()
 def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
     for n in range(len(asked)):
         inside[asked[n, 0], asked[n, 1]] = margin[n] > 0.0
@@ -179,11 +179,12 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
         _around_ends(s, nodes, run, knots[here], points[here], outer[here], inner[here])
     ends = _roots(target, knots, points, outer, inner).reshape(-1, 2)
     return [
-        Cuts(run[:, 0], ends[begin // 2 : stop // 2]) for run, begin, stop in zip(runs, stops, stops[1:], strict=False)
+        Cuts(run[:, 0].copy(), ends[begin // 2 : stop // 2])
+        for run, begin, stop in zip(runs, stops, stops[1:], strict=False)
     ]
 
 
-@nb.njit(cache=True)
+@njit()
 def _runs(inside):  # type: ignore[no-untyped-def]
     """(k, 3) the line, the first and the last node of each run of nodes of `inside` (m, n)."""
     lines, nodes = inside.shape
@@ -213,7 +214,7 @@ def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float)
     return kept
 
 
-@nb.njit(cache=True)
+@njit()
 def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[no-untyped-def]
     """Four nodes around both ends of each of the `runs` (k, 3): their places `knots` (2k, 4) and points `around`
     (2k, 4, 3); and the places of the nodes between which the end is, `outer` and `inner` (2k,)."""
@@ -258,7 +259,7 @@ def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: 
     return found
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _narrow(value, found, index, at, bracket, first):  # type: ignore[no-untyped-def]
     """One step of `_roots`: the brackets of the roots that are left are narrowed by the `value` (n,) at their last
     guess, except the `first` time. Returns how many roots are left: these are moved to the front.
@@ -316,7 +317,7 @@ def extrapolated(coarse: Cuts, fine: Cuts, lines: int, step: float) -> tuple[Cut
     return Cuts(fine.line, ends), errors
 
 
-@nb.njit(cache=True)
+@njit()
 def _extrapolate(coarse_line, coarse, line, fine, step, ends, errors):  # type: ignore[no-untyped-def]
     begin, matching = 0, 0
     while begin < len(line):

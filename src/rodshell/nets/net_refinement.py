@@ -6,12 +6,12 @@ models there. That is Newton's method for the whole net, whose matrix is triangu
 three rounds, whatever the number of nodes. The equations, and so the net, are those of `compass`.
 """
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.curves import resampled
 from rodshell.geometry.frames import unit
+from rodshell.kernels import njit
 from rodshell.nets.compass import (
     NEWTON_STEPS,
     ON_SURFACE,
@@ -127,7 +127,7 @@ def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> b
     return True
 
 
-@nb.njit(cache=True)
+@njit()
 def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
     """The nodes (n, 3) of the axes but the anchor, one arm after the other, in the order of `axes` and outwards; the
     steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
@@ -147,7 +147,7 @@ def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
     return x, steps, stops
 
 
-@nb.njit(cache=True)
+@njit()
 def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
     for arm in range(4):
         for n in range(stops[arm], stops[arm + 1]):
@@ -159,7 +159,7 @@ def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
                     points[i0, j0 + k, d] = x[n, d]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _straighten(starts, directions, steps, stops, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Move the `points` (n, 3) of the arms to the geodesics that begin at `starts` (4, 3) in `directions` (4, 3), see
     `compass.geodesics`, on second order models at the points; return by how much, or NaN."""
@@ -228,7 +228,7 @@ def _refine(target: Target, net: Net, wanted: Bools) -> None:
     _forget(net.points, moved >= limit, i0, j0)
 
 
-@nb.njit(cache=True)
+@njit()
 def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
     """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
     `row` (nu, nv) is the index of each in the result, -1 for the others."""
@@ -250,7 +250,7 @@ def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
     return chosen
 
 
-@nb.njit(cache=True)
+@njit()
 def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
     """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
     which alone are `new`; and whether there are any."""
@@ -270,7 +270,7 @@ def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-u
     return rows, count > 0
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _sweep(  # type: ignore[no-untyped-def]
     points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
 ):
@@ -328,7 +328,7 @@ def _sweep(  # type: ignore[no-untyped-def]
                     points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
 
 
-@nb.njit(cache=True)
+@njit()
 def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Value and gradient of the second order model r, at a distance `away` from its point."""
     x, y, z = away
@@ -340,7 +340,7 @@ def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
     return level, (gx + bx, gy + by, gz + bz)
 
 
-@nb.njit(cache=True)
+@njit()
 def _raised(point, height, normals, i, j):  # type: ignore[no-untyped-def]
     return (
         point[0] + height * normals[i, j, 0],
@@ -349,17 +349,17 @@ def _raised(point, height, normals, i, j):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(cache=True)
+@njit()
 def _at(points, i, j):  # type: ignore[no-untyped-def]
     return points[i, j, 0], points[i, j, 1], points[i, j, 2]
 
 
-@nb.njit(cache=True)
+@njit()
 def _of(models, row):  # type: ignore[no-untyped-def]
     return models[row, 0], models[row, 1], models[row, 2]
 
 
-@nb.njit(cache=True)
+@njit()
 def _plus(a, b):  # type: ignore[no-untyped-def]
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 

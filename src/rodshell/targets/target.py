@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
+from rodshell.kernels import njit
 
 NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
 
@@ -132,6 +132,7 @@ class Target(ABC):
         x : (n, 3) points [m].
         steps : of Newton's method, at most.
         """
+        x = np.ascontiguousarray(x)
         for _ in range(steps):
             x, furthest = along_gradient(x, *self.level(x))
             if furthest <= NEARLY * self.size:
@@ -249,7 +250,7 @@ class Target(ABC):
         return np.column_stack([xy, z])
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
     """Hessians of the distance at points away from a surface, S (I + d S)^-1.
 
@@ -281,7 +282,7 @@ def offset_shape(shape: Floats, distance: Floats) -> Floats:
     return result
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  # type: ignore[no-untyped-def]
     """One step of Newton towards the closest points: y + t F'(y) = x, F(y) = 0.
 
@@ -328,7 +329,7 @@ def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  #
         step[m, 2] = out * nz + along_p * pz + along_q * qz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
     """One step of Newton from points x (n, 3) to F = 0 along the gradient, and the largest |F| before it.
 
@@ -346,7 +347,7 @@ def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
     return result, furthest
 
 
-@njit(cache=True)
+@njit()
 def _times(h, x, y, z):  # type: ignore[no-untyped-def]
     return (
         h[0, 0] * x + h[0, 1] * y + h[0, 2] * z,
@@ -355,7 +356,7 @@ def _times(h, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def shape_operators(gradient, hessian, normal, shape):  # type: ignore[no-untyped-def]
     """Unit normals n, and shape operators P F'' P / |F'| with P = 1 - n n.
 
