@@ -22,7 +22,7 @@ LATH = rs.Rod(rs.RectangularSection(width=1e-3, height=2e-3), MATERIAL)
 STEP = 3e-4  # of the scale of the variables: central differences, extrapolated, agree to 1e-6
 
 EVERY: list[tuple[str, Family]] = [
-    ("taper", Taper(stations=3)), ("taper a rod", Taper(stations=3, one="rod")), ("double", DoubleLaths()),
+    ("taper", Taper(stations=3)), ("taper a rod", Taper(stations=3, per="rod")), ("double", DoubleLaths()),
     ("tails", Tails()), ("holes", Holes()), ("offsets", Offsets()), ("clamps", Clamps()),
 ]  # fmt: skip
 CASES = [
@@ -125,7 +125,7 @@ def test_an_ellipsoid_has_its_three_symmetries_and_a_hemisphere_seven() -> None:
 
 
 @pytest.mark.parametrize(
-    "family", [Taper(one="rod"), Tails(), Holes(), Offsets(), Clamps()], ids=lambda family: family.name
+    "family", [Taper(per="rod"), Tails(), Holes(), Offsets(), Clamps()], ids=lambda family: family.name
 )
 def test_the_free_steepest_descent_of_a_symmetric_shell_is_symmetric(family: Family) -> None:
     """So ties leave nothing out: the gradient of the gap by all variables lies in the space of the tied ones."""
@@ -141,7 +141,7 @@ def test_the_free_steepest_descent_of_a_symmetric_shell_is_symmetric(family: Fam
 
 def test_tied_variables_act_as_the_whole_does() -> None:
     shell = structure("pinned", symmetric=True)
-    tied = design_of(shell, [Taper(one="rod"), Tails()])
+    tied = design_of(shell, [Taper(per="rod"), Tails()])
     values = tied.box.start + 0.3 * tied.box.scale
     change, step = tied.change(values), 1e-5
     for k in range(len(values)):

@@ -126,10 +126,10 @@ def refine(
     grid = Grid(structure.mesh, stages.boundary)
     designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in found.accepted)
     after, made = popped_up(stages, designs[-1], ends)
-    one = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
+    held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
     names = tuple(family.name for family in families)
     return Refinement(
-        names, ends, one, after, designs, found.converged, spent + found.factorizations + made, found.steps
+        names, ends, held, after, designs, found.converged, spent + found.factorizations + made, found.steps
     )
 
 

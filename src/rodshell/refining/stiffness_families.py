@@ -22,7 +22,7 @@ from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
 from rodshell.validation import choice
 
-One = Literal["all", "family", "rod"]
+Per = Literal["shell", "family", "rod"]
 PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
 
 
@@ -115,7 +115,7 @@ class Taper:
     Parameters
     ----------
     ratio : of the largest to the smallest EI that is allowed [-].
-    one : one profile for all rods, one for each family, or one for each rod.
+    per : a profile for the whole shell, for each family, or for each rod.
     stations : at which EI is chosen, from an end of a rod to its middle.
     varies : what of the section is changed, see `Profile`.
 
@@ -125,12 +125,12 @@ class Taper:
     """
 
     ratio: float = 8.0
-    one: One = "all"
+    per: Per = "shell"
     stations: int = 5
     varies: Varies = "size"
 
     def __post_init__(self) -> None:
-        choice("one", self.one, get_args(One))
+        choice("per", self.per, get_args(Per))
         if not self.ratio > 1.0:
             raise InputError(f"the ratio of a taper must be larger than 1, not {self.ratio}")
         if not self.stations >= 2:
@@ -146,9 +146,9 @@ class Taper:
         structure : the shell.
         """
         rods = structure.mesh.grid.rods
-        if self.one == "all":
+        if self.per == "shell":
             group = np.zeros(len(rods), dtype=np.intp)
-        elif self.one == "family":
+        elif self.per == "family":
             group = np.unique([rod.family for rod in rods], return_inverse=True)[1].astype(np.intp)
         else:
             group = np.arange(len(rods))

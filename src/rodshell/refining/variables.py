@@ -161,14 +161,14 @@ class Design:
         )
 
     def change(self, values: Floats) -> Change:
-        return Change.together([part.change(own) for part, own in self._own(values)])
+        return Change.together([part.change(some) for part, some in self._split(values)])
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        for part, own in self._own(values):
-            grid = part.applied(grid, own)
+        for part, some in self._split(values):
+            grid = part.applied(grid, some)
         return grid
 
-    def _own(self, values: Floats) -> list[tuple[Tied, Floats]]:
+    def _split(self, values: Floats) -> list[tuple[Tied, Floats]]:
         begins = np.cumsum([len(part.box.start) for part in self.parts])[:-1]
         return list(zip(self.parts, np.split(values, begins), strict=True))
 
