@@ -14,10 +14,6 @@ Names are imported when they are first used, so that the command line starts at 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from rodshell.uncached import allow_uncached
-
-allow_uncached()
-
 if TYPE_CHECKING:
     from rodshell.checks import check
     from rodshell.errors import (
@@ -62,7 +58,7 @@ if TYPE_CHECKING:
         SharedDofs,
         Spring,
     )
-    from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+    from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -75,6 +71,7 @@ if TYPE_CHECKING:
     from rodshell.solve.problem import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.rod_statics import RodLoads, RodShape, RodSupports, solve_rod
     from rodshell.solve.simulate import Sample, TimeSeries, simulate
+    from rodshell.sweeps import read_sweep, sweep
     from rodshell.targets import (
         Cap,
         Disc,
@@ -108,7 +105,7 @@ _HOMES = {
     "rodshell.formfinding.search": ("search",),
     "rodshell.job": ("Job", "find_form", "pop_up_table"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
-    "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
+    "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
@@ -121,6 +118,7 @@ _HOMES = {
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
     "rodshell.solve.rod_statics": ("RodLoads", "RodShape", "RodSupports", "solve_rod"),
     "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
+    "rodshell.sweeps": ("read_sweep", "sweep"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
@@ -135,11 +133,11 @@ __all__ = [
     "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
     "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Motion", "NetLimitError",
     "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads",
-    "PopUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports",
-    "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed",
-    "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export", "fabricate",
-    "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save", "search",
-    "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
+    "PopUp", "Profile", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape",
+    "RodSupports", "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries",
+    "Trimmed", "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export",
+    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read",
+    "read_sweep", "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 
