@@ -1,7 +1,7 @@
 """A session: the list of cases that somebody made, kept on disk, and the process that runs its jobs.
 
 Everything that is worth keeping lies in the session's folder, written as soon as it is known, so that a page that is
-loaded again, or a server that is started again, goes on where it was.
+loaded again, or a server that is started again, continues where it was.
 """
 
 import asyncio

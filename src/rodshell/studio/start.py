@@ -10,7 +10,7 @@ from rodshell.studio.session import UPLOAD, presets, upload_name
 
 
 def first_case(name: str) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """A case as the page has it, and the files that it names, as if they had been uploaded.
+    """A case for the page, and the files that it names, as if they had been uploaded.
 
     Parameters
     ----------
