@@ -62,7 +62,7 @@ if TYPE_CHECKING:
         SharedDofs,
         Spring,
     )
-    from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+    from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -108,7 +108,7 @@ _HOMES = {
     "rodshell.formfinding.search": ("search",),
     "rodshell.job": ("Job", "find_form", "pop_up_table"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
-    "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
+    "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
@@ -135,11 +135,11 @@ __all__ = [
     "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
     "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Motion", "NetLimitError",
     "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads",
-    "PopUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports",
-    "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed",
-    "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export", "fabricate",
-    "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save", "search",
-    "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
+    "PopUp", "Profile", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape",
+    "RodSupports", "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries",
+    "Trimmed", "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export",
+    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save",
+    "search", "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

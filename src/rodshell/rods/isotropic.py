@@ -42,6 +42,11 @@ class IsotropicBend:
 
     __repr__ = brief
 
+    @property
+    def parts(self) -> tuple[Self, ...]:
+        """The energies of each stiffness alone: it has one."""
+        return (self,)
+
     def curvatures(self, state: Floats) -> Floats:
         """(b,) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-].
 
@@ -83,6 +88,12 @@ class IsotropicBendTwist(BendTwist):
         self.evaluate(state, scrap, before)
         replace(self, natural_twist=self.natural_twist - twist).evaluate(state, scrap, hessians)
         hessians -= before
+
+    @property
+    def parts(self) -> tuple[Self, ...]:
+        """The bending and the twist."""
+        bend, twist = self.bend_stiffness, self.twist_stiffness
+        return replace(self, twist_stiffness=0.0 * twist), replace(self, bend_stiffness=0.0 * bend)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""

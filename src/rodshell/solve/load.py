@@ -19,7 +19,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch
+from rodshell.rods.elements import NO_HESSIANS, Elements, Stretch, add_product
 from rodshell.solve.problem import Problem
 from rodshell.solve.tangent import Tangent, TangentAssembly
 
@@ -199,7 +199,10 @@ class LoadedAssembly:
             stretch.add_axial(state, -self._by_warming(stretch, state, factor), right)
         if load.motions is None:
             return tangent, tangent.solve(right)
-        right -= self._assembly.times(load.motions)
+        held = np.zeros_like(state)
+        for element in (*elements, stretch.with_forces(forces)):
+            add_product(element, state, load.motions, held)
+        right -= held
         return tangent, tangent.solve(right) + load.motions
 
     def stress_values(self, elements: Sequence[Elements], state: Floats, rate: Floats) -> Floats:

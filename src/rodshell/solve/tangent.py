@@ -243,20 +243,6 @@ class TangentAssembly:
         free = problem.constraint.freedom(state)
         return free, self.pattern.assembly.assemble(self._hessians, self._blocks, free)
 
-    def times(self, motion: Floats) -> Floats:
-        """(N, 3) product of the stiffness last assembled with displacements of free and held blocks alike [N, N m].
-
-        Parameters
-        ----------
-        motion : (N, 3) displacements [m, rad].
-        """
-        result = np.zeros_like(motion)
-        for hessians, blocks in zip(self._hessians, self._blocks, strict=True):
-            if len(blocks):
-                rows = np.einsum("mij,mj->mi", hessians, motion[blocks].reshape(len(blocks), -1))
-                np.add.at(result, blocks, rows.reshape(*blocks.shape, 3))
-        return result
-
     def stress_values(self, elements: Sequence[Elements], state: Floats, change: Floats, motion: Floats) -> Floats:
         """(nnz,) values of the change of K with the internal forces alone, the geometry being frozen.
 
