@@ -29,16 +29,16 @@ def near_pairs(points: Floats, radius: float) -> Ints:
     order = np.argsort(number, kind="stable")
     number, columns, found = number[order], np.ascontiguousarray(points[order].T), list[Ints]()
     beside = [(across * rows[1] + along) * rows[2] for across, along in ((0, 1), (1, -1), (1, 0), (1, 1))]
-    for first in range(0, len(points), PART):
-        here = np.arange(first, min(first + PART, len(points)))
+    for begin in range(0, len(points), PART):
+        here = np.arange(begin, min(begin + PART, len(points)))
         own = number[here]
         found += _within(columns, here, here + 1, np.searchsorted(number, own + 1, "right"), radius)
         for step in beside:
             start = np.searchsorted(number, own + step - 1)
             stop = np.searchsorted(number, own + step + 1, "right")
             found += _within(columns, here, start, stop, radius)
-    one, other = (order[np.concatenate(places)] for places in (found[::2], found[1::2]))
-    return np.column_stack([np.minimum(one, other), np.maximum(one, other)])
+    first, second = (order[np.concatenate(places)] for places in (found[::2], found[1::2]))
+    return np.column_stack([np.minimum(first, second), np.maximum(first, second)])
 
 
 def _within(columns: Floats, here: Ints, start: Ints, stop: Ints, radius: float) -> tuple[Ints, Ints]:
