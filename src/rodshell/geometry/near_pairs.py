@@ -37,7 +37,7 @@ def near_pairs(points: Floats, radius: float) -> Ints:
             start = np.searchsorted(number, own + step - 1)
             stop = np.searchsorted(number, own + step + 1, "right")
             found += _within(columns, here, start, stop, radius)
-    first, second = (order[np.concatenate(places)] for places in (found[::2], found[1::2]))
+    first, second = (order[np.concatenate(half)] for half in (found[::2], found[1::2]))
     return np.column_stack([np.minimum(first, second), np.maximum(first, second)])
 
 
