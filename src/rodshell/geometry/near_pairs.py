@@ -31,11 +31,11 @@ def near_pairs(points: Floats, radius: float) -> Ints:
     beside = [(across * rows[1] + along) * rows[2] for across, along in ((0, 1), (1, -1), (1, 0), (1, 1))]
     for begin in range(0, len(points), PART):
         here = np.arange(begin, min(begin + PART, len(points)))
-        own = number[here]
-        found += _within(columns, here, here + 1, np.searchsorted(number, own + 1, "right"), radius)
+        at = number[here]
+        found += _within(columns, here, here + 1, np.searchsorted(number, at + 1, "right"), radius)
         for step in beside:
-            start = np.searchsorted(number, own + step - 1)
-            stop = np.searchsorted(number, own + step + 1, "right")
+            start = np.searchsorted(number, at + step - 1)
+            stop = np.searchsorted(number, at + step + 1, "right")
             found += _within(columns, here, start, stop, radius)
     first, second = (order[np.concatenate(half)] for half in (found[::2], found[1::2]))
     return np.column_stack([np.minimum(first, second), np.maximum(first, second)])
