@@ -224,6 +224,10 @@ class Form:
         """The typed content of result.json before anything was checked."""
         return results_of(self.stages)
 
+    def unchecked(self) -> Archive:
+        """What is kept of it before anything was checked, without a verdict."""
+        return Archive(self.results(), states_of(self.stages), self.case.text(), self.inputs)
+
     def archive(self, *, options: OutputOptions | None = None) -> Archive:
         """Everything that is kept, checked and made ready to be built.
 
