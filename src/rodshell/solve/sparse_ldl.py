@@ -11,8 +11,6 @@ eliminated, what remains is the update matrix for its parent (Duff and Reid 1983
 once per pattern (`symbolic`).
 """
 
-import os
-from threading import Thread
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -23,9 +21,9 @@ from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
 from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
+from rodshell.threads import in_threads, threads
 
 ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
-MOST_THREADS = 4  # the last part is one thread's work
 
 
 class SingularError(ArithmeticError):
@@ -199,37 +197,23 @@ class MultifrontalFactors:
 def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats) -> bool:
     """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on the
     threads. False where a pivot vanishes or is not finite."""
-    starts = plan.part_start
-    separate, regular = iter(range(len(starts) - 2)), [True]
+    starts, regular = plan.part_start, list[bool]()
 
-    def run(part: int, memory: tuple[Floats, Floats]) -> bool:
-        return bool(
+    def run(part: int, thread: int) -> None:
+        regular.append(
             _numeric(
                 plan.parts[starts[part] : starts[part + 1]], data, plan.first, plan.row_start,
                 plan.child_start, plan.children, plan.run_start, plan.runs,
                 plan.entry_start, plan.entry_source, plan.entry_place,
-                plan.panel_start, plan.update_start, scratch.stacks, *memory, panels, pivots,
+                plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
             )
         )  # fmt: skip
 
-    def work(memory: tuple[Floats, Floats]) -> None:
-        for part in separate:
-            regular.append(run(part, memory))
-
-    others = [Thread(target=work, args=(memory,)) for memory in scratch.threads[1 : len(starts) - 2]]
-    for thread in others:
-        thread.start()
-    work(scratch.threads[0])
-    for thread in others:
-        thread.join()
-    return all(regular) and run(len(starts) - 2, scratch.threads[0])
-
-
-def threads() -> int:
-    """Threads of a factorisation: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
-    asked = os.environ.get("NUMBA_NUM_THREADS", "")
-    processors = os.cpu_count() or 1
-    return min(int(asked) if asked.isdigit() else processors, processors, MOST_THREADS)
+    last = len(starts) - 2
+    in_threads(run, last, most=len(scratch.threads))
+    if all(regular):
+        run(last, 0)
+    return all(regular)
 
 
 def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:
