@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numba
 import numpy as np
 import pytest
 
@@ -106,7 +105,6 @@ def _elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def finder(monkeypatch: pytest.MonkeyPatch) -> FakeFinder:
     fake = FakeFinder()
     fake.stand_in(monkeypatch)
-    monkeypatch.setattr("rodshell.cli.reporting.compiled_before", lambda: True)
     return fake
 
 
@@ -400,23 +398,6 @@ def test_quiet_says_nothing(finder: FakeFinder, capsys: pytest.CaptureFixture[st
     assert capsys.readouterr() == ("", "")
 
 
-def test_the_first_run_announces_the_compilation(
-    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.undo()
-    monkeypatch.chdir(tmp_path)
-    finder.stand_in(monkeypatch)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    numba.config.reload_config()  # type: ignore[attr-defined]
-    assert main(["form", "hemisphere", "--out", "a"]) == 0
-    assert "compiling kernels, once" in capsys.readouterr().err
-    kernel = f"stretch.energy-12.py{sys.version_info.major}{sys.version_info.minor}.nbi"
-    (tmp_path / "kernels" / "rods_1").mkdir(parents=True)
-    (tmp_path / "kernels" / "rods_1" / kernel).write_text("")
-    assert main(["form", "hemisphere", "--out", "b"]) == 0
-    assert "compiling" not in capsys.readouterr().err
-
-
 def test_popup_reads_a_table_in_its_unit(finder: FakeFinder) -> None:
     rows = [["A", *(1000 * x for x in CROSS[0])], [], ["B", *(1000 * x for x in CROSS[1])]]
     table = write_table(Path("rods.csv"), rows, ("id", *COLUMNS))
@@ -489,10 +470,12 @@ def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dom
     wishes = {"checks.stages": "3", "checks.strength": "30 MPa", "fabrication.kerf": "2 mm", "drawings.author": "Ada"}
     wishes |= {"fabrication.stock_length": "6 m", "drawings.date": "2026-11-22", "drawings.tolerance": "2 mm"}
     options = [word for key, value in wishes.items() for word in (f"--{key}", value)]
-    for source in (["dome"], [write_table(Path("rods.csv"), CROSS), "--unit", "m"]):
+    table = write_table(Path("rods.csv"), CROSS)
+    for name, source in (("dome", ["dome"]), ("rods", [table, "--unit", "m"])):
         assert main(["popup", *source, *options]) == 0
         told = FakeForm.told[-1]
-        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).output_options()
+        asked = load_case("hemisphere", {**wishes, "drawings.name": name}).output_options()
+        assert replace(told, rod_chosen=()) == asked
 
 
 def test_popup_writes_only_the_kinds_that_are_asked_for(

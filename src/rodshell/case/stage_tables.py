@@ -18,6 +18,7 @@ from rodshell.case.values import (
     LengthOrAuto,
     Lengths,
     LengthsOrAuto,
+    Names,
     NodeStiffness,
     Point,
     PointOrAuto,
@@ -53,6 +54,7 @@ class LayoutTable(Table):
     offset: Point = Field(
         default=(0.0, 0.0), description="shift x,y of the grid lines from the axes through the anchor"
     )
+    left_out: Names = Field(default=(), description="names of rods that are not built, such as U01, V03")
 
     def build(self, target: "Target | None" = None) -> "GridLayout":
         """The layout; a spacing "auto" stands for some 17 rods each way over the target."""
@@ -253,7 +255,7 @@ class DrawingsTable(Table):
     tolerance: Length | None = Field(
         default=None, description="tolerance of lengths, which are shown to a tenth of it or finer"
     )
-    layers: LayersTable = LayersTable()
+    layers: LayersTable = Field(default_factory=LayersTable)
     name: str = Field(default="", description="title of the drawings; default: the target's name")
     author: str = Field(default="", description="who drew them or is responsible for them, for the title block")
     date: IsoDate = Field(default="", description='date for the title block, such as "2026-11-22"; default: today')

@@ -73,18 +73,18 @@ def _size(kernel: Any, known: frozenset[Kernel] = frozenset()) -> int:
 
 
 @contextmanager
-def _helper(kernels: int) -> Iterator[None]:
+def _helper(kernels: int) -> "Iterator[subprocess.Popen[bytes] | None]":
     """A process that compiles from the end of the list, while the block runs; none where it would not help."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if processors < 2 or kernels < 2 or not sys.executable:
-        yield
+        yield None
         return
     nothing = subprocess.DEVNULL
     with subprocess.Popen(
         [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=nothing, stderr=nothing
     ) as helper:
         try:
-            yield
+            yield helper
         finally:
             helper.kill()  # what it wrote is whole: Numba renames files into place
 
@@ -93,7 +93,7 @@ def _help() -> None:
     """What the helper does."""
 
     def end_with_the_other() -> None:
-        sys.stdin.buffer.read()
+        sys.stdin.buffer.read()  # until the input is closed
         os._exit(0)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -70,7 +70,7 @@ def results_of(stages: PatchForm | PatchedForm) -> Results:
     """
     if isinstance(stages, PatchedForm):
         return patches_results(stages)
-    return table_results(stages, "popup") if stages.from_table else form_results(stages)
+    return table_results(stages, "rods") if stages.from_table else form_results(stages)
 
 
 def states_of(stages: PatchForm | PatchedForm) -> States:
