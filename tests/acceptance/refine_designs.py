@@ -47,8 +47,8 @@ CASES = [
     Case("a taper a rod, ratio 4", "paraboloid", (ROD_BY_ROD,), 0.03, 60),
     Case("a taper a rod, ratio 4", "freeform.obj", (ROD_BY_ROD,), 0.016, 60),
     Case("double laths, one variable, 10 mm", "hemisphere", ("double",), 0.21, 25, edge=0.01),
-    Case("clamps and a taper a rod, ratio 8", "two bumps", ("clamps", Taper(per="rod", stations=3)), 0.06, 100, "clamped",
-         settings=(("least_eigenvalue", 0.2), ("most_evaluations", 60))),
+    Case("clamps and a taper a rod, ratio 8", "two bumps", ("clamps", Taper(per="rod", stations=3)), 0.06, 100,
+         "clamped", settings=(("least_eigenvalue", 0.2), ("most_evaluations", 60))),
     Case("tails", "hemisphere", ("tails",), 0.45, 60),
     Case("tails", "paraboloid", ("tails",), 0.20, 60),
 ]  # fmt: skip
