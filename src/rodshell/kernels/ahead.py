@@ -23,18 +23,18 @@ from rodshell.kernels.table import KERNELS
 LONG_ENOUGH = 0.1  # share of the work after which the time that is left is estimated
 
 
-def compile_kernels(tell: Callable[[int, int, float | None], None]) -> int:
+def compile_kernels(progress: Callable[[int, int, float | None], None]) -> int:
     """Compile the kernels that are not kept; how many they were.
 
     Parameters
     ----------
-    tell : called with how many of them are done, how many there are, and about how many seconds the rest takes, None
+    progress : called with how many of them are done, how many there are, and about how many seconds the rest takes, None
         while that is not known.
     """
     missing = [row for row in _rows() if not _is_kept(*row)]
     work = [_size(kernel) for kernel, _ in missing]
     waiting, begun = set(range(len(missing))), monotonic()
-    tell(0, len(missing), None)
+    progress(0, len(missing), None)
     with _helper(len(missing)):
         for k, (kernel, arguments) in enumerate(missing):
             if k in waiting and not _is_kept(kernel, arguments):
@@ -42,7 +42,7 @@ def compile_kernels(tell: Callable[[int, int, float | None], None]) -> int:
             waiting -= {other for other in waiting if other <= k or _is_kept(*missing[other])}
             left = sum(work[other] for other in waiting) / sum(work)
             seconds = (monotonic() - begun) * left / (1.0 - left)
-            tell(len(missing) - len(waiting), len(missing), seconds if left < 1.0 - LONG_ENOUGH else None)
+            progress(len(missing) - len(waiting), len(missing), seconds if left < 1.0 - LONG_ENOUGH else None)
             if not waiting:
                 break
     return len(missing)
@@ -68,8 +68,8 @@ def _size(kernel: Any, known: frozenset[Kernel] = frozenset()) -> int:
     """Bytes of Python's code of a kernel and of those that it calls: about what it takes to compile."""
     function = kernel.py_func
     called = (function.__globals__.get(name) for name in function.__code__.co_names)
-    inner = [one for one in called if hasattr(one, "py_func") and one not in known]
-    return len(function.__code__.co_code) + sum(_size(one, known | {kernel, *inner}) for one in inner)
+    inner = [callee for callee in called if hasattr(callee, "py_func") and callee not in known]
+    return len(function.__code__.co_code) + sum(_size(callee, known | {kernel, *inner}) for callee in inner)
 
 
 @contextmanager
