@@ -28,8 +28,8 @@ def compile_kernels(progress: Callable[[int, int, float | None], None]) -> int:
 
     Parameters
     ----------
-    progress : called with how many of them are done, how many there are, and about how many seconds the rest takes, None
-        while that is not known.
+    progress : called with how many of them are done, how many there are, and about how many seconds the rest takes,
+        None while that is not known.
     """
     missing = [row for row in _rows() if not _is_kept(*row)]
     work = [_size(kernel) for kernel, _ in missing]
