@@ -11,6 +11,7 @@ eliminated, what remains is the update matrix for its parent (Duff and Reid 1983
 once per pattern (`symbolic`).
 """
 
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -24,6 +25,9 @@ from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
 from rodshell.threads import in_threads, threads
 
 ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
+
+
+NONE_ABOVE, NOTHING = np.empty(0, dtype=np.int64), np.empty(0)
 
 
 class SingularError(ArithmeticError):
@@ -157,6 +161,17 @@ class Multifrontal:
             raise SingularError("a pivot of the factorisation vanishes")
         return MultifrontalFactors(self, data, panels, pivots)
 
+    @cached_property
+    def above(self) -> tuple[Longs, Longs]:
+        """Permuted unknowns (m,) of the plan's last part, where it has others; and the place (n,) of each among them, -1
+        of the others."""
+        plan, place = self.plan, np.full(len(self.indptr) - 1, -1)
+        *separate, last = plan.each
+        columns = [np.arange(plan.first[s], plan.first[s + 1]) for s in last.tolist()] if separate else []
+        unknowns = np.concatenate([*columns, np.arange(0)])
+        place[unknowns] = np.arange(len(unknowns))
+        return unknowns, place
+
     def _new_scratch(self) -> _Scratch:
         plan = self.plan
         threads_memory = [(room(plan.largest_panel), workspace(plan.largest_front)) for _ in range(threads())]
@@ -185,10 +200,28 @@ class MultifrontalFactors:
 
     def _substitute(self, right: Floats) -> Floats:
         assert self._memory is not None, GIVEN_AWAY
-        plan = self._solver.plan
-        x = right[plan.order]
-        row, aside = room(plan.largest_front), room(2 * plan.largest_front)
-        _solve(x, plan.first, plan.row_start, plan.rows, plan.panel_start, *self._memory, row, aside)
+        plan, (panels, pivots) = self._solver.plan, self._memory
+        x, fronts, parts = (
+            right[plan.order],
+            (plan.first, plan.row_start, plan.rows, plan.panel_start, panels),
+            plan.each,
+        )
+        last = len(parts) - 1
+        memory = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in range(threads() if last else 1)]
+        above, place = self._solver.above
+        carried = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
+
+        def rise(part: int, thread: int) -> None:
+            _forward(parts[part], x, place, carried[part], *fronts, *memory[thread])
+
+        def descend(part: int, thread: int) -> None:
+            _backward(parts[part], x, *fronts, pivots, *memory[thread])
+
+        in_threads(rise, last, most=len(memory))
+        x[above] += carried.sum(axis=0)
+        _forward(parts[last], x, NONE_ABOVE, NOTHING, *fronts, *memory[0])
+        descend(last, 0)
+        in_threads(descend, last, most=len(memory))
         result = np.empty_like(x)
         result[plan.order] = x
         return result
@@ -197,19 +230,18 @@ class MultifrontalFactors:
 def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats) -> bool:
     """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on the
     threads. False where a pivot vanishes or is not finite."""
-    starts, regular = plan.part_start, list[bool]()
+    regular, last = list[bool](), len(plan.each) - 1
 
     def run(part: int, thread: int) -> None:
         regular.append(
             _numeric(
-                plan.parts[starts[part] : starts[part + 1]], data, plan.first, plan.row_start,
+                plan.each[part], data, plan.first, plan.row_start,
                 plan.child_start, plan.children, plan.run_start, plan.runs,
                 plan.entry_start, plan.entry_source, plan.entry_place,
                 plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
             )
         )  # fmt: skip
 
-    last = len(starts) - 2
     in_threads(run, last, most=len(scratch.threads))
     if all(regular):
         run(last, 0)
@@ -296,11 +328,11 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     return residual, largest
 
 
-@njit(error_model="numpy")
-def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
-    """Forward and backward substitution in place, supernode by supernode."""
-    supers = len(first) - 1
-    for s in range(supers):
+@njit(error_model="numpy", nogil=True)
+def _forward(part, x, above, carried, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
+    """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
+    added to `carried` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
+    for s in part:
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
@@ -310,8 +342,18 @@ def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside)
         for i in range(width):
             x[first[s] + i] = values[i]
         for i in range(width, size):
-            x[rows[row_start[s] + i]] += values[i]
-    for s in range(supers - 1, -1, -1):
+            row = rows[row_start[s] + i]
+            if len(above) > 0 and above[row] >= 0:
+                carried[above[row]] += values[i]
+            else:
+                x[row] += values[i]
+
+
+@njit(error_model="numpy", nogil=True)
+def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
+    """Backward substitution in place, supernode by supernode of a `part`."""
+    for k in range(len(part) - 1, -1, -1):
+        s = part[k]
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
