@@ -163,8 +163,8 @@ class Multifrontal:
 
     @cached_property
     def above(self) -> tuple[Longs, Longs]:
-        """Permuted unknowns (m,) of the plan's last part, where it has others; and the place (n,) of each among them, -1
-        of the others."""
+        """Permuted unknowns (m,) of the plan's last part, if it is not the only one; and the place (n,) of each unknown
+        among them, or -1."""
         plan, place = self.plan, np.full(len(self.indptr) - 1, -1)
         *separate, last = plan.each
         columns = [np.arange(plan.first[s], plan.first[s + 1]) for s in last.tolist()] if separate else []
@@ -201,12 +201,8 @@ class MultifrontalFactors:
     def _substitute(self, right: Floats) -> Floats:
         assert self._memory is not None, GIVEN_AWAY
         plan, (panels, pivots) = self._solver.plan, self._memory
-        x, fronts, parts = (
-            right[plan.order],
-            (plan.first, plan.row_start, plan.rows, plan.panel_start, panels),
-            plan.each,
-        )
-        last = len(parts) - 1
+        x, parts = right[plan.order], plan.each
+        fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
         memory = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in range(threads() if last else 1)]
         above, place = self._solver.above
         carried = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
