@@ -206,7 +206,7 @@ class _Search:
                 continue
             longest = min(GROWTH, sqrt(0.5 * STRAYED / max(there.strayed, 1e-9))) * step
             if there.negative_modes:
-                beyond = there
+                beyond, share = there, 0.98 * min(share, 1.0)
                 continue
             self._add(here, there)
             foreseen, now = here.ahead, step + there.ahead
