@@ -16,6 +16,7 @@ from rodshell.case.stage_tables import (
     FabricationTable,
     LayoutTable,
     PopUpTable,
+    RefineTable,
     SeamsTable,
 )
 from rodshell.case.target_tables import HemisphereTable, TargetTable
@@ -63,6 +64,7 @@ class Case(Table):
     joint: JointKinds = Field(default=BallTable(), discriminator="kind")
     drape: DrapeTable = DrapeTable()
     pop_up: PopUpTable = PopUpTable()
+    refine: RefineTable = RefineTable()
     seams: SeamsTable = SeamsTable()
     checks: ChecksTable = ChecksTable()
     fabrication: FabricationTable = FabricationTable()

@@ -1,9 +1,9 @@
 """The tables of a case's stages: layout, drape, pop-up, seams, checks, fabrication and drawings."""
 
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from rodshell.case.values import (
     Acceleration,
@@ -22,6 +22,7 @@ from rodshell.case.values import (
     Point,
     PointOrAuto,
     Polylines,
+    Ratio,
     Share,
     Stress,
     Table,
@@ -29,6 +30,7 @@ from rodshell.case.values import (
     Whole,
     polylines,
     unit,
+    words,
 )
 from rodshell.errors import InputError
 from rodshell.units import rounded_down, shown
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
     from rodshell.formfinding.patches import PatchLayout
     from rodshell.layout import GridLayout
+    from rodshell.refining.variables import Family
     from rodshell.targets import Target
 
 
@@ -151,6 +154,37 @@ class PopUpTable(Table):
     ends: Literal["pinned", "clamped", "both"] = Field(
         default="both", description="supports: free to turn, with fixed direction, or one form with each"
     )
+
+
+FAMILIES = ("taper", "double")
+Families = Annotated[tuple[str, ...], BeforeValidator(words(FAMILIES))]
+
+
+class RefineTable(Table):
+    vary: Families = Field(
+        default=(), description=f"what is varied to bring the shell nearer to its target: {', '.join(FAMILIES)}"
+    )
+    ends: Literal["pinned", "clamped"] | None = Field(
+        default=None, description="supports of the refined shell, the only ones; default: the first of pop_up.ends"
+    )
+    ratio: Ratio = Field(default=8.0, description="of the largest EI to the smallest along a taper")
+    per: Literal["all", "family", "rod"] = Field(
+        default="all", description="one taper for all rods, one for each family, or one for each rod"
+    )
+    varies: Literal["size", "width", "height", "a", "b"] = Field(
+        default="size", description="what of the section a taper changes: all lengths alike, or one of them"
+    )
+    offer: Literal["on", "off"] = Field(
+        default="on", description="say of a form that is not refined what the cheapest refinement would gain"
+    )
+
+    def build(self) -> "tuple[Family, ...]":
+        """The families that are varied."""
+        from rodshell.refining.refine import FAMILIES as KNOWN
+        from rodshell.refining.stiffness_families import Taper
+
+        taper = Taper(ratio=self.ratio, one=self.per, varies=self.varies)
+        return tuple(taper if name == "taper" else KNOWN[name] for name in self.vary)
 
 
 class PatchTable(Table):

@@ -34,8 +34,8 @@ SAME_SHAPE = 1e-6  # largest distance of the shape reached from flat
 MISFIT = 5e-4  # largest distance of a joint's two holes in the plane: the workshop's error, see SPAN_ERROR
 REMESHED, REMESHED_LEAST = 0.05, 2e-5  # change of the rms gap: a share of it, or so much
 SAMPLES = 8
-SPAN_ERROR = 0.1e-3 / 0.2  # of each span's length: 0.1 mm where the target's size is 0.2 m
-STIFFNESS_ERROR = 0.05  # of each rod's EI and GJ
+SPAN_ERROR = 0.1e-3 / 0.2  # largest, of each span's length: 0.1 mm where the target's size is 0.2 m
+STIFFNESS_ERROR = 0.05  # largest, of each rod's EI and GJ
 WORSE, WORSE_BY = 1.5, 0.0015  # with errors the rms gap may be so many times its value, and so much more
 FITS = 20  # steps of the fit of rods in a plane
 
@@ -177,11 +177,11 @@ def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
     for seed in range(samples):
         random = np.random.default_rng(seed)
         varied = table.copy()
-        errors = SPAN_ERROR * form.target.size * random.choice((-1.0, 1.0), edges)
+        errors = SPAN_ERROR * form.target.size * random.uniform(-1.0, 1.0, edges)
         varied[:, LENGTH] *= 1.0 + (errors / lengths)[span]
-        softer = 1.0 + STIFFNESS_ERROR * random.choice((-1.0, 1.0), len(mesh.grid.rods))
+        softer = 1.0 + STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))
         varied[:, EI1:LENGTH] *= softer[mesh.edge_rods, None]
-        other = EdgeProperties.of(shell, table).varied(varied).shell
+        other = EdgeProperties.of(shell, form.joint, table).varied(varied).shell
         problem = replace(found.problem, elements=other.elements, stretch=other.stretch)
         there = find_equilibrium(problem, found.state, found.forces)
         yield replace(popped, shell=other.with_elements(there.elements), equilibrium=there)
