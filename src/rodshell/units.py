@@ -29,6 +29,7 @@ Kind = Literal[
     "inertia per length",
     "time",
     "stiffness",
+    "memory",
     "number",
 ]
 
@@ -84,7 +85,7 @@ _KINDS: dict[Kind, _Units] = {
             "6894757.293168361 ksi",
         ),
     ),
-    "time": _Units("a time", '"10 ms"', _factors("1 s second seconds", "0.001 ms")),
+    "time": _Units("a time", '"10 ms"', _factors("1 s second seconds", "0.001 ms", "60 min minutes", "3600 h hours")),
     "stiffness": _Units("a stiffness", '"0.8 N/m"', _factors("1 N/m", "1e3 N/mm kN/m")),
     "density": _Units(
         "a density",
@@ -107,6 +108,7 @@ _KINDS: dict[Kind, _Units] = {
     "mass": _Units("a mass", '"1.2 kg"', _factors("1 kg", "0.001 g", "1000 t", "0.45359237 lb")),
     "mass per length": _Units("a mass per length", '"1.2 kg/m"', _factors("1 kg/m", "0.001 g/m", "1 g/mm")),
     "inertia per length": _Units("an inertia per length", '"0.001 kg m"', _factors("1 kgm", "0.001 gm", "0.001 kgmm")),
+    "memory": _Units("a size of memory", '"2 GB"', _factors("1 B", "1e6 MB", "1e9 GB", "1073741824 GiB")),
     "number": _Units("a plain number", "0.5", {}),
 }
 
@@ -192,9 +194,18 @@ def read_unit(text: str, kind: Kind) -> Decimal:
     if not units.factors:
         raise ValueError(f'takes no unit, and "{text}" follows the number; give {units.wanted}')
     near = {name.lower(): name for name in reversed(units.factors)}
-    close = get_close_matches(unit.lower(), near, n=1, cutoff=0.5)
+    close = _mistyped(unit.lower(), near) or get_close_matches(unit.lower(), near, n=1, cutoff=0.5)
     hint = f" (did you mean {near[close[0]]}?)" if close else ""
     raise ValueError(f'unknown unit "{text}"{hint}; give {units.wanted}')
+
+
+def _mistyped(unit: str, names: Iterable[str]) -> list[str]:
+    """The names from which only one letter differs, and not the first; the most usual one first.
+
+    By shared letters alone "mn" is as near to "m" as to "mm".
+    """
+    alike = (name for name in reversed(list(names)) if len(name) == len(unit) > 1 and name[0] == unit[0])
+    return [name for name in alike if sum(a != b for a, b in zip(name, unit, strict=True)) == 1]
 
 
 def wanted(kind: Kind) -> str:

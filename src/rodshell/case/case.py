@@ -58,17 +58,17 @@ class Built(NamedTuple):
 class Case(Table):
     """Everything that decides one job, complete and in SI. Make one with `load_case`."""
 
-    target: TargetTable = Field(default=HemisphereTable(), discriminator="kind")
-    layout: LayoutTable = LayoutTable()
-    rod: RodTable = RodTable()
-    joint: JointKinds = Field(default=BallTable(), discriminator="kind")
-    drape: DrapeTable = DrapeTable()
-    pop_up: PopUpTable = PopUpTable()
-    refine: RefineTable = RefineTable()
-    seams: SeamsTable = SeamsTable()
-    checks: ChecksTable = ChecksTable()
-    fabrication: FabricationTable = FabricationTable()
-    drawings: DrawingsTable = DrawingsTable()
+    target: TargetTable = Field(default_factory=HemisphereTable, discriminator="kind")
+    layout: LayoutTable = Field(default_factory=LayoutTable)
+    rod: RodTable = Field(default_factory=RodTable)
+    joint: JointKinds = Field(default_factory=BallTable, discriminator="kind")
+    drape: DrapeTable = Field(default_factory=DrapeTable)
+    pop_up: PopUpTable = Field(default_factory=PopUpTable)
+    refine: RefineTable = Field(default_factory=RefineTable)
+    seams: SeamsTable = Field(default_factory=SeamsTable)
+    checks: ChecksTable = Field(default_factory=ChecksTable)
+    fabrication: FabricationTable = Field(default_factory=FabricationTable)
+    drawings: DrawingsTable = Field(default_factory=DrawingsTable)
 
     @property
     def held_objects(self) -> dict[str, Held]:

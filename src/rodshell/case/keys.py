@@ -17,11 +17,7 @@ from rodshell.case.values import Table
 from rodshell.units import shown
 from rodshell.validation import either, not_a_choice
 
-BY_KIND: dict[str, str] = {
-    "target": Case().target.kind,
-    "rod.section": Case().rod.section.kind,
-    "joint": Case().joint.kind,
-}
+BY_KIND: dict[str, str] = {"target": "hemisphere", "rod.section": "auto", "joint": "ball"}
 """Tables whose `kind` decides which keys they have, and the kind that they are by default."""
 
 

@@ -1,4 +1,4 @@
-"""What a design does to a grid: to the stiffnesses of its edges, to their rest lengths, and to where its ends are held."""
+"""What a design does: to the stiffnesses of edges, to their rest lengths, and to where rod ends are held."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -132,7 +132,8 @@ def _reduced(jacobian: Floats, r: Floats) -> tuple[Floats, Floats]:
 
 def _least_squares(matrix: Floats, right: Floats, low: Floats, high: Floats) -> Floats:
     """(n,) least squares in a box; of directions without effect none is taken."""
-    n = matrix.shape[1]
+    n, size = matrix.shape[1], float(np.linalg.norm(right))  # of the order of one: the method's tolerances are absolute
+    matrix, right = matrix / size, right / size
     tiny = 1e-6 * float(np.linalg.norm(matrix)) * np.eye(n)
     tight = high - low < 1e-12
     low, high = np.where(tight, low - 1e-12, low), np.where(tight, high + 1e-12, high)

@@ -1,7 +1,7 @@
 """Goals and limits of a refinement: small values that add up to one sum of squares.
 
-Each has residuals (q,), whose squares are added up, and their derivatives (q, n) by the variables. A limit is a residual
-that is zero where it is kept.
+Each has residuals r (q,), whose squares are added up, and slopes J (q, n) by the variables: 2 J'r is the gradient of
+the sum, exactly, and J'J stands for half of its Hessian. A limit is a residual that is zero where it is kept.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +28,7 @@ class Objective(Protocol):
         ...
 
     def slopes(self, here: Point) -> Floats:
-        """(q, n) derivatives of the residuals by the variables.
+        """(q, n) slopes of the residuals by the variables.
 
         Parameters
         ----------
@@ -39,39 +39,46 @@ class Objective(Protocol):
 
 @dataclass(frozen=True)
 class Gap:
-    """Distance of the rods from the target over its size: with power 2 the mean square.
+    """The mean distance of the rods from the target over its size, G = (mean of |g|^p)^(1/p).
+
+    The residuals g (|g|/G)^(p/2 - 1) / sqrt(q) have the sum of squares G^2: with p = 2 the mean square.
 
     Parameters
     ----------
-    power : of the mean, 2 or more; large ones count the largest gaps.
-    weight : of each point (q, 3) of the rods [m], from its coordinates; None: the same for all.
+    power : p, 2 or more; large ones count the largest gaps.
+    weight : of each point (q, 3) of the rods [m] in the mean, from its coordinates; None: the same for all.
     """
 
     power: float = 2.0
     weight: Callable[[Floats], Floats] | None = None
 
     def residuals(self, here: Point) -> Floats:
-        scaled = self._scaled(here)
-        return np.asarray(np.sign(scaled) * np.abs(scaled) ** (0.5 * self.power) * self._roots(here))
+        gaps, weights = here.gaps[0] / here.structure.target.size, self._weights(here)
+        return np.asarray(
+            np.sqrt(weights) * gaps * (np.abs(gaps) / self._mean(gaps, weights)) ** (0.5 * self.power - 1)
+        )
 
     def slopes(self, here: Point) -> Floats:
-        structure, (_, normals) = here.structure, here.gaps
-        motions = here.response.motions[:, : structure.mesh.node_count]
+        structure, (distances, normals) = here.structure, here.gaps
+        size, nodes = structure.target.size, structure.mesh.node_count
+        motions = here.response.motions[:, :nodes]
         by_gap = np.stack([np.einsum("qx,qx->q", normals, structure.sampled @ motion) for motion in motions], axis=1)
-        steep = 0.5 * self.power * np.abs(self._scaled(here)) ** (0.5 * self.power - 1.0)
-        return np.asarray((steep * self._roots(here) / structure.target.size)[:, None] * by_gap)
+        gaps, weights = distances / size, self._weights(here)
+        relative = np.abs(gaps) / self._mean(gaps, weights)
+        # those of least squares with the present weights, whose gradient is that of G^2 [Nocedal and Wright 2006, 10.2]
+        return np.asarray((np.sqrt(weights) * relative ** (0.5 * self.power - 1))[:, None] * by_gap / size)
 
-    def _scaled(self, here: Point) -> Floats:
-        return here.gaps[0] / here.structure.target.size
+    def _mean(self, gaps: Floats, weights: Floats) -> float:
+        largest = float(np.abs(gaps).max()) or 1.0
+        return float(largest * (weights @ (np.abs(gaps) / largest) ** self.power) ** (1 / self.power)) or 1.0
 
-    def _roots(self, here: Point) -> Floats:
-        structure = here.structure
-        count = len(here.gaps[0])
+    def _weights(self, here: Point) -> Floats:
+        structure, count = here.structure, len(here.gaps[0])
         if self.weight is None:
-            return np.full(count, count**-0.5)
+            return np.full(count, 1.0 / count)
         points = structure.sampled @ structure.popped.state[: structure.mesh.node_count]
         weights = self.weight(points)
-        return np.asarray(np.sqrt(weights / weights.sum()))
+        return np.asarray(weights / weights.sum())
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Refinement: a shell that pops up next to its target becomes one that pops up on it.
 
-The variables are chosen by families, Gauss and Newton's method finds their values with exact derivatives, and the grid that
-they describe is popped up again.
+The variables are chosen by families, Gauss and Newton's method finds their values with exact derivatives, and the grid
+that they describe is popped up again.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,25 +13,30 @@ from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
 from rodshell.formfinding.popup import Ends, PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.model import Shell
+from rodshell.refining.end_families import Clamps
 from rodshell.refining.gauss_newton import Step, gauss_newton
-from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective
+from rodshell.refining.length_families import Holes, Offsets, Tails
+from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
 from rodshell.refining.stiffness_families import DoubleLaths, Taper
 from rodshell.refining.structure import Point, Structure
-from rodshell.refining.variables import Family, Grid, Together
+from rodshell.refining.variables import Design, Family, Grid, design_of
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem
 from rodshell.validation import choice
 
-FAMILIES: dict[str, Family] = {"taper": Taper(), "double": DoubleLaths()}
+FAMILIES: dict[str, Family] = {
+    family.name: family for family in (Taper(), DoubleLaths(), Tails(), Clamps(), Holes(), Offsets())
+}
 """The families of variables by the names that users write."""
 
+LENGTHS = ("tails", "holes", "offsets")  # work by compressing rods
 LEAST_EIGENVALUE = 0.5  # of the lowest one before
 Progress = Callable[[Step], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Candidate:
     """One design on the way.
 
     Parameters
@@ -63,7 +68,7 @@ class Refinement:
     ends: Ends
     before: PatchForm
     after: PatchForm
-    designs: tuple[Design, ...]
+    designs: tuple[Candidate, ...]
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
@@ -108,22 +113,23 @@ def refine(
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
     structure = structure_of(stages, ends)
-    variables = Together([family.on(structure) for family in families])
+    variables = design_of(structure, families)
     here, spent = first_point(structure, variables)
     before = float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
-    goals = [Gap()] if objectives is None else list(objectives)
+    stressed = [Prestress()] if any(family.name in LENGTHS for family in families) else []
+    goals = [Gap(), *stressed] if objectives is None else list(objectives)
     found = gauss_newton(
         variables, here, [*goals, floor],
         allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
     )  # fmt: skip
     grid = Grid(structure.mesh, stages.boundary)
-    designs = tuple(Design(point, variables.applied(grid, point.values)) for point in found.accepted)
+    designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in found.accepted)
     after, made = popped_up(stages, designs[-1], ends)
-    one = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
+    held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
     names = tuple(family.name for family in families)
     return Refinement(
-        names, ends, one, after, designs, found.converged, spent + found.factorizations + made, found.steps
+        names, ends, held, after, designs, found.converged, spent + found.factorizations + made, found.steps
     )
 
 
@@ -173,7 +179,7 @@ def structure_of(stages: PatchForm, ends: Ends) -> Structure:
     return Structure(popped, stages.rod, stages.joint, stages.target)
 
 
-def first_point(structure: Structure, variables: Together) -> tuple[Point, int]:
+def first_point(structure: Structure, variables: Design) -> tuple[Point, int]:
     """The design to start from, and the factorisations that it took.
 
     Parameters
@@ -198,7 +204,7 @@ def first_point(structure: Structure, variables: Together) -> tuple[Point, int]:
     return Point(structure, values, change, edges.at(found.elements), found), found.report.factorizations
 
 
-def popped_up(stages: PatchForm, design: Design, ends: Ends) -> tuple[PatchForm, int]:
+def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchForm, int]:
     """The stages of a grid built to a design, and the factorisations that its pop-up took.
 
     Parameters
@@ -233,5 +239,5 @@ def _with_frames(element: Elements, like: Elements) -> Elements:
         field.name: getattr(like, field.name) for field in fields(element) if field.name.startswith("source_")
     }
     if hasattr(element, "bends"):
-        sources["bends"] = _with_frames(element.bends, like.bends)  # type: ignore[attr-defined]
+        sources["bends"] = _with_frames(element.bends, like.bends)
     return replace(element, **sources)

@@ -1,8 +1,8 @@
 """Families of variables that change the stiffness along rods: a taper, and double laths over a share of each rod.
 
-Every rod has a profile of a few numbers, each of which is one of the variables; rods whose numbers are the same variables
-have the same profile. The stiffness of the edges by these numbers is an explicit formula (`model.rod_sections`), whose
-derivatives are central differences for all rods at once.
+Every rod has a profile of a few numbers, each of which is one of the variables; rods whose numbers are the same
+variables have the same profile. The stiffness of the edges by these numbers is an explicit formula
+(`model.rod_sections`), whose derivatives are central differences for all rods at once.
 """
 
 from collections.abc import Callable
@@ -18,10 +18,11 @@ from rodshell.layout import Profile
 from rodshell.layout.profile import Varies
 from rodshell.refining.change import STIFFNESSES, Change
 from rodshell.refining.structure import Structure
+from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
 from rodshell.validation import choice
 
-One = Literal["all", "family", "rod"]
+Per = Literal["shell", "family", "rod"]
 PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
 
 
@@ -41,6 +42,17 @@ class Profiles:
     variable_of: Ints
     profile: Callable[[Floats], Profile]
     box: Box
+
+    def image(self, by: Operation) -> Image:
+        """Where an operation maps the variables.
+
+        Parameters
+        ----------
+        by : a symmetry.
+        """
+        index = np.empty(len(self.box.start), dtype=np.intp)
+        index[self.variable_of] = self.variable_of[by.rods]
+        return Image(index, np.ones(len(index)))
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
         """The grid whose rods have these profiles.
@@ -103,7 +115,7 @@ class Taper:
     Parameters
     ----------
     ratio : of the largest to the smallest EI that is allowed [-].
-    one : one profile for all rods, one for each family, or one for each rod.
+    per : a profile for the whole shell, for each family, or for each rod.
     stations : at which EI is chosen, from an end of a rod to its middle.
     varies : what of the section is changed, see `Profile`.
 
@@ -113,12 +125,12 @@ class Taper:
     """
 
     ratio: float = 8.0
-    one: One = "all"
+    per: Per = "shell"
     stations: int = 5
     varies: Varies = "size"
 
     def __post_init__(self) -> None:
-        choice("one", self.one, get_args(One))
+        choice("per", self.per, get_args(Per))
         if not self.ratio > 1.0:
             raise InputError(f"the ratio of a taper must be larger than 1, not {self.ratio}")
         if not self.stations >= 2:
@@ -134,9 +146,9 @@ class Taper:
         structure : the shell.
         """
         rods = structure.mesh.grid.rods
-        if self.one == "all":
+        if self.per == "shell":
             group = np.zeros(len(rods), dtype=np.intp)
-        elif self.one == "family":
+        elif self.per == "family":
             group = np.unique([rod.family for rod in rods], return_inverse=True)[1].astype(np.intp)
         else:
             group = np.arange(len(rods))
@@ -144,7 +156,9 @@ class Taper:
         count, half = int(variable_of.max()) + 1, 0.5 * np.log(self.ratio)
         zero = np.zeros(count)
         box = Box(zero, zero - half, zero + half, zero + 1.0)
-        return Profiles(structure, variable_of, lambda logs: Profile.symmetric(np.exp(logs), varies=self.varies), box)
+        return Profiles(
+            structure, variable_of, lambda logs: Profile.symmetric(np.exp(logs).tolist(), varies=self.varies), box
+        )
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from rodshell.formfinding.trim import Boundary
 from rodshell.layout import GridMesh
 from rodshell.refining.change import Change
 from rodshell.refining.structure import Structure
+from rodshell.refining.symmetry import Image, Operation, symmetries, ties
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,19 @@ class Variables(Protocol):
         ...
 
 
+class Untied(Variables, Protocol):
+    """The variables of a family, which know their symmetric images."""
+
+    def image(self, by: Operation) -> Image:
+        """Where a symmetry maps the variables.
+
+        Parameters
+        ----------
+        by : the symmetry.
+        """
+        ...
+
+
 class Family(Protocol):
     """A kind of variables that a user chooses.
 
@@ -82,7 +96,7 @@ class Family(Protocol):
     @property
     def name(self) -> str: ...
 
-    def on(self, structure: Structure) -> Variables:
+    def on(self, structure: Structure) -> Untied:
         """The variables on a shell.
 
         Parameters
@@ -90,37 +104,6 @@ class Family(Protocol):
         structure : the shell.
         """
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class Together:
-    """Several sets of variables, one after the other.
-
-    Parameters
-    ----------
-    parts : the sets.
-    """
-
-    parts: Sequence[Variables]
-
-    @property
-    def box(self) -> Box:
-        boxes = [part.box for part in self.parts]
-        return Box(
-            *(np.concatenate([getattr(box, name) for box in boxes]) for name in ("start", "lower", "upper", "scale"))
-        )
-
-    def change(self, values: Floats) -> Change:
-        return Change.together([part.change(own) for part, own in self._own(values)])
-
-    def applied(self, grid: Grid, values: Floats) -> Grid:
-        for part, own in self._own(values):
-            grid = part.applied(grid, own)
-        return grid
-
-    def _own(self, values: Floats) -> list[tuple[Variables, Floats]]:
-        begins = np.cumsum([len(part.box.start) for part in self.parts])[:-1]
-        return list(zip(self.parts, np.split(values, begins), strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +116,7 @@ class Tied:
     ties : (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
     """
 
-    whole: Variables
+    whole: Untied
     ties: csc_array
 
     @property
@@ -157,3 +140,49 @@ class Tied:
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
         return self.whole.applied(grid, self.ties @ values)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Several sets of variables, one after the other.
+
+    Parameters
+    ----------
+    parts : the sets.
+    """
+
+    parts: Sequence[Tied]
+
+    @property
+    def box(self) -> Box:
+        boxes = [part.box for part in self.parts]
+        return Box(
+            *(np.concatenate([getattr(box, name) for box in boxes]) for name in ("start", "lower", "upper", "scale"))
+        )
+
+    def change(self, values: Floats) -> Change:
+        return Change.together([part.change(some) for part, some in self._split(values)])
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        for part, some in self._split(values):
+            grid = part.applied(grid, some)
+        return grid
+
+    def _split(self, values: Floats) -> list[tuple[Tied, Floats]]:
+        begins = np.cumsum([len(part.box.start) for part in self.parts])[:-1]
+        return list(zip(self.parts, np.split(values, begins), strict=True))
+
+
+def design_of(structure: Structure, families: Sequence[Family]) -> Design:
+    """The variables of several families on a shell; where it is symmetric, so is every design.
+
+    Parameters
+    ----------
+    structure : the shell.
+    families : what is varied.
+    """
+    mesh, draped = structure.mesh, structure.popped.boundary.draped
+    shapes = [structure.popped.positions, *([] if draped is None else [draped])]
+    operations = symmetries(mesh, np.column_stack(shapes))
+    parts = [family.on(structure) for family in families]
+    return Design([Tied(part, ties(len(part.box.start), [part.image(by) for by in operations])) for part in parts])
