@@ -28,7 +28,6 @@ from rodshell.layout import GridLayout
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
 from rodshell.output.pictures import picture_svg
-from rodshell.refining.acceptance import Refined
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
@@ -38,6 +37,8 @@ from rodshell.validation import instance
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
+
+    from rodshell.refining.acceptance import Refined
 
 Stages = PatchForm | PatchedForm
 
@@ -64,7 +65,7 @@ class Form:
     options: OutputOptions
     inputs: Mapping[str, bytes]
     search: Search | None = None
-    refined: Refined | None = None
+    refined: "Refined | None" = None
     reused: tuple[str, ...] = ()
     _known_checks: Checks | None = field(default=None)
     _known_fabrication: Fabricated | None = field(default=None)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rodshell.case import Case
 from rodshell.case.case import Built, built
@@ -14,8 +15,6 @@ from rodshell.formfinding import Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
 from rodshell.formfinding.progress import Progress
 from rodshell.formfinding.search import Search, search
-from rodshell.refining.acceptance import Refined, refined
-from rodshell.refining.variables import Family
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
 from rodshell.results.summary import chosen, rod_text
@@ -23,6 +22,10 @@ from rodshell.rods.section import GivenSection, Rod
 from rodshell.targets import Target
 from rodshell.targets.patch import Seam
 from rodshell.units import length_text
+
+if TYPE_CHECKING:
+    from rodshell.refining.acceptance import Refined
+    from rodshell.refining.variables import Family
 
 Announce = Callable[[str], None]
 
@@ -119,7 +122,7 @@ class Run:
             same_drape="trim" in same, progress=self.progress,
         )  # fmt: skip
 
-    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> Refined | None:
+    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> "Refined | None":
         """The refinement of these stages, where the case asks for one."""
         vary: tuple[Family, ...] = built(case.refine)
         if not vary or stages.status != "converged" or not stages.ends:
@@ -127,6 +130,8 @@ class Run:
         earlier = self.earlier
         if earlier is not None and "refine" in same and _same_pop_ups(stages, earlier.unrefined):
             return earlier.refined
+        from rodshell.refining.acceptance import refined  # it takes a tenth of a second to load, which few jobs need
+
         return refined(stages, vary, ends=case.refine.ends, progress=self.progress)
 
     def _decided(self, case: Case, found: Built) -> tuple[Case, Built, Search | None]:
@@ -158,7 +163,7 @@ class Run:
         )  # fmt: skip
 
     def _made(
-        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: Refined | None = None
+        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: "Refined | None" = None
     ) -> Form:
         """The form, with what it takes over from the earlier one."""
         built = stages if better is None else better.after

@@ -161,29 +161,27 @@ Families = Annotated[tuple[str, ...], BeforeValidator(words(FAMILIES))]
 
 
 class RefineTable(Table):
-    vary: Families = Field(
-        default=(), description=f"what is varied to bring the shell nearer to its target: {', '.join(FAMILIES)}"
-    )
+    vary: Families = Field(default=(), description=f"what is varied: {', '.join(FAMILIES)}")
     ends: Literal["pinned", "clamped"] | None = Field(
-        default=None, description="supports of the refined shell, the only ones; default: the first of pop_up.ends"
+        default=None, description="supports of the refined shell; default: the first of pop_up.ends"
     )
     ratio: Ratio = Field(default=8.0, description="of the largest EI to the smallest along a taper")
-    per: Literal["all", "family", "rod"] = Field(
-        default="all", description="one taper for all rods, one for each family, or one for each rod"
+    per: Literal["shell", "family", "rod"] = Field(
+        default="shell", description="one taper for the shell, one for each family, or for each rod"
     )
     varies: Literal["size", "width", "height", "a", "b"] = Field(
-        default="size", description="what of the section a taper changes: all lengths alike, or one of them"
+        default="size", description="what of the section a taper changes: all lengths, or one"
     )
-    offer: Literal["on", "off"] = Field(
-        default="on", description="say of a form that is not refined what the cheapest refinement would gain"
-    )
+    offer: Literal["on", "off"] = Field(default="on", description="say of any form what double laths would gain")
 
     def build(self) -> "tuple[Family, ...]":
         """The families that are varied."""
+        if not self.vary:
+            return ()
         from rodshell.refining.refine import FAMILIES as KNOWN
         from rodshell.refining.stiffness_families import Taper
 
-        taper = Taper(ratio=self.ratio, one=self.per, varies=self.varies)
+        taper = Taper(ratio=self.ratio, per=self.per, varies=self.varies)
         return tuple(taper if name == "taper" else KNOWN[name] for name in self.vary)
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from math import degrees
 from platform import python_version
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import scipy
@@ -27,7 +27,6 @@ from rodshell.joints.joint import Joint as JointModel
 from rodshell.kernels import description
 from rodshell.layout import Profile
 from rodshell.nets import ChebyshevNet
-from rodshell.refining.acceptance import Refined
 from rodshell.results.records import (
     Agreement,
     Drape,
@@ -61,6 +60,9 @@ from rodshell.rods.varied import sizes
 from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
 from rodshell.targets.surface_mesh import surface_mesh
+
+if TYPE_CHECKING:
+    from rodshell.refining.acceptance import Refined
 
 States = dict[str, NDArray[Any]]
 
@@ -200,7 +202,7 @@ def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Res
     return results.changed(seams=tuple(seams))
 
 
-def with_refinement(results: Results, found: Refined) -> Results:
+def with_refinement(results: Results, found: "Refined") -> Results:
     """The same results, with how their form was refined; a refusal is a warning.
 
     Parameters
