@@ -235,6 +235,10 @@ class Form:
         found = results_of(self.stages)
         return found if self.refined is None else with_refinement(found, self.refined)
 
+    def unchecked(self) -> Archive:
+        """What is kept of it before anything was checked, without a verdict."""
+        return Archive(self.results(), states_of(self.stages), self.case.text(), self.inputs)
+
     def archive(self, *, options: OutputOptions | None = None) -> Archive:
         """Everything that is kept, checked and made ready to be built.
 

@@ -15,6 +15,7 @@ COMMANDS = {
     "refine": "Bring a form nearer to its target, and accept only what can be built.",
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
     "export": "Write drawings, schedules, models or the report of an earlier result again.",
+    "studio": "Design a gridshell on a live page in the browser.",
     "sweep": "Compute many designs: combinations or samples of the values of some keys.",
     "warmup": "Compile all kernels in advance, once.",
     "paper": "Compute a figure of the paper again, with the errors.",

@@ -93,6 +93,7 @@ class GridLayout:
         edge: float | Auto = "auto",
         rotate: float = 0.0,
         offset: tuple[float, float] = (0.0, 0.0),
+        left_out: tuple[str, ...] = (),
     ) -> "GridLayout":
         """Make a layout of equally spaced rods along x and along y.
 
@@ -104,6 +105,7 @@ class GridLayout:
         edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing.
         rotate : angle of family u against the target's x axis [rad].
         offset : shift (x, y) of the lattice against the axes through the anchor [m].
+        left_out : names of rods that are not built.
 
         Raises
         ------
@@ -114,7 +116,7 @@ class GridLayout:
         _require_two("spacing", pair)
         pair = (positive("layout spacing", pair[0], "m"), positive("layout spacing", pair[1], "m"))
         longest = auto_edge(pair) if isinstance(edge, str) and edge == "auto" else edge
-        return GridLayout(rods, pair, length, longest, rotate, offset)
+        return GridLayout(rods, pair, length, longest, rotate, offset, left_out=left_out)
 
     def phase(self, family: Family) -> float:
         """Offset of one line of the lattice of a family [m]; the others are whole spacings away."""

@@ -145,6 +145,7 @@ def chebyshev_net(
         raise _net_limit(where, f"the families meet at only {degrees(angle):.1f} degrees")
     ends, error, loosest = _extrapolate(target, lines, (coarse, fine), GRAZING * min(layout.spacing))
     rods, dropped, warnings = _name_rods(layout, lines, ends)
+    _require_names(layout, [*(rod.name for rod in rods), *(name for name, _ in dropped)])
     if all(rod.virtual for rod in rods):
         raise InputError("no rod of the layout touches the target: move the layout (offset, anchor), or give more rods")
     if error > LOOSE * min(layout.spacing):
@@ -319,6 +320,13 @@ def piece_names(rod: str, count: int) -> list[str]:
     count : number of its pieces.
     """
     return [rod] if count == 1 else [f"{rod}{ascii_lowercase[k] if k < 26 else f'.{k + 1}'}" for k in range(count)]
+
+
+def _require_names(layout: GridLayout, names: list[str]) -> None:
+    """Refuse to leave out rods that are not there."""
+    for name in layout.left_out:
+        if name not in names:
+            raise InputError(f"layout.left_out: there is no rod {name}: the rods are {', '.join(names)}")
 
 
 def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:

@@ -76,6 +76,7 @@ def scene_of(archive: Archive) -> Scene | None:
         "version": VERSION,
         "name": archive.name,
         "size": size,
+        "low": low.tolist(),
         "box": ((cloud.max(axis=0) - low) / size).tolist(),
         "rods": [_rod(rod, count) for rod, count in zip(rods, counts, strict=True)],
         "joints": {"ids": [joint.id for joint, _ in joints], "entries": data.add(meeting)},
