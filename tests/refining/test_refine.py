@@ -40,7 +40,7 @@ def test_one_taper_for_all_rods_brings_the_shell_eight_times_nearer() -> None:
     profile = np.array(factors[0])
     np.testing.assert_allclose(profile, profile[::-1])
     assert profile.max() / profile.min() <= 8.0 * (1 + 1e-12)
-    assert profile.min() < 0.5 < 1.2 < profile.max()
+    assert profile.max() == 1.0  # the rod itself where it is thickest
 
 
 def test_the_refined_grid_pops_up_from_its_draped_state_to_the_same_shape() -> None:

@@ -7,6 +7,7 @@ variables have the same profile. The stiffness of the edges by these numbers is 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Literal, get_args
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.sparse import csc_array
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.joints.joint import Elastic
 from rodshell.layout import Profile
 from rodshell.layout.profile import Varies
 from rodshell.refining.change import STIFFNESSES, Change
@@ -55,14 +57,23 @@ class Profiles:
         return Image(index, np.ones(len(index)))
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid whose rods have these profiles.
+        """The grid whose rods have these profiles; a taper such that its thickest place has the section itself.
+
+        A common factor on all stiffnesses changes no unloaded shape, unless joints are springs: it is free.
 
         Parameters
         ----------
         grid : before.
         values : (n,) the design.
         """
-        return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
+        profiles = self.of_rods(values)
+        joint = self.structure.joint
+        given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
+        springs = any(0.0 < stiffness < inf for stiffness in given)
+        if profiles[0].varies != "laths" and not springs:
+            most = max(max(profile.factors) for profile in profiles)
+            profiles = tuple(replace(p, factors=tuple(factor / most for factor in p.factors)) for p in profiles)
+        return replace(grid, mesh=grid.mesh.with_profiles(profiles))
 
     def of_rods(self, values: Floats) -> tuple[Profile, ...]:
         """The profile of each rod.
