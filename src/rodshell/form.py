@@ -27,7 +27,6 @@ from rodshell.joints import Joint
 from rodshell.layout import GridLayout
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
-from rodshell.output.pictures import picture_svg
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
@@ -300,6 +299,7 @@ class Form:
 
     def _repr_html_(self) -> str:
         """The 3D viewer with all shapes, and what they are worth, as notebooks show it."""
+        from rodshell.output.pictures import picture_svg
         from rodshell.output.viewer import frame_html, scene_of
 
         scene = scene_of(self._archive)
