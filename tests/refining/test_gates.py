@@ -130,7 +130,7 @@ def moved_ends(by: float) -> PatchForm:
 @pytest.mark.parametrize("factor", [0.9, 1.12])
 def test_a_gap_that_the_new_mesh_does_not_confirm_is_refused(factor: float) -> None:
     judged = gates(moved_ends(factor), all_of_them=False)
-    assert judged.reason.startswith("remeshed: meshed anew, its gap is")
+    assert judged.reason.startswith("remeshed: meshed again, its gap is")
     assert list(judged.passed) == ["stable", "flat", "remeshed"]
 
 

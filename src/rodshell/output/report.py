@@ -237,7 +237,7 @@ def supports_table(results: Results) -> dict[str, Any] | None:
 GATE_WORDS: dict[Gate, str] = {
     "flat": "the rods fit together in a plane",
     "from_flat": "pushed up from flat it comes to this shape",
-    "remeshed": "meshed anew it is as near to the target",
+    "remeshed": "meshed again it is as near to the target",
     "tolerance": "built with errors it stays stable and nearly as near",
     "stable": "it is a stable equilibrium",
 }

@@ -2,7 +2,7 @@
 
     stable      the shell is a stable equilibrium
     flat        its rods, straight and with their joints where they are drilled, fit together in a plane
-    remeshed    meshed anew with the same edge length it is as near to its target
+    remeshed    meshed again with the same edge length it is as near to its target
     tolerance   it stays stable, and nearly as near, when it is built with errors
     from_flat   pushed up from flat it comes to the same shape
 
@@ -118,11 +118,11 @@ def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
     again = popped_again(form, Footprint(mesh), boundary, ends)
     made = _popped(again).report.factorizations
     if not _popped(again).report.stable:
-        return "meshed anew, the shell is not stable", made
+        return "meshed again, the shell is not stable", made
     before, after = _rms(form), _rms(again)
     if abs(after - before) <= max(REMESHED * before, REMESHED_LEAST):
         return "", made
-    return f"meshed anew, its gap is {percent_text(after)} rms and not {percent_text(before)}", made
+    return f"meshed again, its gap is {percent_text(after)} rms and not {percent_text(before)}", made
 
 
 def _tolerance(form: PatchForm, progress: Progress) -> tuple[str, int]:
