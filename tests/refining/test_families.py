@@ -1,5 +1,6 @@
 """Each family of variables: its derivatives against solving again, and what it builds against what it changes."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -33,13 +34,16 @@ CASES = [
 
 
 @cache
-def structure(ends: Ends, laths: bool = False, symmetric: bool = False) -> Structure:
+def structure(ends: Ends, laths: bool = False, symmetric: bool = False, weighs: bool = False) -> Structure:
     layout = rs.GridLayout.orthogonal(
         rods=(5, 5) if symmetric else (6, 5), spacing=0.06, edge=0.02, rotate=0.0 if symmetric else 0.3
     )
     target = rs.Ellipsoid(0.2, 0.18, 0.12)
     rod, joint = (LATH, rs.Pin()) if laths else (ROD, None)
-    return structure_of(rs.find_form(target, layout, rod, ends=(ends,), joint=joint).stages, ends)  # type: ignore[arg-type]
+    if weighs:
+        rod = rs.Rod(rod.section, rs.Material(youngs_modulus=1e6, density=7.0))
+    found = structure_of(rs.find_form(target, layout, rod, ends=(ends,), joint=joint).stages, ends)  # type: ignore[arg-type]
+    return replace(found, weighs=weighs)
 
 
 def free_design(shell: Structure, family: Family) -> Design:
@@ -48,9 +52,9 @@ def free_design(shell: Structure, family: Family) -> Design:
     return Design([Tied(part, ties(len(part.box.start), []))])
 
 
-def start(family: Family, laths: bool) -> tuple[Design, Point, np.ndarray]:
+def start(family: Family, laths: bool, weighs: bool = False) -> tuple[Design, Point, np.ndarray]:
     """A design, its equilibrium, and a direction at random in it."""
-    shell = structure("clamped" if family.name == "clamps" else "pinned", laths)
+    shell = structure("clamped" if family.name == "clamps" else "pinned", laths, weighs=weighs)
     variables = free_design(shell, family)
     here, _ = first_point(shell, variables)
     return variables, here, variables.box.scale * np.random.default_rng(3).uniform(-1.0, 1.0, len(variables.box.scale))
@@ -62,12 +66,12 @@ def solved(variables: Design, here: Point, values: np.ndarray) -> Point:
     return point
 
 
-def errors(family: Family, laths: bool) -> dict[str, float]:
+def errors(family: Family, laths: bool, weighs: bool = False) -> dict[str, float]:
     """Of the derivatives of the state, and of the objectives' squares, over the largest of each.
 
     Differences of Hessians leave 1e-7 of a mode's value, see `solve.sensitivity`: its error may be related to that.
     """
-    variables, here, direction = start(family, laths)
+    variables, here, direction = start(family, laths, weighs)
     nodes = here.structure.mesh.node_count
     floor = LowestEigenvalue(least=2.0, before=float(here.modes.values[0]))  # counts here
     goals: dict[str, Objective] = {
@@ -97,6 +101,15 @@ def errors(family: Family, laths: bool) -> dict[str, float]:
 @pytest.mark.parametrize(("family", "laths"), CASES)
 def test_states_and_objectives_change_as_their_derivatives_say(family: Family, laths: bool) -> None:
     assert {name: error for name, error in errors(family, laths).items() if error > 1e-6} == {}
+
+
+@pytest.mark.parametrize("family", [Taper(stations=3), Tails(), Clamps()], ids=lambda family: family.name)
+def test_under_its_weight_a_shell_changes_as_its_derivatives_say(family: Family) -> None:
+    """The weight follows the design: its sections and its lengths."""
+    here = start(family, True, True)[1]
+    sag = here.state - here.structure.popped.state
+    assert -sag[:, 2].min() > 2e-3 * here.structure.target.size
+    assert {name: error for name, error in errors(family, True, True).items() if error > 1e-6} == {}
 
 
 @pytest.mark.parametrize("family", [family for _, family in EVERY[2:]], ids=[name for name, _ in EVERY[2:]])
