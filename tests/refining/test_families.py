@@ -10,6 +10,7 @@ import rodshell as rs
 from rodshell.formfinding.popup import Ends
 from rodshell.refining.end_families import Clamps
 from rodshell.refining.length_families import Holes, Offsets, Tails
+from rodshell.refining.limits import Curvature, Energy, MinimumAngle, SmoothStiffness
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
 from rodshell.refining.refine import first_point, structure_of
 from rodshell.refining.stiffness_families import DoubleLaths, Taper
@@ -76,6 +77,8 @@ def errors(family: Family, laths: bool, weighs: bool = False) -> dict[str, float
     floor = LowestEigenvalue(least=2.0, before=float(here.modes.values[0]))  # counts here
     goals: dict[str, Objective] = {
         "gap": Gap(), "4-norm of the gap": Gap(power=4.0), "compression": Prestress(most=-1.0), "modes": floor,
+        "curvature": Curvature(most=1.0), "energy": Energy(before=here.equilibrium.energy),
+        "angles": MinimumAngle(least=1.5), "smoothness": SmoothStiffness(),
     }  # fmt: skip
 
     def difference(step: float) -> list[np.ndarray]:
@@ -91,7 +94,7 @@ def errors(family: Family, laths: bool, weighs: bool = False) -> dict[str, float
     result = {}
     for name, slope, coarse, fine in zip(["state", *goals], found, difference(2 * STEP), difference(STEP), strict=True):
         exact = (4 * fine - coarse) / 3
-        scale = float(np.abs(exact).max())
+        scale = max(float(np.abs(exact).max()), 1e-9)  # a square is known to 1e-16
         if name == "modes":
             scale = max(scale, 0.2 * float(floor.residuals(here) @ floor.residuals(here)))
         result[name] = float(np.abs(slope - exact).max()) / scale
