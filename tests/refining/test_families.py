@@ -8,7 +8,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.formfinding.popup import Ends
-from rodshell.refining.end_families import Clamps
+from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.limits import Curvature, Energy, MinimumAngle, SmoothStiffness
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
@@ -26,6 +26,7 @@ STEP = 3e-4  # of the scale of the variables: central differences, extrapolated,
 EVERY: list[tuple[str, Family]] = [
     ("taper", Taper(stations=3)), ("taper a rod", Taper(stations=3, per="rod")), ("double", DoubleLaths()),
     ("tails", Tails()), ("holes", Holes()), ("offsets", Offsets()), ("clamps", Clamps()),
+    ("supports", Supports()),
 ]  # fmt: skip
 CASES = [
     pytest.param(family, laths, id=f"{name}{', laths with pins' * laths}")
@@ -127,6 +128,12 @@ def test_what_is_built_has_the_lengths_stiffnesses_and_directions_of_the_design(
     )
     turned = built.boundary.tangents - shell.popped.boundary.tangents
     assert np.allclose(turned, 0.0) == (family.name != "clamps")
+    moved = built.boundary.points - shell.popped.boundary.points
+    np.testing.assert_allclose(moved, change.held[: len(moved)], atol=1e-15)
+    assert np.allclose(moved, 0.0) == (family.name != "supports")
+    still = shell.target.margin(built.boundary.points) - shell.target.margin(shell.popped.boundary.points)
+    assert np.abs(still).max() < 1e-9
+    assert np.abs(shell.target.distance(built.boundary.points)).max() < 1e-9
 
 
 def test_rods_moved_across_stay_straight_and_their_joints_stay_together() -> None:
@@ -152,7 +159,7 @@ def test_an_ellipsoid_has_its_three_symmetries_and_a_hemisphere_seven() -> None:
 
 
 @pytest.mark.parametrize(
-    "family", [Taper(per="rod"), Tails(), Holes(), Offsets(), Clamps()], ids=lambda family: family.name
+    "family", [Taper(per="rod"), Tails(), Holes(), Offsets(), Clamps(), Supports()], ids=lambda family: family.name
 )
 def test_the_free_steepest_descent_of_a_symmetric_shell_is_symmetric(family: Family) -> None:
     """So ties leave nothing out: the gradient of the gap by all variables lies in the space of the tied ones."""

@@ -17,7 +17,7 @@ from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
 from rodshell.formfinding.popup import Ends, PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.model import Shell
-from rodshell.refining.end_families import Clamps
+from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
@@ -30,7 +30,7 @@ from rodshell.solve.problem import Problem
 from rodshell.validation import choice
 
 FAMILIES: dict[str, Family] = {
-    family.name: family for family in (Taper(), DoubleLaths(), Tails(), Clamps(), Holes(), Offsets())
+    family.name: family for family in (Taper(), DoubleLaths(), Tails(), Clamps(), Supports(), Holes(), Offsets())
 }
 """The families of variables by the names that users write."""
 
