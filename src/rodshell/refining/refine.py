@@ -34,7 +34,7 @@ FAMILIES: dict[str, Family] = {
 }
 """The families of variables by the names that users write."""
 
-LENGTHS = ("tails", "holes", "offsets")  # work by compressing rods
+STIFFNESSES = ("taper", "double", "sections")  # the others work by compressing rods, too
 LEAST_EIGENVALUE = 0.5  # of the lowest one before
 Progress = Callable[[Step], None]
 
@@ -109,7 +109,7 @@ def refine(
     stages : of one shell, with a stable pop-up.
     vary : what is varied: names of `FAMILIES`, or families with settings of their own.
     ends : how the rods' ends are held; None: as first asked for.
-    objectives : what is made small; None: the mean square of the gap and, where lengths vary, compression.
+    objectives : what is made small; None: the mean square of the gap and, where not only stiffness varies, compression.
     least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
     under_weight : bring the shell that bears its own weight to the target; unloaded it then stands above.
     carried : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
@@ -128,7 +128,7 @@ def refine(
     here, spent = first_point(structure, variables)
     before = float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
-    stressed = [Prestress()] if any(family.name in LENGTHS for family in families) else []
+    stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
     goals = [Gap(), *stressed] if objectives is None else list(objectives)
     found = gauss_newton(
         variables, here, [*goals, floor],
