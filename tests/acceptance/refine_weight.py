@@ -1,4 +1,4 @@
-"""Shells that meet their target when they bear their own weight: tubes of glass fibre, and laths of larch."""
+"""Shells that meet their target when they carry their own weight: tubes of glass fibre, and laths of larch."""
 
 from collections.abc import Iterator
 

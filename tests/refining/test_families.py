@@ -13,7 +13,7 @@ from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.limits import Curvature, Energy, MinimumAngle, SmoothStiffness
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
 from rodshell.refining.refine import first_point, structure_of
-from rodshell.refining.stiffness_families import DoubleLaths, Taper
+from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.structure import Point, Structure
 from rodshell.refining.symmetry import symmetries, ties
 from rodshell.refining.variables import Design, Family, Grid, Tied, design_of
@@ -25,6 +25,7 @@ STEP = 3e-4  # of the scale of the variables: central differences, extrapolated,
 
 EVERY: list[tuple[str, Family]] = [
     ("taper", Taper(stations=3)), ("taper a rod", Taper(stations=3, per="rod")), ("double", DoubleLaths()),
+    ("sections", Sections()),
     ("tails", Tails()), ("holes", Holes()), ("offsets", Offsets()), ("clamps", Clamps()),
     ("supports", Supports()),
 ]  # fmt: skip

@@ -38,6 +38,8 @@ class Directions:
     box: Box
     image: Callable[[Operation], Image]
 
+    stock = None
+
     def tangents(self, values: Floats) -> Floats:
         """(2m, 3) directions of the clamps.
 
@@ -130,6 +132,8 @@ class Slides:
     inwards: Floats
     box: Box
     image: Callable[[Operation], Image]
+
+    stock = None
 
     def moved(self, values: Floats) -> Floats:
         """(2m, 3) displacements of the rod ends [m].

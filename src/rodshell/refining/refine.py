@@ -21,7 +21,8 @@ from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
-from rodshell.refining.stiffness_families import DoubleLaths, Taper
+from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
+from rodshell.refining.stock import rounded
 from rodshell.refining.structure import Point, Structure, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
 from rodshell.rods.elements import Elements
@@ -30,7 +31,8 @@ from rodshell.solve.problem import Problem
 from rodshell.validation import choice
 
 FAMILIES: dict[str, Family] = {
-    family.name: family for family in (Taper(), DoubleLaths(), Tails(), Clamps(), Supports(), Holes(), Offsets())
+    family.name: family
+    for family in (Taper(), DoubleLaths(), Sections(), Tails(), Clamps(), Supports(), Holes(), Offsets())
 }
 """The families of variables by the names that users write."""
 
@@ -98,7 +100,7 @@ def refine(
     objectives: Sequence[Objective] | None = None,
     least_eigenvalue: float = LEAST_EIGENVALUE,
     under_weight: bool = False,
-    carried: Floats | None = None,
+    dead_loads: Floats | None = None,
     most_evaluations: int = 30,
     progress: Progress = lambda step: None,
 ) -> Refinement:
@@ -111,8 +113,8 @@ def refine(
     ends : how the rods' ends are held; None: as first asked for.
     objectives : what is made small; None: the mean square of the gap and, where not only stiffness varies, compression.
     least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
-    under_weight : bring the shell that bears its own weight to the target; unloaded it then stands above.
-    carried : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
+    under_weight : bring the shell that carries its own weight to the target; unloaded it then stands above.
+    dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
     most_evaluations : designs that are tried.
     progress : called after each; what it raises ends the search.
 
@@ -123,7 +125,7 @@ def refine(
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
-    structure = replace(structure_of(stages, ends), weighs=under_weight, carried=carried)
+    structure = replace(structure_of(stages, ends), weighs=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
     here, spent = first_point(structure, variables)
     before = float(here.modes.values[0])
@@ -134,8 +136,14 @@ def refine(
         variables, here, [*goals, floor],
         allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
     )  # fmt: skip
+    accepted = found.accepted
+    if any(sizes is not None for sizes in variables.stock):
+        chosen, more = rounded(variables, accepted[-1], [*goals, floor], floor.allows)
+        spent += more
+        nearer = chosen is not None and chosen.rms < here.rms
+        accepted = (here, chosen) if chosen is not None and nearer else (here,)
     grid = Grid(structure.mesh, stages.boundary)
-    designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in found.accepted)
+    designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in accepted)
     after, made = popped_up(stages, designs[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
@@ -165,6 +173,9 @@ def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family
     names = [family.name for family in families]
     if not names or len(set(names)) < len(names):
         raise InputError(f"vary must name one family or several, each once, not {names}")
+    stiff = [name for name in names if name in STIFFNESSES]
+    if len(stiff) > 1:
+        raise InputError(f"{' and '.join(stiff)} both decide the sections along a rod: vary one of them")
     return families
 
 
@@ -271,8 +282,8 @@ def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
     nodes = slice(0, popped.shell.first_angle)
     if structure.weighs:
         load[nodes, 2] = -STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
-    if structure.carried is not None:
-        load[: len(structure.carried)] += structure.carried
+    if structure.dead_loads is not None:
+        load[: len(structure.dead_loads)] += structure.dead_loads
     shell = popped.shell.with_elements(tuple(map(_with_frames, popped.shell.elements, here.elements)))
     problem = replace(popped.equilibrium.problem, elements=shell.elements, load=load)
     return agreement(replace(popped, equilibrium=find_equilibrium(problem, here.state, here.forces)), stages.target)

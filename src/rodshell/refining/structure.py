@@ -38,7 +38,7 @@ class Structure:
     joint : where they cross.
     target : the shape wanted.
     weighs : whether the shell is wanted there under its own weight.
-    carried : (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
+    dead_loads : (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
     """
 
     popped: PopUp
@@ -46,7 +46,7 @@ class Structure:
     joint: Joint
     target: Target
     weighs: bool = False
-    carried: Floats | None = None
+    dead_loads: Floats | None = None
 
     @property
     def mesh(self) -> GridMesh:
@@ -62,14 +62,14 @@ class Structure:
 
     @cached_property
     def constant_load(self) -> Floats:
-        """(N, 3) the load that does not change with a design: the weight of joints, and what is carried [N]."""
+        """(N, 3) the load that does not change with a design: the weight of joints, and the dead loads [N]."""
         shell, edges = self.popped.shell, self.edges
         result = np.zeros((len(shell.like), 3))
         nodes = slice(0, shell.first_angle)
         if self.weighs:
             result[nodes, 2] = -STANDARD_GRAVITY * shell.mass[nodes, 2] - edges.load(len(result))[nodes, 2]
-        if self.carried is not None:
-            result[: len(self.carried)] += self.carried
+        if self.dead_loads is not None:
+            result[: len(self.dead_loads)] += self.dead_loads
         return result
 
     def load(self, edges: EdgeProperties) -> Floats | None:
@@ -79,7 +79,7 @@ class Structure:
         ----------
         edges : of the design.
         """
-        if not self.weighs and self.carried is None:
+        if not self.weighs and self.dead_loads is None:
             return None
         return edges.load(len(self.popped.shell.like)) + self.constant_load
 
