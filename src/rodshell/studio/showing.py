@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rodshell.output.grid import joints_of, rods_of
+from rodshell.output.grid import rods_of
 from rodshell.output.viewer import scene_of
 from rodshell.results import wording
 from rodshell.results.verdict import facts as facts_of
@@ -38,7 +38,7 @@ def checked_facts(form: "Form", job: "Job") -> tuple[dict[str, Any], bytes]:
 
 
 def _shown(form: "Form", job: "Job", archive: "Archive", *, checked: bool) -> tuple[dict[str, Any], bytes]:
-    scene = scene_of(archive)
+    scene = scene_of(archive, schedules=checked)
     facts: dict[str, Any] = {
         "name": archive.name,
         "status": form.status,
@@ -76,18 +76,12 @@ def _figures(archive: "Archive") -> list[tuple[str, str]]:
     return rows
 
 
-def _plan(archive: "Archive") -> dict[str, Any]:
-    """The flat grid in metres: rods by name with both ends and the length, and joints."""
-    rods = rods_of(archive)
-    return {
-        "rods": [
-            {"id": rod.id, "family": rod.family, "ends": rod.flat.ravel().tolist(), "length": rod.cut_length}
-            for rod in rods
-        ],
-        "joints": [
-            {"id": joint.id, "at": rods[joint.rods[0]].point(joint.at[0]).tolist()} for joint in joints_of(rods)
-        ],
-    }
+def _plan(archive: "Archive") -> list[dict[str, Any]]:
+    """The flat grid: rods by name with both ends and the length [m]."""
+    return [
+        {"id": rod.id, "family": rod.family, "ends": rod.flat.ravel().tolist(), "length": rod.cut_length}
+        for rod in rods_of(archive)
+    ]
 
 
 def _handles(form: "Form") -> Mapping[str, Any] | None:

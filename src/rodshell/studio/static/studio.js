@@ -254,7 +254,7 @@ function refreshControls() {
 // The flat plan
 
 function showPlan() {
-  const svg = byId("plan").querySelector("svg"), { rods } = facts.plan;
+  const svg = byId("plan").querySelector("svg"), rods = facts.plan;
   if (!rods.length) return svg.replaceChildren();
   const draw = (name, attributes) => {
     const element = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -286,7 +286,7 @@ function toggle(id) {
 
 function markRod(id) {
   for (const line of byId("plan").querySelectorAll("line[data-line]")) line.classList.toggle("marked", line.dataset.line === id);
-  const rod = facts?.plan.rods.find(one => one.id === id);
+  const rod = facts?.plan.find(one => one.id === id);
   const size = rod && (rod.length < 10 ? `${(1000 * rod.length).toFixed(1)} mm` : `${rod.length.toFixed(4)} m`);
   byId("plan").querySelector("figcaption").textContent = rod ? `${id}: cut length ${size}. Click to leave it out.` : "Point at a rod; a click leaves it out.";
 }
@@ -523,6 +523,7 @@ function wire() {
   const plan = byId("plan");
   plan.addEventListener("pointerover", ({ target }) => { const id = target.dataset?.rod; if (id) { markRod(id); viewer.select("rod", id); } });
   plan.addEventListener("click", ({ target }) => { if (target.dataset?.rod) toggle(target.dataset.rod); });
+  viewer.on("hover", found => { if (found) markRod(found.kind === "rod" ? found.id : found.id.split("/")[0]); });
   viewer.on("pick", found => markRod(found?.kind === "rod" ? found.id : found?.id.split("/")[0]));
   viewer.canvas.addEventListener("click", event => {
     const place = drawing && onTarget(event);

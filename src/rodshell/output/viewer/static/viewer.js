@@ -404,6 +404,12 @@ export function createViewer(root, { controls = true } = {}) {
     if (down && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < 4) pick(under(event));
     down = null;
   });
+  let looking = false;
+  canvas.addEventListener("pointermove", event => {  // at most once a frame
+    if (!listeners.hover || event.buttons || looking || !scene) return;
+    looking = true;
+    requestAnimationFrame(() => { looking = false; emit("hover", under(event)); });
+  });
   orbit.addEventListener("change", later);
   slider.addEventListener("input", () => { stop(); touched.stage = true; later(); });
   choice.addEventListener("change", () => { touched.colour = true; later(); });
