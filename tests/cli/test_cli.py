@@ -60,6 +60,7 @@ class FakeForm:
     options: OutputOptions
     inputs: dict[str, bytes]
     search: Search | None
+    refined: None
 
     told: ClassVar = list[OutputOptions]()
 
