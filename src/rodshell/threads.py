@@ -27,6 +27,8 @@ def in_threads(work: Callable[[int, int], object], count: int, *, most: int | No
     ------
     BaseException : what a piece of work raised; of several one.
     """
+    if count == 0:
+        return
     waiting, failures = iter(range(count)), list[BaseException]()
 
     def run(thread: int) -> None:

@@ -240,9 +240,9 @@ class _Builder:
         clamped: bool,
         twist: bool | None,
     ) -> None:
-        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
-        for item in self.rods:
+        for item in rod if isinstance(rod, Sequence) else (rod,):
             instance("rod", item, Rod)
+        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
         self.joints, self.joint_of = _kinds(_per_item(joint or Ball(), len(mesh.grid.crossings), "crossings"))
         if isinstance(joint, Sequence):
             refuse_mixtures(mesh.joint_nodes, joint)

@@ -141,6 +141,7 @@ class Multifrontal:
         blocks = blocks_of(indptr, indices, begin)
         order = _minimum_degree(indptr, indices) if coordinates is None else _dissected(coordinates, blocks)
         self.plan = plan_of(indptr, indices, blocks, order)
+        self.parts = self.plan.each
         self._spare = list[_Scratch]()  # scratch memory that no factorisation is using
 
     @property
@@ -166,7 +167,7 @@ class Multifrontal:
         """Permuted unknowns (m,) of the plan's last part, if it is not the only one; and the place (n,) of each unknown
         among them, or -1."""
         plan, place = self.plan, np.full(len(self.indptr) - 1, -1)
-        *separate, last = plan.each
+        *separate, last = self.parts
         columns = [np.arange(plan.first[s], plan.first[s + 1]) for s in last.tolist()] if separate else []
         unknowns = np.concatenate([*columns, np.arange(0)])
         place[unknowns] = np.arange(len(unknowns))
@@ -201,20 +202,21 @@ class MultifrontalFactors:
     def _substitute(self, right: Floats) -> Floats:
         assert self._memory is not None, GIVEN_AWAY
         plan, (panels, pivots) = self._solver.plan, self._memory
-        x, parts = right[plan.order], plan.each
+        x, parts = right[plan.order], self._solver.parts
         fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
         memory = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in range(threads() if last else 1)]
         above, place = self._solver.above
-        carried = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
+        sums = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
 
         def rise(part: int, thread: int) -> None:
-            _forward(parts[part], x, place, carried[part], *fronts, *memory[thread])
+            _forward(parts[part], x, place, sums[part], *fronts, *memory[thread])
 
         def descend(part: int, thread: int) -> None:
             _backward(parts[part], x, *fronts, pivots, *memory[thread])
 
-        in_threads(rise, last, most=len(memory))
-        x[above] += carried.sum(axis=0)
+        if last:
+            in_threads(rise, last, most=len(memory))
+            x[above] += sums.sum(axis=0)
         _forward(parts[last], x, NONE_ABOVE, NOTHING, *fronts, *memory[0])
         descend(last, 0)
         in_threads(descend, last, most=len(memory))
@@ -325,9 +327,9 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy", nogil=True)
-def _forward(part, x, above, carried, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
+def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
     """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
-    added to `carried` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
+    added to `sums` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
     for s in part:
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
@@ -340,7 +342,7 @@ def _forward(part, x, above, carried, first, row_start, rows, panel_start, panel
         for i in range(width, size):
             row = rows[row_start[s] + i]
             if len(above) > 0 and above[row] >= 0:
-                carried[above[row]] += values[i]
+                sums[above[row]] += values[i]
             else:
                 x[row] += values[i]
 
