@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         StabilityError,
     )
     from rodshell.fabrication import Fabrication, fabricate
-    from rodshell.form import Form
+    from rodshell.form import Form, check_loads
     from rodshell.formfinding import (
         Agreement,
         Bound,
@@ -63,6 +63,17 @@ if TYPE_CHECKING:
         Spring,
     )
     from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+    from rodshell.loads.kinds import (
+        LineLoad,
+        Loads,
+        PointLoad,
+        SelfWeight,
+        Settlement,
+        Snow,
+        Stability,
+        Temperature,
+        Wind,
+    )
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -97,7 +108,7 @@ _HOMES = {
         "StabilityError",
     ),
     "rodshell.fabrication": ("Fabrication", "fabricate"),
-    "rodshell.form": ("Form",),
+    "rodshell.form": ("Form", "check_loads"),
     "rodshell.formfinding": (
         "Agreement", "Bound", "Boundary", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed", "agreement",
         "drape", "map_back", "pop_up", "trim",
@@ -109,6 +120,9 @@ _HOMES = {
     "rodshell.job": ("Job", "find_form", "pop_up_table"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
+    "rodshell.loads.kinds": (
+        "LineLoad", "Loads", "PointLoad", "SelfWeight", "Settlement", "Snow", "Stability", "Temperature", "Wind",
+    ),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
@@ -133,13 +147,14 @@ __all__ = [
     "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse", "Ellipsoid",
     "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform",
     "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
-    "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Motion", "NetLimitError",
-    "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads",
-    "PopUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports",
-    "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries", "Trimmed",
-    "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export", "fabricate",
-    "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save", "search",
-    "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
+    "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "LineLoad", "Linker", "Loads", "Material", "Motion",
+    "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement",
+    "PointLoad", "PointLoads", "PopUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads",
+    "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow",
+    "Spring", "Stability", "StabilityError", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube", "Verdict",
+    "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export",
+    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save",
+    "search", "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
 ]  # fmt: skip
 
 

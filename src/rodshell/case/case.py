@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from pydantic import Field
 
+from rodshell.case.load_tables import CombinationTable, LoadKinds, StabilityTable
 from rodshell.case.rod_tables import BallTable, JointKinds, RodTable
 from rodshell.case.stage_tables import (
     ChecksTable,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.popup import Ends
     from rodshell.joints import Joint
     from rodshell.layout import GridLayout
+    from rodshell.loads.kinds import Loads
     from rodshell.output.options import OutputOptions
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
@@ -67,12 +69,21 @@ class Case(Table):
     checks: ChecksTable = ChecksTable()
     fabrication: FabricationTable = FabricationTable()
     drawings: DrawingsTable = DrawingsTable()
+    loads: tuple[LoadKinds, ...] = Field(default=(), description="loads, each in a table [[loads]]; in a case file only")
+    combinations: tuple[CombinationTable, ...] = Field(
+        default=(), description="combinations of loads, each in a table [[combinations]]; in a case file only"
+    )
+    stability: StabilityTable = StabilityTable()
 
     @property
     def held_objects(self) -> dict[str, Held]:
         """Objects that tables were made of and that their keys do not describe, by the name of the table."""
         tables = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: table.held for name, table in tables.items() if table.held is not None}
+        return {
+            name: table.held
+            for name, table in tables.items()
+            if isinstance(table, Table) and table.held is not None
+        }
 
     def to_toml(self) -> str:
         """The full input as a case file with SI numbers: loading it from anywhere gives the same case.
@@ -187,6 +198,7 @@ class Case(Table):
         target = target or built(self.target)
         layout = built(self.layout, target)
         self._require_stock(layout)
+        self.built_loads()
         rod = self.rod_on(target, layout, anchor=anchor)
         self.output_options().require_known_stress(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
@@ -214,6 +226,28 @@ class Case(Table):
         ):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")
+
+    def built_loads(self) -> "Loads | None":
+        """What the shell is to be checked under; None where the case has no loads.
+
+        Raises
+        ------
+        InputError : two loads or two combinations of one name, and what `Loads` refuses.
+        """
+        if not self.loads and not self.combinations:
+            return None
+        from rodshell.loads.kinds import Loads
+
+        for tables, rows in (("loads", self.loads), ("combinations", self.combinations)):
+            names = [row.name for row in rows]
+            for name in names:
+                if names.count(name) > 1:
+                    raise InputError(f"{tables} has {shown(name)} twice: give each a name of its own")
+        return Loads(
+            loads={load.name: load.build() for load in self.loads},
+            combinations={row.name: dict(row.factors) for row in self.combinations},
+            stability=self.stability.build(),
+        )
 
     def output_options(self) -> "OutputOptions":
         """Options of checks, fabrication and drawings.
@@ -243,11 +277,12 @@ def built(table: Table, *arguments: object) -> Any:
     return table.held.value if table.held is not None else table.build(*arguments)  # type: ignore[attr-defined]
 
 
-def toml_text(case: Mapping[str, Mapping[str, object]]) -> str:
-    """One [table] for each entry, its own tables inline, keys in the order given."""
+def toml_text(case: Mapping[str, Any]) -> str:
+    """One [table] for each entry, one [[table]] for each in a row, their own tables inline, keys in the order given."""
     tables = [
-        f"[{name}]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in table.items())
-        for name, table in case.items()
+        f"{head}\n" + "".join(f"{key} = {_value(value)}\n" for key, value in table.items())
+        for name, entry in case.items()
+        for head, table in ([(f"[{name}]", entry)] if isinstance(entry, Mapping) else [(f"[[{name}]]", row) for row in entry])
     ]
     return "\n".join([HEADER, *tables])
 

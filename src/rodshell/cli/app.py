@@ -13,6 +13,7 @@ from rodshell.errors import InputError, OutOfTimeError, OutputWarning, RodshellE
 COMMANDS = {
     "form": "Find the flat grid that pops up into a target.",
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
+    "check": "Check a case, or an earlier result, under loads.",
     "export": "Write drawings, schedules, models or the report of an earlier result again.",
     "warmup": "Compile all kernels in advance, once.",
     "paper": "Compute a figure of the paper again, with the errors.",

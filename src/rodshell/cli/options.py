@@ -1,7 +1,7 @@
 """Options of the commands: keys of the case file, and those that several commands have."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
@@ -122,6 +122,10 @@ class RunOptions:
     force: bool
     as_json: bool
     quiet: bool
+
+    def into(self, folder: str) -> "RunOptions":
+        """The same with another folder for the results."""
+        return replace(self, out=folder)
 
 
 FORCE = click.option(

@@ -12,6 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, ValidationError
 
 from rodshell.errors import OutputError
+from rodshell.results.loaded import LoadCases
 from rodshell.results.records import (
     Agreement,
     Bent,
@@ -286,6 +287,7 @@ class Results(Record):
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
+    loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and end condition")
     deployment: Deployment | None = key("the shell from flat to popped up")
     contact: Contact | None = key("contact of rods with each other")
     other_shapes: ByEnds[OtherShapes] = by_ends("other stable shapes on the same supports")
@@ -421,6 +423,10 @@ def contradictions(results: Results) -> Iterator[str]:
     counts = {"footprint": results.footprint, "boundary": results.boundary, "end_tangents": results.end_tangents}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}
+    for name, by_ends in results.loads.items():
+        for support, loaded in by_ends.items():
+            where = f"loads.{name}.{support}"
+            counts |= {f"{where}.reactions": loaded.reactions, f"{where}.moments": loaded.moments}
     for name, points in counts.items():
         if len(points) not in (0, 2 * len(ids)):
             yield f"{name} has {len(points)} points for {len(ids)} rods: there must be two for each"
@@ -435,6 +441,10 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
             yield from ((f"joint_loads.{support}[{k}].rods", name) for name in load.rods)
     bent = results.bending.shapes() if results.bending else {}
     yield from ((f"bending.{shape}.rod", worst.rod) for shape, worst in bent.items() if worst.rod is not None)
+    for name, by_ends in results.loads.items():
+        for support, loaded in by_ends.items():
+            if loaded.governs is not None:
+                yield f"loads.{name}.{support}.governs.rod", loaded.governs.rod
     for shape in ("pinned", "clamped", "deployment"):
         nearest = results.contact.of(shape) if results.contact else None
         yield from ((f"contact.{shape}.rods", name) for name in (nearest.rods if nearest else None) or ())
