@@ -62,7 +62,7 @@ if TYPE_CHECKING:
         SharedDofs,
         Spring,
     )
-    from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, mesh_grid, straight_rods
+    from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
     from rodshell.loads.kinds import (
         LineLoad,
         Loads,
@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from rodshell.solve.problem import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.rod_statics import RodLoads, RodShape, RodSupports, solve_rod
     from rodshell.solve.simulate import Sample, TimeSeries, simulate
+    from rodshell.sweeps import read_sweep, sweep
     from rodshell.targets import (
         Cap,
         Disc,
@@ -119,7 +120,7 @@ _HOMES = {
     "rodshell.formfinding.search": ("search",),
     "rodshell.job": ("Job", "find_form", "pop_up_table"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
-    "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "mesh_grid", "straight_rods"),
+    "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
     "rodshell.loads.kinds": (
         "LineLoad", "Loads", "PointLoad", "SelfWeight", "Settlement", "Snow", "Stability", "Temperature", "Wind",
     ),
@@ -135,6 +136,7 @@ _HOMES = {
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
     "rodshell.solve.rod_statics": ("RodLoads", "RodShape", "RodSupports", "solve_rod"),
     "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
+    "rodshell.sweeps": ("read_sweep", "sweep"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
@@ -149,12 +151,12 @@ __all__ = [
     "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
     "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "LineLoad", "Linker", "Loads", "Material", "Motion",
     "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement",
-    "PointLoad", "PointLoads", "PopUp", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads",
-    "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow",
-    "Spring", "Stability", "StabilityError", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube", "Verdict",
-    "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export",
-    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "save",
-    "search", "simulate", "solve_rod", "straight_rods", "surface_from", "trim",
+    "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod",
+    "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell",
+    "Snow", "Spring", "Stability", "StabilityError", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube",
+    "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export",
+    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "read_sweep",
+    "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from functools import cached_property
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,6 +37,9 @@ from rodshell.results.from_form import results_of, states_of, with_seam_forces
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance
+
+if TYPE_CHECKING:
+    from anywidget import AnyWidget
 
 Stages = PatchForm | PatchedForm
 
@@ -282,6 +285,20 @@ class Form:
         wanted = wanted_kinds(kinds)  # before the checks, which take time
         return save(self.archive(options=options), folder, wanted, force=force)
 
+    def widget(self) -> "AnyWidget":
+        """The 3D viewer for a notebook, whose `picked` is the id of the rod or joint that was clicked last.
+
+        Raises
+        ------
+        InputError : anywidget is not installed, or there is no shape in space.
+        """
+        from rodshell.output.viewer import scene_of, widget_of
+
+        scene = scene_of(self._archive)
+        if scene is None:
+            raise InputError("this form has no shape in space to look at: its verdict says why")
+        return widget_of(scene)
+
     # Python manners
 
     def __repr__(self) -> str:
@@ -292,9 +309,11 @@ class Form:
         return f"<rodshell.Form of {name}{parts}: {rods} rods, {found}, {self.status}>"
 
     def _repr_html_(self) -> str:
-        """The shell in its final shape and what it is worth, as notebooks show it."""
-        archive = self._archive
-        picture = picture_svg(archive, archive.final or "flat")
+        """The 3D viewer with all shapes, and what they are worth, as notebooks show it."""
+        from rodshell.output.viewer import frame_html, scene_of
+
+        scene = scene_of(self._archive)
+        picture = picture_svg(self._archive, "flat") if scene is None else frame_html(scene)
         level, reasons = self.verdict.level, "".join(f"<li>{escape(reason)}</li>" for reason in self.verdict.reasons)
         return f"<div>{picture}<p>{escape(repr(self))}: <b>{level}</b></p><ul>{reasons}</ul></div>"
 
@@ -348,7 +367,7 @@ class Form:
         if self.loaded is not None:
             results = loaded_results(results, self.footprint.mesh, self.loaded)
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
-        states = states_of(self.stages) | checked_states(checks)
+        states = states_of(self.stages) | checked_states(checks, self.rod.stretch_stiffness)
         states |= {} if self.loaded is None else loaded_states(self.loaded)
         return Archive(results, states, self.case.text(), self.inputs)
 

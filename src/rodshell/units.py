@@ -33,6 +33,7 @@ Kind = Literal[
     "mass per area",
     "force per length",
     "temperature",
+    "memory",
     "number",
 ]
 
@@ -94,7 +95,7 @@ _KINDS: dict[Kind, _Units] = {
     "mass per area": _Units("a mass per area", '"5 kg/m2"', _factors("1 kg/m2", "0.001 g/m2")),
     "force per length": _Units("a force per length", '"0.8 kN/m"', _factors("1 N/m", "1e3 kN/m N/mm")),
     "temperature": _Units("a change of temperature", '"30 K"', _factors("1 K °C degC C")),
-    "time": _Units("a time", '"10 ms"', _factors("1 s second seconds", "0.001 ms")),
+    "time": _Units("a time", '"10 ms"', _factors("1 s second seconds", "0.001 ms", "60 min minutes", "3600 h hours")),
     "stiffness": _Units("a stiffness", '"0.8 N/m"', _factors("1 N/m", "1e3 N/mm kN/m")),
     "density": _Units(
         "a density",
@@ -117,6 +118,7 @@ _KINDS: dict[Kind, _Units] = {
     "mass": _Units("a mass", '"1.2 kg"', _factors("1 kg", "0.001 g", "1000 t", "0.45359237 lb")),
     "mass per length": _Units("a mass per length", '"1.2 kg/m"', _factors("1 kg/m", "0.001 g/m", "1 g/mm")),
     "inertia per length": _Units("an inertia per length", '"0.001 kg m"', _factors("1 kgm", "0.001 gm", "0.001 kgmm")),
+    "memory": _Units("a size of memory", '"2 GB"', _factors("1 B", "1e6 MB", "1e9 GB", "1073741824 GiB")),
     "number": _Units("a plain number", "0.5", {}),
 }
 

@@ -24,14 +24,26 @@ needs_browser = pytest.mark.skipif(
     reason="no browser: install Chromium (Debian: apt-get install chromium)",
 )
 
-UNITS = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0, "mm": 1e-3, "m": 1.0}
+UNITS = {
+    "GPa": 1e9,
+    "MPa": 1e6,
+    "kPa": 1e3,
+    "Pa": 1.0,
+    "mm": 1e-3,
+    "m": 1.0,
+    "1/m": 1.0,
+    "kN": 1e3,
+    "N": 1.0,
+    "mN": 1e-3,
+}
 
 
 PROBE = """
 <script>
 window.requestAnimationFrame = work => setTimeout(() => work(performance.now()), 0);  // no screen, no frames
 addEventListener("load", () => {
-  const view = document.getElementById("view"), slider = document.getElementById("view-stage"), found = {};
+  const part = name => document.querySelector("#view " + name), found = {};
+  const view = part("canvas"), slider = part("input.stages");
   const picture = () => view.toDataURL().length + ":" + view.toDataURL().slice(-400);
   const wait = () => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)));
   const column = (table, k) => [...table.tBodies[0].rows].map(row => row.cells[k].textContent);
@@ -40,11 +52,11 @@ addEventListener("load", () => {
       found.stages = [];
       for (let k = 0; k <= +slider.max; k++) {
         slider.value = k; slider.dispatchEvent(new Event("input")); await wait();
-        found.stages.push([document.getElementById("view-caption").textContent, picture()]);
+        found.stages.push([part(".caption").textContent, picture()]);
       }
-      const choice = document.getElementById("view-colour");
+      const choice = part("select.colours");
       found.legends = [];
-      const stages = found.stages.map((_, k) => k), bar = document.getElementById("view-bar");
+      const stages = found.stages.map((_, k) => k), bar = part(".bar");
       for (const { value: kind } of choice.options) {
         choice.value = kind; choice.dispatchEvent(new Event("change"));
         for (const k of [...stages, ...stages.toReversed()]) {
@@ -60,8 +72,8 @@ addEventListener("load", () => {
       choice.value = "gap"; choice.dispatchEvent(new Event("change")); await wait(); found.gap = picture();
       choice.value = "stress"; choice.dispatchEvent(new Event("change")); await wait();
       found.stress = picture();
-      const at = (type, x, y) => new PointerEvent(type, { pointerId: 1, clientX: x, clientY: y });
-      view.setPointerCapture = () => {};
+      const at = (type, x, y) => new PointerEvent(type, { pointerId: 1, clientX: x, clientY: y, bubbles: true });
+      view.setPointerCapture = view.releasePointerCapture = () => {};
       view.dispatchEvent(at("pointerdown", 300, 300)); view.dispatchEvent(at("pointermove", 380, 340));
       view.dispatchEvent(at("pointerup", 380, 340)); await wait();
       found.turned = picture();
@@ -89,17 +101,22 @@ addEventListener("load", () => {
 """
 
 
+def browser_options(folder: Path) -> list[str]:
+    """Without a window, without a network; WebGL is drawn by the processor. The profile lies in `folder`."""
+    return [
+        "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+        "--window-size=1200,900", "--host-resolver-rules=MAP * ~NOTFOUND", "--proxy-server=127.0.0.1:9",
+        "--disable-background-networking", "--virtual-time-budget=30000", "--enable-logging=stderr", "--v=0",
+        f"--user-data-dir={folder / 'profile'}",
+    ]  # fmt: skip
+
+
 def open_report(page: Path, folder: Path) -> tuple[dict[str, Any], list[str]]:
     """What a user finds who moves and clicks everything, and all that the console says."""
     assert CHROMIUM, "no browser, and RODSHELL_BROWSER=required: install Chromium (Debian: apt-get install chromium)"
     probed = folder / "probed.html"
     probed.write_text(page.read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"), encoding="utf-8")
-    command = [
-        str(CHROMIUM), "--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1200,900",
-        "--host-resolver-rules=MAP * ~NOTFOUND", "--proxy-server=127.0.0.1:9", "--disable-background-networking",
-        "--virtual-time-budget=30000", "--enable-logging=stderr", "--v=0", f"--user-data-dir={folder / 'profile'}",
-        "--dump-dom", probed.as_uri(),
-    ]  # fmt: skip
+    command = [str(CHROMIUM), *browser_options(folder), "--dump-dom", probed.as_uri()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240)
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     match = re.search(r'data-found="([^"]*)"', done.stdout)
@@ -110,15 +127,23 @@ def open_report(page: Path, folder: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def coloured(made: Archive) -> dict[str, list[np.ndarray | None]]:
-    """By colour, what each frame of the view shows [Pa or m] at each entry of `rod_nodes`, where it is known."""
+    """By colour, what each stage of the view shows (Pa, m, 1/m, N) at each entry of `rod_nodes`, where it is known."""
     states, nodes = made.states, made.states["rod_nodes"]
     ends = [end for end in ("pinned", "clamped") if f"popped_{end}" in states]
     between = len(states["history"]) - 2 if "history" in states else 0
-    stress = [*states.get("history_stress", [])[1 : between + 1], *(states.get(f"stress_{end}") for end in ends)]
+    draped = [states["gap_draped"][nodes]] if "draped" in states else []
+    unknown: list[np.ndarray | None] = [None] * (len(draped) + 1)  # draped, and flat
     if not made.results.plain().get("target"):
-        return {"gap": [None, *(states[f"popped_{end}"][nodes, 2] for end in ends)]}
-    gap = [*[None] * between, *(states[f"gap_{end}"][nodes] for end in ends)]
-    return {"stress": [None, *stress], "gap": [None, *gap]}
+        found = {"gap": [None, *(states[f"popped_{end}"][nodes, 2] for end in ends)]}
+    else:
+        found = {"gap": [*draped, *[None] * (1 + between), *(states[f"gap_{end}"][nodes] for end in ends)]}
+    for kind in ("stress", "curvature"):
+        if f"{kind}_{ends[0]}" in states:
+            stages = states.get(f"history_{kind}", [])[1 : between + 1]
+            found[kind] = [*unknown, *stages, *(states[f"{kind}_{end}"] for end in ends)]
+    if f"force_{ends[0]}" in states:
+        found["force"] = [*unknown, *[None] * between, *(states[f"force_{end}"] for end in ends)]
+    return found
 
 
 def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
@@ -129,7 +154,7 @@ def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
         if shown is None or not caption:
             wrong += [f"{kind}, frame {k}: {caption!r}"] if (shown is None) != (not caption) else []
             continue
-        what, unit = re.match(r"([a-z ]+) in ([A-Za-z%]+)", caption).groups()  # type: ignore[union-attr]
+        what, unit = re.match(r"([a-z ]+) in ([A-Za-z%1/]+)", caption).groups()  # type: ignore[union-attr]
         values = shown / (strength / 100 if unit == "%" else UNITS[unit])
         named = re.search(r"here up to ([0-9.e+-]+)$", caption)
         (share, least), (stop, most) = [
@@ -138,11 +163,14 @@ def wrong_legends(made: Archive, found: dict[str, Any]) -> list[str]:
         low, high = (least + (end - share) * (most - least) / (stop - share) for end in (0, 1))
         true = {
             "word": what
-            == {"gap": "gap to target" if made.results.plain().get("target") else "height"}.get(
-                kind, "utilisation" if strength else "stress"
-            ),
+            == {
+                "gap": "gap to target" if made.results.plain().get("target") else "height",
+                "stress": "utilisation" if strength else "stress",
+                "curvature": "curvature",
+                "force": "normal force",
+            }[kind],
             "choice": found["kinds"][kind] == what,
-            "largest": kind == "gap" or (named and float(named[1]) == pytest.approx(values.max(), rel=6e-3)),
+            "largest": kind in ("gap", "force") or (named and float(named[1]) == pytest.approx(values.max(), rel=6e-3)),
             "range": low <= values.min() + 1e-3 * (high - low) and values.max() <= high + 1e-3 * (high - low),
         }
         wrong += [f"{kind}, frame {k}: {caption!r}, {ticks} ({name})" for name, right in true.items() if not right]

@@ -307,7 +307,8 @@ def test_report_needs_nothing_else(which: str, request: pytest.FixtureRequest) -
     parser.feed(page)
     assert parser.found == []
     assert parser.open == []
-    assert not re.search(r"https?://|@import|url\(", page)
+    names = "http://www.w3.org/1999/xhtml"  # the name of a namespace, which nothing is loaded from
+    assert not re.search(r"https?://|@import|url\(", page.replace(names, ""))
 
 
 def test_report_gives_the_verdict_first(out: Path) -> None:
@@ -315,7 +316,7 @@ def test_report_gives_the_verdict_first(out: Path) -> None:
     assert page.index('aria-label="Verdict"') < page.index("<strong>Check: ") < page.index("<h2>")
     assert "Supports that hold the rods&#39; directions (clamped) leave" in page
     assert "Design aid, not code compliance" in page
-    assert page.count("<figure>") == 7
+    assert page.count("<figure>") == 8
     assert "kind = &#34;hemisphere&#34;" in page
 
 

@@ -1,9 +1,11 @@
 """The report: what a reader meets first, that it needs nothing else, and that it works in a browser."""
 
-import base64
+import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,8 @@ import rodshell as rs
 from rodshell.checks import Deployment
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
-from rodshell.output.report import checks_table, key_figures, viewer_data, viewer_json
+from rodshell.output.report import checks_table, key_figures
+from rodshell.output.viewer import Scene, scene_of
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
 from rodshell.results.from_form import rod_type
@@ -32,6 +35,19 @@ def page_of(made: object, folder: Path) -> Path:
     return folder / "report.html"
 
 
+def read(scene: Scene | None) -> tuple[dict[str, Any], Callable[[dict[str, Any]], np.ndarray]]:
+    """The header of a scene, read from its bytes as a page does, and what reads an array."""
+    assert scene is not None
+    content = scene.content()
+    length = int.from_bytes(content[:4], "little")
+    data = content[4 + length :]
+
+    def array(part: dict[str, Any]) -> np.ndarray:
+        return np.frombuffer(data, dtype=np.dtype(f"<{part['type']}"), count=part["count"], offset=part["at"])
+
+    return json.loads(content[4 : 4 + length]), array
+
+
 REPORTS = {**{name: lambda name=name: archive(name) for name in TARGETS}, "table": table_archive, "breaking": breaking}
 
 
@@ -44,9 +60,9 @@ def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent
     assert console == []
     pictures = [picture for _, picture in found["stages"]]
     captions = [caption for caption, _ in found["stages"]]
-    assert len(set(captions)) == len(captions) == {"table": 2, "breaking": 6}.get(name, 10)
+    assert len(set(captions)) == len(captions) == {"table": 2, "breaking": 7}.get(name, 11)
     assert len(set(pictures)) == len(pictures)  # every stage looks different
-    assert captions[0] == "Flat, as cut and laid out"
+    assert captions[name != "table"] == "Flat, as cut and laid out"
     assert len(found["legends"]) == 2 * len(found["kinds"]) * len(captions)
     assert wrong_legends(made, found) == []
     if name != "table":
@@ -61,19 +77,18 @@ def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent
 
 def test_colours_of_the_view_mean_what_stands_at_their_own_bar() -> None:
     made = breaking()
-    data = viewer_data(made)
-    assert data is not None
-    unit = made.results.plain()["bending"]["strength"] / 100
-    for kind, factor in (("stress", unit), ("gap", 1e-3)):
-        for frame, shown in zip(data["frames"], coloured(made)[kind], strict=True):
-            assert (kind in frame) == (shown is not None)
+    header, array = read(scene_of(made))
+    units = {"stress": made.results.plain()["bending"]["strength"] / 100, "gap": 1e-3, "curvature": 1.0}
+    for kind, factor in units.items():
+        for stage, shown in zip(header["stages"], coloured(made)[kind], strict=True):
+            assert (kind in stage["colours"]) == (shown is not None)
             if shown is None:
                 continue
-            (share, least), *_, (stop, most) = [(at, float(text)) for at, text in frame[kind]["ticks"]]
-            step = (most - least) / (stop - share) / (len(data["palettes"][kind]) - 1)
-            bins = np.frombuffer(base64.b64decode(frame[kind]["bins"]), dtype=np.uint8)
-            read = least - share * (most - least) / (stop - share) + step * bins
-            np.testing.assert_allclose(read, shown / factor, atol=0.51 * step)
+            colours = stage["colours"][kind]
+            (share, least), *_, (stop, most) = [(at, float(text)) for at, text in colours["ticks"]]
+            step = (most - least) / (stop - share) / (len(header["palettes"][kind]) - 1)
+            values = least - share * (most - least) / (stop - share) + step * array(colours["bins"])
+            np.testing.assert_allclose(values, shown / factor, atol=0.51 * step)
 
 
 @pytest.fixture(scope="module")
@@ -87,39 +102,71 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_60_by_60_grid_is_usable_in_a_browser(large: Path, tmp_path: Path) -> None:
     found, console = open_report(large, tmp_path)
     assert console == []
-    assert len({picture for _, picture in found["stages"]}) == 10
+    assert len({picture for _, picture in found["stages"]}) == 11
 
 
-def test_frames_of_the_view_are_the_archive_s_shapes() -> None:
-    """Decoded again: every frame is a shape of the archive to 16 bits, and there are no others."""
+def test_stages_of_the_view_are_the_archive_s_shapes() -> None:
+    """Decoded again: every stage is a shape of the archive to 16 bits, and there are no others."""
     made = archive("dome")
-    data = viewer_data(made)
-    assert data is not None
-    nodes = made.states["rod_nodes"]
-    shapes = [*made.states["history"][:-1], made.states["popped_pinned"], made.states["popped_clamped"]]
-    cloud = np.concatenate([shape[nodes] for shape in shapes])
+    header, array = read(scene_of(made))
+    nodes, states = made.states["rod_nodes"], made.states
+    shapes = [states["draped"], *states["history"][:-1], states["popped_pinned"], states["popped_clamped"]]
+    cloud = np.concatenate([*(shape[nodes] for shape in shapes), states["target_points"]])
     low, size = cloud.min(axis=0), np.ptp(cloud, axis=0).max()
-    assert sum(data["rods"]) == len(nodes)
-    assert len(data["frames"]) == len(shapes)
-    for frame, shape in zip(data["frames"], shapes, strict=True):
-        places = np.frombuffer(base64.b64decode(frame["places"]), dtype="<u2").reshape(-1, 3)
-        np.testing.assert_allclose(low + places / 65535 * size, shape[nodes], atol=size / 65535)
-        assert ("gap" in frame) == frame["name"].startswith("popped")
-        assert ("stress" in frame) == (frame["name"] != "flat")
+    assert sum(rod["count"] for rod in header["rods"]) == len(nodes)
+    assert len(header["stages"]) == len(shapes)
+    for stage, shape in zip(header["stages"], shapes, strict=True):
+        points = array(stage["points"]).reshape(-1, 3)
+        np.testing.assert_allclose(low + points / 65535 * size, shape[nodes], atol=size / 65535)
+        assert ("gap" in stage["colours"]) == (stage["name"].startswith("popped") or stage["name"] == "draped")
+        assert ("stress" in stage["colours"]) == (stage["name"] not in ("flat", "draped"))
+    points = array(header["target"]["points"]).reshape(-1, 3)
+    gaps = rs.Hemisphere(0.2).gap(low + points / 65535 * size).distance
+    assert np.abs(gaps).max() < 1e-4
+
+
+def test_joints_and_supports_of_the_view_lie_where_the_schedules_say() -> None:
+    made = archive("dome")
+    header, array = read(scene_of(made))
+    last = header["stages"][-1]
+    points = array(last["points"]).reshape(-1, 3) / 65535
+    pairs = array(header["joints"]["entries"]).reshape(-1, 2)
+    np.testing.assert_allclose(points[pairs[:, 0]], points[pairs[:, 1]], atol=2 / 65535)
+    assert header["joints"]["ids"] == list(header["rows"]["joint"]["rows"])
+    assert [rod["id"] for rod in header["rods"]] == list(header["rows"]["rod"]["rows"])
+    ends = array(header["supports"]["entries"])
+    boundary = np.array(made.results.plain()["boundary"]) / header["size"]
+    offset = points[ends] - boundary
+    np.testing.assert_allclose(offset, np.tile(offset[0], (len(ends), 1)), atol=2 / 65535)
+    forces = array(header["supports"]["reactions"]["popped_pinned"]["forces"]).reshape(-1, 3)
+    assert np.linalg.norm(forces, axis=1).max() == pytest.approx(1, rel=1e-6)
+    np.testing.assert_allclose(forces.sum(axis=0), 0, atol=1e-4)
+
+
+def test_a_stage_of_eight_thousand_segments_is_small() -> None:
+    made = with_deployment(sample_archive(60, 6))
+    header, _ = read(scene_of(made))
+    entries = sum(rod["count"] for rod in header["rods"])
+    for stage in header["stages"]:
+        arrays = [stage["points"], *([stage["normals"]] if "normals" in stage else [])]
+        arrays += [colours["bins"] for colours in stage["colours"].values()]
+        size = sum(part["count"] * int(part["type"][1:]) for part in arrays)
+        assert size * 8000 / entries < 200e3
 
 
 def test_without_a_deployment_the_view_says_that_nothing_is_known_between(tmp_path: Path) -> None:
     made = sample_archive()
     page = page_of(made, tmp_path).read_text()
     assert "The deployment from flat was not followed: the shapes in between are not known." in page
-    assert len((viewer_data(made) or {})["frames"]) == 3  # flat, pinned, clamped, and nothing made up
+    names = [stage["name"] for stage in read(scene_of(made))[0]["stages"]]
+    assert names == ["draped", "flat", "popped_pinned", "popped_clamped"]  # and nothing made up
 
 
-def test_data_of_the_view_cannot_end_its_script() -> None:
+def test_names_in_the_view_cannot_end_its_script(tmp_path: Path) -> None:
     made = table_archive()
     rods = tuple(rod.changed(id="</script>") for rod in made.results.rods)
-    data = viewer_data(replace(made, results=made.results.changed(rods=rods)))
-    assert "</" not in viewer_json({**(data or {}), "names": {"gap": "</script>"}})
+    page = page_of(replace(made, results=made.results.changed(rods=rods)), tmp_path).read_text()
+    assert page.count("</script>") == page.count("<script")
 
 
 @pytest.mark.slow
@@ -156,7 +203,7 @@ def test_checks_are_in_words_and_numbers(tmp_path: Path) -> None:
     assert 0.1 < share < 1
     assert f"{100 * share:.2g} %" in page
     assert "Sum of all forces over the largest" in page
-    assert "utilisation in %" in page
+    assert read(scene_of(made))[0]["kinds"]["stress"] == "utilisation"
     assert re.search(r"<h2>Stock</h2>", page)
     assert "cut = &#34;LASER&#34;" in page
 
@@ -277,6 +324,7 @@ def test_a_page_for_others_names_files_and_no_folders() -> None:
 
 def test_no_drawing_of_the_page_claims_to_be_at_true_scale(tmp_path: Path) -> None:
     page = page_of(wished(), tmp_path).read_text(encoding="utf-8")
+    page = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     assert ": flat plan</text>" in page
     assert "1:1" not in page
 

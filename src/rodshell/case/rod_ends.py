@@ -11,7 +11,8 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
-from rodshell.layout import FlatGrid, straight_rods
+from rodshell.layout import FlatGrid, Profile, straight_rods
+from rodshell.results.records import Stiffness
 from rodshell.units import length_text, parse_quantity, read_unit, shown
 from rodshell.validation import instance
 
@@ -210,4 +211,14 @@ def read_result(folder: Path) -> ResultRods:
     if not rods:
         raise InputError(f"the result in {folder} has no rods")
     edge = results.layout.edge if results.layout else None
-    return ResultRods(RodEnds(straight_rods(flat, names=[rod.id for rod in rods]), final, edge), rod, joint)
+    grid = straight_rods(flat, names=[rod.id for rod in rods])
+    profiles = [_profile(rod.record.stiffness, rod.length) for rod in rods]
+    return ResultRods(RodEnds(grid.with_profiles(profiles), final, edge), rod, joint)
+
+
+def _profile(known: Stiffness | None, length: float) -> Profile | None:
+    """How the section of a rod of this length [m] changes along it."""
+    if known is None:
+        return None
+    inner = [at / length for at in known.at[1:-1]]
+    return Profile((0.0, *inner, 1.0), known.factors, known.varies or "size")

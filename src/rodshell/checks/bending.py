@@ -17,6 +17,9 @@ two strengths are given, and s over the strength is the criterion of Tsai and Hi
 
 The largest s lies on the outline: sigma is linear, and tau the gradient of a function of constant Laplacian, so that
 neither sigma^2 nor tau^2 has a maximum inside.
+
+Where a section changes along its rod, its fibres are as far from the axis as they are there, and torsion shears the
+outline in the pattern of the unchanged section, up to the largest stress of the changed one.
 """
 
 from dataclasses import dataclass
@@ -30,6 +33,7 @@ from rodshell.formfinding.finite_sections import node_normals
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.model.shell import last_edges
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
@@ -312,15 +316,20 @@ def bending(
     elif normals is not None:
         normal, geodesic = _parts(turns, tangents, normals)
     fibre, known = fibre_distance(rod), stress_is_known(rod, twisted=bool(twist.any()))
+    # the strain of a fibre k times as far is that of a bend k times as sharp
+    sharp, bends, sheared_by = curvature, components, twist
+    if (local := varied_at_nodes(mesh, rod)) is not None:
+        sharp, sheared_by = np.maximum(local.fibre1, local.fibre2) * curvature, local.shear * twist
+        bends = None if components is None else np.column_stack([local.fibre1, local.fibre2]) * components
     if fibre is not None:
-        bent = fibre * curvature if components is None else fibre_strain(rod, components[:, 0], components[:, 1])
+        bent = fibre * sharp if bends is None else fibre_strain(rod, bends[:, 0], bends[:, 1])
         strain = bent + np.abs(axial)
     if known and strain is not None:
-        sheared = torsion_stress(rod, twist) if twist.any() else np.zeros(len(twist))
-        if components is None:
+        sheared = torsion_stress(rod, sheared_by) if twist.any() else np.zeros(len(twist))
+        if bends is None:
             stress = np.hypot(fibre_modulus(rod) * strain, shear_weight * sheared)
         else:
-            stress = largest_stress(rod, components[:, 0], components[:, 1], axial, twist, weight=shear_weight)
+            stress = largest_stress(rod, bends[:, 0], bends[:, 1], axial, sheared_by, weight=shear_weight)
     return Bending(curvature, axial, stress, strain, normal, geodesic, twist, sheared)
 
 

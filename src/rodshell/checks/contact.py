@@ -28,8 +28,9 @@ from rodshell.geometry.frames import adapted, cross, dot, unit
 from rodshell.layout import FlatGrid, GridMesh
 from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell
+from rodshell.model.rod_sections import varied_at_nodes
 from rodshell.model.shell import UP
-from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+from rodshell.rods.section import Circle, Ellipse, RectangularSection, Rod, Tube
 
 FLATTEST = 0.17  # sine of the smallest angle at which rods are taken to cross: a net stops at 10 degrees
 SHORT = 0.5  # of a section's reach: edges are taken together up to this length, which leaves 0.2 % of it as sag
@@ -77,7 +78,7 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
     ----------
     mesh : all their meshes as one, in the order of the patches.
     """
-    outline = _Outline.of(rod)
+    outline = _Outline.of(rod, mesh)
     if outline is None:
         return Contact()
     sizes = np.cumsum([0, *(len(shell.mesh.grid.rods) for shell, _ in patches)])
@@ -109,7 +110,7 @@ def contact(
     directors : (e, 3) first material director of each edge; without, the normal of the shell.
     crossings : where rods meet by design; without, wherever their lines cross in the flat grid.
     """
-    outline = _Outline.of(rod)
+    outline = _Outline.of(rod, mesh)
     if outline is None:
         return Contact()
     by_design = _crossing_lines(mesh.grid.rods, outline) if crossings is None else crossings
@@ -139,23 +140,33 @@ def worst_contact(parts: Mapping[str, Contact]) -> Contact:
 
 @dataclass(frozen=True)
 class _Outline:
-    """A section's outline: half its width along m1 and along m2 [m], and whether it is a box or an ellipse."""
+    """A section's outline where it is widest: half its width along m1 and along m2 [m], whether it is a box or an
+    ellipse, and by what these widths are multiplied at each entry (k, 2) of `rod_nodes`; None: 1 everywhere."""
 
     x: float
     y: float
     box: bool
+    along: Floats | None = None
 
     @staticmethod
-    def of(rod: Rod) -> "_Outline | None":
+    def of(rod: Rod, mesh: GridMesh) -> "_Outline | None":
         section = rod.section
         if isinstance(section, Circle | Tube):
-            return _Outline(section.outer_radius, section.outer_radius, False)
-        if isinstance(section, Ellipse):
-            return _Outline(section.a, section.b, False)
-        if isinstance(section, RectangularSection):
-            return _Outline(0.5 * section.width, 0.5 * section.height, True)
-        known = section.fibre_distances if isinstance(section, GivenSection) else None
-        return None if known is None else _Outline(*known, True)
+            unchanged = _Outline(section.outer_radius, section.outer_radius, False)
+        elif isinstance(section, Ellipse):
+            unchanged = _Outline(section.a, section.b, False)
+        elif isinstance(section, RectangularSection):
+            unchanged = _Outline(0.5 * section.width, 0.5 * section.height, True)
+        elif section.fibre_distances is not None:
+            unchanged = _Outline(*section.fibre_distances, True)
+        else:
+            return None
+        if (local := varied_at_nodes(mesh, rod)) is None:
+            return unchanged
+        depths = np.column_stack([local.depth1, local.depth2])
+        widest = depths.max(axis=0)
+        boxed = unchanged.box or bool((local.depth1 != local.depth2).any())  # round rods on each other: their box
+        return _Outline(unchanged.x * widest[0], unchanged.y * widest[1], boxed, depths / widest)
 
     @property
     def round(self) -> bool:
@@ -171,9 +182,11 @@ class _Outline:
         """Clearance up to which rods are near to each other: a rod's breadth [m]."""
         return 2 * self.reach
 
-    def half_width(self, along_m1: Floats, along_m2: Floats) -> Floats:
-        """Of the section, seen along directions with these components."""
+    def half_width(self, along_m1: Floats, along_m2: Floats, share: Floats | None) -> Floats:
+        """Of sections with this `share` (n, 2) of the widths, seen along directions with these components."""
         parts = np.abs(self.x * along_m1), np.abs(self.y * along_m2)
+        if share is not None:
+            parts = share[:, 0] * parts[0], share[:, 1] * parts[1]
         return parts[0] + parts[1] if self.box else np.hypot(*parts)
 
 
@@ -205,6 +218,8 @@ class _Edges:
         self.tangent = unit(self.stop - self.start)
         self._directors = None if directors is None else directors[begins - self.rods]
         self._positions, self._begins = positions, begins
+        along = outline.along
+        self._share = None if along is None else np.maximum(along[begins], along[ends])
 
     @cached_property
     def across(self) -> tuple[Floats, Floats]:
@@ -292,10 +307,12 @@ class _Edges:
         return widest
 
     def _half_width(self, edges: Ints, n: Floats) -> Floats:
+        share = None if self._share is None else self._share[edges]
         if self.outline.round:
-            return self.outline.x * np.sqrt(np.maximum(1.0 - dot(n, self.tangent[edges]) ** 2, 0.0))
+            radius = self.outline.x if share is None else self.outline.x * share[:, 0]
+            return np.asarray(radius * np.sqrt(np.maximum(1.0 - dot(n, self.tangent[edges]) ** 2, 0.0)))
         m1, m2 = self.across
-        return self.outline.half_width(dot(n, m1[edges]), dot(n, m2[edges]))
+        return self.outline.half_width(dot(n, m1[edges]), dot(n, m2[edges]), share)
 
     @cached_property
     def _sines(self) -> Floats:

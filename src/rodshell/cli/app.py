@@ -15,6 +15,7 @@ COMMANDS = {
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
     "check": "Check a case, or an earlier result, under loads.",
     "export": "Write drawings, schedules, models or the report of an earlier result again.",
+    "sweep": "Compute many designs: combinations or samples of the values of some keys.",
     "warmup": "Compile all kernels in advance, once.",
     "paper": "Compute a figure of the paper again, with the errors.",
 }

@@ -9,10 +9,11 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.fabrication.cutting import Nesting, nest, splices
-from rodshell.layout import GridMesh
+from rodshell.layout import GridMesh, Profile
 from rodshell.layout.cells import Pattern, diagonals
 from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
+from rodshell.rods.varied import varied
 from rodshell.units import length_text
 
 SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no more bars
@@ -113,10 +114,26 @@ def fabricate(
             Diagonal((a, b), float(np.linalg.norm(flat[a] - flat[b])), float(np.linalg.norm(there[a] - there[b])))
             for a, b in diagonals(mesh.grid, pattern).tolist()
         )
+    mass = rod.mass_per_length * (cut + _more(mesh, rod, options))
     return Fabricated(
-        options, cut, cut * rod.mass_per_length, layers(len(rods), crossings.rods.tolist()),
-        made, pieces, nesting, bracing, warnings,
+        options, cut, mass, layers(len(rods), crossings.rods.tolist()), made, pieces, nesting, bracing, warnings
     )  # fmt: skip
+
+
+def _more(mesh: GridMesh, rod: Rod, options: Fabrication) -> Floats:
+    """(m,) length of the unchanged rod that weighs as much as a rod whose section changes is heavier than it [m]."""
+    more = np.zeros(len(mesh.grid.rods))
+    for k, line in enumerate(mesh.grid.rods):
+        if line.profile is not None:
+            profile, ends = line.profile, np.array([0.0, 1.0])
+            mean = profile.mean(partial(_stretch, rod, profile), ends[:1], ends[1:])[0, 0]
+            at_ends = _stretch(rod, profile, np.array([profile.factors[0], profile.factors[-1]])).sum()
+            more[k] = line.length * (mean - 1.0) + options.end_allowance * (at_ends - 2.0)
+    return more
+
+
+def _stretch(rod: Rod, profile: Profile, factors: Floats) -> Floats:
+    return varied(rod, profile.varies, factors).stretch
 
 
 def _splices(

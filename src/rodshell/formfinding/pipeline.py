@@ -4,7 +4,7 @@ The last stage is the agreement: how far the popped-up shell is from the target,
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, pi
 
 import numpy as np
@@ -248,6 +248,24 @@ def find_stages(
         if shell.report.converged
     }
     return PatchForm(name, rod, joint, ends, footprint, trimmed.boundary, popped, compared, trimmed.dropped, trimmed)
+
+
+def popped_again(
+    form: PatchForm, footprint: Footprint, boundary: Boundary, ends: Ends, *, progress: Progress = silent
+) -> PatchForm:
+    """The form of another flat grid on the same target: popped up and compared.
+
+    Parameters
+    ----------
+    form : whose target, rods and joints are kept.
+    footprint, boundary : the other grid, and where its rod ends go.
+    ends : the only end condition of the other form.
+    """
+    popped = pop_up(footprint, boundary, form.rod, ends=ends, joint=form.joint, progress=progress)
+    compared = {ends: agreement(popped, form.target)} if popped.report.converged else {}
+    return replace(
+        form, ends=(ends,), footprint=footprint, boundary=boundary, popped={ends: popped}, agreement=compared
+    )
 
 
 def pop_up_stages(

@@ -274,7 +274,7 @@ def elastic_joints(
     rod_nodes : of the mesh.
     crossings : (m,) indices of the grid's crossings.
     joints : m, the joint at each of them.
-    rod_stiffness : (rods, 3) EI1, EI2 and GJ of each rod [N m2].
+    rod_stiffness : (k, 3) EI1, EI2 and GJ at each rod node [N m2].
     size : number of blocks of the state.
     """
     stiff = np.array([joint.shear + joint.out_of_plane + joint.twist > 0 for joint in joints], dtype=bool)
@@ -381,7 +381,7 @@ def _compliance(rod_nodes: RodNodes, here: Ints, along: Floats, rod_stiffness: F
     rod_axes = np.zeros((len(here), 3, 3))  # rows: tangent, across it in the plane, normal
     rod_axes[:, 0, :2], rod_axes[:, 2, 2] = along, 1.0
     rod_axes[:, 1, 0], rod_axes[:, 1, 1] = -along[:, 1], along[:, 0]
-    about = half_edges[:, None] * rod_stiffness[rod_nodes.rods[here]][:, [2, 0, 1]]
+    about = half_edges[:, None] * rod_stiffness[here][:, [2, 0, 1]]
     return np.asarray(rod_axes.transpose(0, 2, 1) @ (rod_axes / about[:, :, None]))
 
 

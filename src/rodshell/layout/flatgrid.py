@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
+from rodshell.layout.profile import Profile
 
 Family = Literal["u", "v", "free"]
 
@@ -31,6 +32,7 @@ class FlatRod:
     origin : point of the rod's line at which s is 0 [m].
     direction : unit vector along the rod.
     virtual : whether the line only shapes the net and is not built.
+    profile : how its section changes along it; None: not at all.
     """
 
     name: str
@@ -41,6 +43,7 @@ class FlatRod:
     origin: tuple[float, float]
     direction: tuple[float, float]
     virtual: bool = False
+    profile: Profile | None = None
 
     @staticmethod
     def u(name: str, offset: float, start: float, end: float, *, virtual: bool = False) -> "FlatRod":
@@ -203,6 +206,25 @@ class FlatGrid:
     def joint_counts(self) -> Ints:
         """(m,) number of joints on each rod."""
         return np.bincount(self.crossings.rods.ravel(), minlength=len(self.rods))
+
+    def with_profiles(self, profiles: Profile | Sequence[Profile | None] | None) -> "FlatGrid":
+        """The same rods, whose sections change along them.
+
+        Parameters
+        ----------
+        profiles : the same for all rods, or one for each; None: the section does not change.
+
+        Raises
+        ------
+        InputError : not as many profiles as rods.
+        """
+        each = profiles if isinstance(profiles, Sequence) else (profiles,) * len(self.rods)
+        if len(each) != len(self.rods):
+            raise InputError(
+                f"the grid has {len(self.rods)} rods: give one profile for all, or one for each, not {len(each)}"
+            )
+        rods = tuple(replace(rod, profile=profile) for rod, profile in zip(self.rods, each, strict=True))
+        return replace(self, rods=rods)
 
     def without(self, leave_out: Callable[["FlatGrid"], Bools]) -> tuple["FlatGrid", list[str]]:
         """Remove rods repeatedly, until `leave_out` marks none.

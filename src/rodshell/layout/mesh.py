@@ -12,6 +12,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.layout.flatgrid import Crossings, FlatGrid, FlatRod, sides, whole_rods
+from rodshell.layout.profile import Profile
 
 CROWDED = 0.01  # of the usual edge: nodes closer to an end are left out: round-off in forces grows as the inverse cube
 
@@ -153,6 +154,10 @@ class GridMesh:
         inside = self._rod_of[width - 1 :] == self._rod_of[:last]
         columns = [self.rod_nodes[k : k + last][inside] for k in range(width)]
         return np.column_stack(columns)
+
+    def with_profiles(self, profiles: Profile | Sequence[Profile | None] | None) -> "GridMesh":
+        """The same mesh of rods whose sections change along them; arguments as of `FlatGrid.with_profiles`."""
+        return replace(self, grid=self.grid.with_profiles(profiles))
 
     def tributary_lengths(self) -> Floats:
         """Rod length (n,) that each node represents: half of every edge at the node [m]."""
@@ -401,7 +406,8 @@ def _moved_rod(name: str, rod: FlatRod, shift: Floats) -> FlatRod:
         x, y = np.array(rod.origin) + shift
         return replace(rod, name=label, origin=(float(x), float(y)))
     make, across = (FlatRod.u, shift[1]) if rod.family == "u" else (FlatRod.v, shift[0])
-    return make(label, rod.offset + float(across), rod.start + by, rod.end + by)
+    moved = make(label, rod.offset + float(across), rod.start + by, rod.end + by)
+    return replace(moved, profile=rod.profile)
 
 
 def _merged(meshes: list[GridMesh]) -> GridMesh:

@@ -36,6 +36,7 @@ from rodshell.joints.joint import elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
+from rodshell.model.rod_sections import RodSections
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, Stretch
 from rodshell.rods.isotropic import IsotropicBend
@@ -102,7 +103,8 @@ class Shell:
         Parameters
         ----------
         mesh : if joints are eccentric and its rods share nodes, `Shell.mesh` is that mesh in layers.
-        rod : the same for all, or one for each rod of the grid.
+        rod : the same for all, or one for each rod of the grid; where a rod of the grid has a profile, its section
+            changes along it. Linkers without a rod of their own have the unchanged section.
         clamped : each rod continues to a ghost node past its end that holds its direction there. The end's Voronoi
             length is half its last edge, so that the clamp acts exactly at the end (second order). A rod may spin in
             its clamp.
@@ -246,7 +248,8 @@ class _Builder:
         if eccentricity and not mesh.layered:
             mesh = mesh.in_layers(eccentricity)
         self.mesh, self.coupling = mesh, coupling
-        self.stiffness = np.array([(*item.bend_stiffnesses, item.twist_stiffness) for item in self.rods])
+        self.sections = RodSections.of(mesh, self.rods)
+        self.stiffness = self.sections.nodes
         self.isotropic = bool((self.stiffness[:, 0] == self.stiffness[:, 1]).all())
         needed = not self.isotropic or any(item.turns_frames for item in self.joints)
         self.twist = needed if twist is None else twist
@@ -267,8 +270,7 @@ class _Builder:
 
     def shell(self) -> Shell:
         mesh, parts = self.mesh, self.parts
-        axial = np.array([rod.stretch_stiffness for rod in self.rods])[mesh.edge_rods]
-        stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, axial)
+        stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, self.sections.stretch)
         bends = self._bends()
         linkers, linker_ties = self._linkers()
         copies = np.bincount(self.like)
@@ -291,13 +293,16 @@ class _Builder:
     def _bends(self) -> tuple[Elements, ...]:
         """Bending and twist of single rods. Isotropic rods bend without their frames: see `ElasticRod`."""
         mesh, parts = self.mesh, self.parts
-        per_length = self.stiffness[mesh.bend_rods] / mesh.voronoi_lengths[:, None]
+        inner = np.ones(len(mesh.rod_nodes), dtype=bool)
+        inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
+        per_length = self.stiffness[inner] / mesh.voronoi_lengths[:, None]
         edge = self.first_angle + np.arange(len(mesh.edges))
         same_rod = mesh.edge_rods[1:] == mesh.edge_rods[:-1]
         nodes, angles = parts.bends, np.column_stack([edge[:-1][same_rod], edge[1:][same_rod]])
         if len(self.ghosts):
             rows = np.column_stack([_inner_nodes(parts), parts.ends.ravel(), self.ghosts])
-            at_clamps = self.stiffness[np.repeat(np.arange(len(self.rods)), 2)] / (0.5 * last_edges(mesh)[:, None])
+            ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
+            at_clamps = self.stiffness[ends] / (0.5 * last_edges(mesh)[:, None])
         if self.isotropic:
             bends, stiffness = nodes, per_length[:, 0]
             if len(self.ghosts):
@@ -361,7 +366,8 @@ class _Builder:
             if self.apart:
                 flat[blocks] = flat[corners.blocks]
             if joint.rod is None:
-                stiffness = self.stiffness[corners.rods].mean(axis=1)
+                unchanged = np.array([(*rod.bend_stiffnesses, rod.twist_stiffness) for rod in self.rods])
+                stiffness = unchanged[corners.rods].mean(axis=1)
             else:
                 stiffness = np.tile([*joint.rod.bend_stiffnesses, joint.rod.twist_stiffness], (len(blocks), 1))
             linkers.append(LinkerBend.of(corners, blocks, flat, stiffness))
@@ -401,7 +407,7 @@ class _Builder:
         """Lumped mass of the blocks of the shared form."""
         mesh = self.mesh
         mass = np.zeros((int(self.like.max()) + 1, 3))
-        half = 0.5 * mesh.edge_lengths * np.array([rod.mass_per_length for rod in self.rods])[mesh.edge_rods]
+        half = 0.5 * mesh.edge_lengths * self.sections.mass
         for side in range(2):
             np.add.at(mass, mesh.edges[:, side], half[:, None])
         of_joints = 0.5 * np.array([joint.mass for joint in self.joints])
@@ -409,8 +415,7 @@ class _Builder:
             np.add.at(mass, nodes, of_joints[:, None])  # half on either rod
         if self.twist:
             first = mesh.node_count + len(self.ghosts)
-            rotary = np.array([rod.rotary_inertia for rod in self.rods])[mesh.edge_rods]
-            mass[first : first + len(mesh.edges), 0] = mesh.edge_lengths * rotary
+            mass[first : first + len(mesh.edges), 0] = mesh.edge_lengths * self.sections.rotary_inertia
         return mass
 
 

@@ -16,7 +16,7 @@ from rodshell.results.archive import SHELLS, Archive, made_once
 from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 
-Colour = Literal["gap", "stress"]
+Colour = Literal["gap", "stress", "curvature", "force"]
 
 # Maps of even steps in lightness, by a few control points.
 # Signed: dark in the middle, so that rods without a gap are drawn in ink on light paper.
@@ -25,6 +25,8 @@ STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
 HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
 STRESSES = ("stress_pinned", "stress_clamped")
+CURVATURES = ("curvature_pinned", "curvature_clamped", "history_curvature")
+FORCES = ("force_pinned", "force_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
 
@@ -64,11 +66,16 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
     ----------
     archive : the result that the shape belongs to.
     shape : the one whose rods are coloured.
-    colour : "stress", or "gap": signed distance to the target, or height where there is no target.
+    colour : "stress"; "curvature"; "force", along the rods; or "gap": signed distance to the target, or height where
+        there is no target.
     """
     nodes = archive.states["rod_nodes"]
     if colour == "stress":
         return None if shape.stress is None else _stress_scale(archive, shape)
+    if colour == "curvature":
+        return None if shape.curvature is None else _curvature_scale(archive, shape)
+    if colour == "force":
+        return None if shape.force is None else _force_scale(archive, shape)
     if shape.gap is not None:
         largest = _largest_of_all_gaps(archive)
         factor, unit = length_unit(largest)
@@ -127,6 +134,24 @@ def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     largest = float(np.max(shape.stress)) / unit
     limit = _rounded_up(max(top / unit, FINEST))
     return Scale(shape.stress / unit, 0.0, limit, STRESS, f"{caption}, here up to {largest:.3g}")
+
+
+def _curvature_scale(archive: Archive, shape: Shape) -> Scale:
+    assert shape.curvature is not None
+    top = max(float(np.max(values)) for name, values in archive.states.items() if name in CURVATURES)
+    limit = _rounded_up(max(top, FINEST))
+    caption = f"curvature in 1/m, here up to {float(np.max(shape.curvature)):.3g}"
+    return Scale(np.asarray(shape.curvature, dtype=float), 0.0, limit, STRESS, caption)
+
+
+def _force_scale(archive: Archive, shape: Shape) -> Scale:
+    """Normal forces; signed as gaps are, so that rods without a force are drawn in ink."""
+    assert shape.force is not None
+    known = [values for name, values in archive.states.items() if name in FORCES]
+    top = max(float(np.abs(values).max()) for values in known)
+    unit, name = (1e3, "kN") if top >= 1e3 else (1.0, "N") if top >= 1.0 else (1e-3, "mN")
+    limit = _rounded_up(max(top / unit, FINEST))
+    return Scale(shape.force / unit, -limit, limit, SIGNED, f"normal force in {name}, + tension")
 
 
 def _rounded_up(largest: float) -> float:

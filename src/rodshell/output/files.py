@@ -215,6 +215,7 @@ def _csv(content: Content) -> Files:
     }
     tables |= {"bracing": schedules.bracing_table} if fabrication and fabrication.bracing else {}
     tables |= {"stock": schedules.stock_table} if fabrication and fabrication.stock else {}
+    tables |= {"sections": schedules.sections_table} if any(rod.stiffness for rod in results.rods) else {}
     tables |= {"seams": schedules.seams_table} if results.seams else {}
     tables |= {"end_paths": schedules.end_paths_table} if "history" in archive.states else {}
     for name, table in tables.items():
@@ -297,7 +298,7 @@ KINDS: dict[str, Callable[[Content], Files]] = {
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
-_SCHEDULES = ("rods", "joints", "supports", "bracing", "stock", "seams", "end_paths")
+_SCHEDULES = ("rods", "joints", "supports", "bracing", "stock", "sections", "seams", "end_paths")
 _STAGES = ("flat", "stage_[0-9]*", "popped_pinned")
 
 NAMES: dict[str, list[str]] = {

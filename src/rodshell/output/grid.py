@@ -187,7 +187,8 @@ class Shape:
     name : "flat", "draped", "popped_pinned", "popped_clamped", or "stage_1", ... of the deployment.
     positions : (n, 3) [m].
     gap : (n,) signed distances to the target [m], where known.
-    stress : (k,) [Pa] and curvature : (k,) [1/m] at each entry of `rod_nodes`, where known.
+    stress : (k,) [Pa], curvature : (k,) [1/m] and force : (k,) normal forces [N], tension positive, at each entry of
+        `rod_nodes`, where known.
     """
 
     name: str
@@ -196,6 +197,7 @@ class Shape:
     gap: Floats | None = None
     stress: Floats | None = None
     curvature: Floats | None = None
+    force: Floats | None = None
 
     @property
     def flat(self) -> bool:
@@ -232,7 +234,8 @@ def shape_of(archive: Archive, name: str) -> Shape:
     ends = name.removeprefix("popped_")
     curvature, stress = (states.get(f"{what}_{ends}") for what in BENT)
     gap = states.get(GAPS.get(name, ""))
-    return Shape(name, CAPTIONS[name], np.asarray(states[name], dtype=float), gap, stress, curvature)
+    force = states.get(f"force_{ends}")
+    return Shape(name, CAPTIONS[name], np.asarray(states[name], dtype=float), gap, stress, curvature, force)
 
 
 def outlines(rods: Floats) -> list[Ints]:

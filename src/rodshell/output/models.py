@@ -27,7 +27,7 @@ from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.grid import STAGE, Shape, joint_places, joints_of, rods_of, shape_names, shape_of
 from rodshell.output.svg import tag
 from rodshell.results import Archive
-from rodshell.results.records import Section
+from rodshell.results.records import Section, Stiffness
 
 COMPRESSION = 3  # half the time of 6, for files that are 5 % longer
 COLOURS = {"CUT": (34, 40, 47), "MARK": (179, 55, 44), "FINAL": (31, 95, 139), "BOUNDARY-FINAL": (43, 122, 75)}
@@ -235,7 +235,11 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
         colours = np.split(palette[scale.bins], np.cumsum([len(rod.nodes) for rod in rods])[:-1])
     file = _Glb()
     for k, rod in enumerate(rods):
-        points, normals, faces = swept(shape.positions[rod.nodes], outline)
+        curve, along = shape.positions[rod.nodes], rod.record.stiffness
+        widths = (
+            None if along is None or "flat" not in archive.states else _widths(along, archive.states["flat"][rod.nodes])
+        )
+        points, normals, faces = swept(curve, outline, widths)
         shades = None if colours is None else np.repeat(colours[k], len(outline), axis=0)
         file.add(rod.id, points, normals, faces, shades)
     return file.content()
@@ -260,7 +264,17 @@ def section_outline(archive: Archive, size: float) -> Floats:
     return np.column_stack([b * np.cos(angle), a * np.sin(angle)])
 
 
-def swept(curve: Floats, outline: Floats) -> tuple[Floats, Floats, NDArray[np.uint32]]:
+def _widths(along: Stiffness, flat: Floats) -> Floats:
+    """(k, 2) widths across and up of a rod's section at its nodes, `flat` (k, 3), over those of the unchanged one."""
+    stations = np.linalg.norm(flat - flat[0], axis=1)
+    factors = np.interp(stations, along.at, along.factors)
+    same = np.ones_like(factors)
+    if along.varies in ("laths", "width", "a"):
+        return np.column_stack([same, factors if along.varies == "laths" else np.cbrt(factors)])
+    return np.column_stack([factors, same] if along.varies in ("height", "b") else 2 * [np.sqrt(np.sqrt(factors))])
+
+
+def swept(curve: Floats, outline: Floats, widths: Floats | None = None) -> tuple[Floats, Floats, NDArray[np.uint32]]:
     """A tube: points and normals (k s, 3), triangles (t, 3), the outline (s, 2) swept along a curve (k, 3).
 
     The frame has no twist and begins as upright as possible. The ends are open.
@@ -268,6 +282,7 @@ def swept(curve: Floats, outline: Floats) -> tuple[Floats, Floats, NDArray[np.ui
     Parameters
     ----------
     curve : (k, 3) nodes [m]; outline : (s, 2) corners across and up [m].
+    widths : (k, 2) by which these are multiplied at each node; None: by 1.
     """
     edges = unit(np.diff(curve, axis=0))
     up = np.array([0.0, 0.0, 1.0]) if abs(edges[0, 2]) < 0.9 else np.array([1.0, 0.0, 0.0])
@@ -276,7 +291,8 @@ def swept(curve: Floats, outline: Floats) -> tuple[Floats, Floats, NDArray[np.ui
     tangents = unit(np.vstack([edges[:1], edges[:-1] + edges[1:], edges[-1:]]))
     across = unit(cross(raised, tangents))
     raised = cross(tangents, across)
-    ring = outline[None, :, 0, None] * across[:, None] + outline[None, :, 1, None] * raised[:, None]
+    corners = outline[None] if widths is None else outline[None] * widths[:, None]
+    ring = corners[..., 0, None] * across[:, None] + corners[..., 1, None] * raised[:, None]
     points = (curve[:, None] + ring).reshape(-1, 3)
     s = len(outline)
     k, j = np.meshgrid(np.arange(len(curve) - 1), np.arange(s), indexing="ij")

@@ -5,31 +5,25 @@ and draws nothing between them.
 """
 
 import base64
-import json
 from collections.abc import Callable, Mapping, Sequence
-from importlib.resources import files
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rodshell.arrays import Floats, Ints
-from rodshell.output.colour_scale import Colour, Scale, scale_of
 from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, on_a_page
-from rodshell.output.grid import CAPTIONS, Shape, rods_of, shape_names, shape_of
-from rodshell.output.pictures import FAMILIES, SEGMENTS, picture_svg
+from rodshell.output.grid import CAPTIONS
+from rodshell.output.pictures import picture_svg
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
 from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
 from rodshell.output.svg import drawing_svg, inline
+from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import SHELLS, shown_case
 from rodshell.results.records import Agreement, Drape, Ends, PopUp, Record
 from rodshell.results.results import Clearance, Reactions, Stock
 from rodshell.results.verdict import ENDS, facts, unknown_below
-from rodshell.results.wording import Rounding, nice_ticks, percent, rounding_of, whole_percent
+from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
 
 IN_PAGE = ("supports", "elevations", "erection")
 FOLLOWED = "Every stage of the deployment is an equilibrium of the elastic grid with pinned ends{gaps}."
@@ -97,18 +91,16 @@ def _on_page(drawing: Drawing) -> str:
 
 
 def _view(archive: Archive) -> dict[str, Any] | None:
-    """The 3D view's data and script."""
+    """The scene, and the viewer's script and style."""
     from markupsafe import Markup
 
-    data = viewer_data(archive)
-    if data is None:
+    scene = scene_of(archive)
+    if scene is None:
         return None
-    script = files("rodshell.output").joinpath("templates/view.js").read_text(encoding="utf-8")
     return {
-        "data": Markup(viewer_json(data)),
-        "script": Markup(script),
-        "frames": len(data["frames"]),
-        "colours": sorted(data["names"].items(), reverse=True),  # stress first
+        "scene": base64.b64encode(scene.content()).decode(),
+        "script": Markup(viewer_script()),
+        "style": Markup(viewer_style()),
         "note": _note(archive),
     }
 
@@ -347,87 +339,3 @@ def _cut_list(plan: FlatPlan) -> list[Row]:
         (f"longest rod{bare}", f"{plan.rounding.mm(max(lengths, default=None)) or wording.UNKNOWN} mm"),
         (f"shortest rod{bare}", f"{plan.rounding.mm(min(lengths, default=None)) or wording.UNKNOWN} mm"),
     ]
-
-
-STEPS = 65535  # of a coordinate: 16 bits
-
-
-def viewer_data(archive: Archive) -> dict[str, Any] | None:
-    """The frames for templates/view.js, and what their colours are called; None where there is no shape in space."""
-    names = [name for name in shape_names(archive) if name != "draped"] or []
-    rods = [rod for rod in rods_of(archive) if len(rod.nodes)]
-    if len(names) < 2 or not rods:
-        return None
-    shapes = [_frame_shape(archive, name) for name in names]
-    entries, counts = _entries([len(rod.nodes) for rod in rods])
-    nodes = archive.states["rod_nodes"][entries]
-    cloud = np.concatenate([shape.positions[nodes] for shape in shapes])
-    low, size = cloud.min(axis=0), float(np.ptp(cloud, axis=0).max())
-    scales = [_scales(archive, shape) for shape in shapes]
-    frames = [
-        _frame(shape, coloured, nodes, entries, low, size) for shape, coloured in zip(shapes, scales, strict=True)
-    ]
-    kinds = {kind: scale for coloured in scales for kind, scale in coloured.items()}
-    return {
-        "frames": frames,
-        "palettes": {kind: scale.palette for kind, scale in kinds.items()},
-        "names": {kind: scale.caption.split(" in ")[0] for kind, scale in kinds.items()},
-        "rods": counts,
-        "inks": [FAMILIES[rod.family == "v"] for rod in rods],
-        "box": ((cloud.max(axis=0) - low) / size).tolist(),
-    }
-
-
-def viewer_json(data: dict[str, Any]) -> str:
-    """The data as they stand in a page: they cannot end its script element."""
-    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-
-
-def _frame_shape(archive: Archive, name: str) -> Shape:
-    """The flat grid is shown where the deployment begins."""
-    shape = shape_of(archive, name)
-    if shape.flat and "history" in archive.states:
-        return Shape("flat", shape.caption, np.asarray(archive.states["history"][0], dtype=float))
-    return shape
-
-
-def _entries(lengths: list[int]) -> tuple[Ints, list[int]]:
-    """Entries of `rod_nodes` that are drawn, at most about SEGMENTS, and how many of them each rod has."""
-    stride, first, parts = max(1, -(-sum(lengths) // SEGMENTS)), 0, []
-    for length in lengths:
-        parts.append(first + np.unique([*range(0, length - 1, stride), length - 1]))
-        first += length
-    return np.concatenate(parts).astype(np.intp), [len(part) for part in parts]
-
-
-def _scales(archive: Archive, shape: Shape) -> dict[Colour, Scale]:
-    """Scales by which the shape is coloured."""
-    kinds: tuple[Colour, ...] = () if shape.flat else ("stress", "gap")
-    found = {colour: scale_of(archive, shape, colour) for colour in kinds}
-    return {colour: scale for colour, scale in found.items() if scale is not None}
-
-
-def _frame(
-    shape: Shape, scales: dict[Colour, Scale], nodes: Ints, entries: Ints,
-    low: Floats, size: float,
-) -> dict[str, Any]:  # fmt: skip
-    coordinates = np.rint((shape.positions[nodes] - low) / size * STEPS).astype("<u2")
-    coloured: dict[str, Any] = {
-        colour: {"bins": _packed(scale.bins[entries].astype(np.uint8)), **_legend(scale)}
-        for colour, scale in scales.items()
-    }
-    return {"name": shape.name, "caption": shape.caption, "places": _packed(coordinates), **coloured}
-
-
-def _legend(scale: Scale) -> dict[str, Any]:
-    """What stands at the colour bar."""
-    ticks = nice_ticks(scale.low, scale.high, 4)
-    spread = scale.high - scale.low
-    return {
-        "caption": scale.caption,
-        "ticks": [[(value - scale.low) / spread, f"{value + 0.0:g}"] for value in ticks],
-    }
-
-
-def _packed(values: NDArray[Any]) -> str:
-    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode()

@@ -22,7 +22,15 @@ from rodshell.results.wording import FINEST, Rounding, rounding_of
 
 Rows = list[list[str]]
 Table = tuple[list[str], Rows]
-UNITS = {"mm": "mm", "kg": "kg", "MPa": "MPa", "deg": "\N{DEGREE SIGN}", "N": "N", "Nm": "N m"}
+UNITS = {
+    "Nm2": "N m\N{SUPERSCRIPT TWO}",
+    "mm": "mm",
+    "kg": "kg",
+    "MPa": "MPa",
+    "deg": "\N{DEGREE SIGN}",
+    "N": "N",
+    "Nm": "N m",
+}
 Show = Callable[[float | None], str]
 
 
@@ -93,6 +101,35 @@ def rods_table(archive: Archive, *, brief: bool = False) -> Table:
     chosen = [column for column in columns if column[1] or not brief]
     rows = [[cell(rod) for _, _, cell in chosen] for rod in rods_of(archive)]
     return _pruned(([name for name, _, _ in chosen], rows), brief)
+
+
+def sections_table(archive: Archive) -> Table:
+    """One row a segment of a rod whose section changes: its EI at both ends, linear between, and the length of the
+    section that changes, or the number of laths on each other.
+
+    Segments are measured from the cut end of the rod's start; allowances have the section of their end.
+    """
+    mm, known = rounding_of(archive.results).mm, archive.results.rod
+    unchanged = None if known is None else known.EI if known.EI is not None else known.EI1
+    columns = ["rod", "varies", "from_mm", "to_mm", "EI_from_Nm2", "EI_to_Nm2"]
+    columns += ["size_from_mm", "size_to_mm", "laths"]
+    rows = []
+    for rod in rods_of(archive):
+        along = rod.record.stiffness
+        if along is None:
+            continue
+        stops = [rod.from_cut_end(at) for at in along.at]
+        stops[0], stops[-1] = 0.0, rod.cut_length
+        for k in range(len(stops) - 1):
+            if along.at[k] == along.at[k + 1]:
+                continue
+            factors, sizes = along.factors[k : k + 2], along.sizes[k : k + 2]
+            stiffness = ["" if unchanged is None else _six(factor * unchanged) for factor in factors]
+            cut = [_significant(size, 1e3) for size in sizes] or ["", ""]
+            laths = f"{factors[0]:g}" if along.varies == "laths" else ""
+            row = [rod.id, along.varies or "", mm(stops[k]), mm(stops[k + 1]), *stiffness, *cut, laths]
+            rows.append(row)
+    return columns, rows
 
 
 def joints_table(archive: Archive, *, brief: bool = False) -> Table:

@@ -122,16 +122,18 @@ def judged(results: Results, *, drawings: Mapping[str, Any], name: str = "", rod
     return found.changed(verdict=verdict(found))
 
 
-def checked_states(checks: Checks) -> dict[str, NDArray[Any]]:
-    """States of the checks: curvature and stress at each entry of `rod_nodes`, and the deployment.
+def checked_states(checks: Checks, stretch_stiffness: float) -> dict[str, NDArray[Any]]:
+    """States of the checks: curvature, stress and normal force at each entry of `rod_nodes`, and the deployment.
 
     Parameters
     ----------
     checks : of all shells; states that were not checked are left out.
+    stretch_stiffness : EA of the rods [N].
     """
     states: dict[str, NDArray[Any]] = {}
     for ends, bent in checks.bending.items():
         states[f"curvature_{ends}"] = bent.curvature
+        states[f"force_{ends}"] = stretch_stiffness * bent.axial_strain
         if bent.stress is not None:
             states[f"stress_{ends}"] = bent.stress
     if checks.deployment is not None:

@@ -25,6 +25,7 @@ from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
 from rodshell.joints import joint_parameters
 from rodshell.joints.joint import Joint as JointModel
+from rodshell.layout import Profile
 from rodshell.nets import ChebyshevNet
 from rodshell.results.records import (
     Agreement,
@@ -44,6 +45,7 @@ from rodshell.results.records import (
     Seam,
     SeamForces,
     Solve,
+    Stiffness,
     StrongBending,
     Target,
     plain,
@@ -51,8 +53,10 @@ from rodshell.results.records import (
 from rodshell.results.results import Results
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod as RodModel
+from rodshell.rods.varied import sizes
 from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
+from rodshell.targets.surface_mesh import surface_mesh
 
 States = dict[str, NDArray[Any]]
 
@@ -89,8 +93,8 @@ def form_results(form: PatchForm) -> Results:
         layout=Layout.model_validate(form.layout.parameters()),
         rod=rod_type(form.rod),
         joint=_joint(form.joint),
-        **_grid(form.footprint, form.trimmed.boundary.points, form.trimmed.dropped),
-        end_tangents=form.trimmed.boundary.tangents.tolist(),
+        **_grid(form.footprint, form.boundary.points, form.dropped, form.rod),
+        end_tangents=form.boundary.tangents.tolist(),
         agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
         drape=_drape(form.draped),
         pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in form.popped.items()},
@@ -101,13 +105,21 @@ def form_results(form: PatchForm) -> Results:
 def form_states(form: PatchForm) -> States:
     """The states of a form in one piece."""
     states = _mesh_states(form.footprint)
-    states["draped"] = form.trimmed.positions
-    states["gap_draped"] = form.target.gap(form.trimmed.positions).distance - form.trimmed.mesh.heights
+    if (draped := form.boundary.draped) is not None:
+        states["draped"] = draped
+        states["gap_draped"] = form.target.gap(draped).distance - form.footprint.mesh.heights
+        states |= _target_states(form.target, draped)
     for ends, shell in form.popped.items():
         states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:
             states[f"gap_{ends}"] = form.agreement[ends].gaps
     return states
+
+
+def _target_states(target: TargetSurface, around: Floats) -> States:
+    """Triangles of the target under a shell, for pictures."""
+    points, faces = surface_mesh(target, around)
+    return {"target_points": points.astype(np.float32), "target_faces": faces.astype(np.uint32)}
 
 
 def table_results(table: PatchForm, name: str) -> Results:
@@ -121,7 +133,7 @@ def table_results(table: PatchForm, name: str) -> Results:
         **_head(name, table.status, table.warnings),
         rod=rod_type(table.rod),
         joint=_joint(table.joint),
-        **_grid(table.footprint, table.boundary.points, table.dropped),
+        **_grid(table.footprint, table.boundary.points, table.dropped, table.rod),
         pop_up={ends: _pop_up(shell.report, shell.start) for ends, shell in table.popped.items()},
     )
 
@@ -144,7 +156,7 @@ def patches_results(form: PatchedForm) -> Results:
         patches=tuple(_patch(form, name) for name in form.patches),
         seams=tuple(_seam(form, k) for k in range(len(form.seams))),
         net=_net(tightest).changed(error_estimate=max(net.error_estimate for net in nets)),
-        **_grid(form.footprint, form.boundary.points, form.dropped),
+        **_grid(form.footprint, form.boundary.points, form.dropped, form.rod),
         end_tangents=form.boundary.tangents.tolist(),
         agreement={ends: _agreement(gap) for ends, gap in form.agreement.items()},
         drape=_drape_of_all([_drape(found.draped) for found in form.patches.values()]),
@@ -157,6 +169,7 @@ def patches_states(form: PatchedForm) -> States:
     states = _mesh_states(form.footprint)
     states["draped"] = form.draped
     states["gap_draped"] = form.target.gap(form.draped).distance
+    states |= _target_states(form.target, form.draped)
     for ends, shell in form.popped.items():
         states[f"popped_{ends}"] = shell.positions
         if ends in form.agreement:
@@ -278,7 +291,7 @@ def _mesh_states(footprint: Footprint) -> States:
     return {"flat": mesh.flat, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
 
 
-def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, str]]) -> dict[str, Any]:
+def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, str]], kind: RodModel) -> dict[str, Any]:
     """Rods with their joints, and rod ends."""
     joints: list[list[RodJoint]] = [[] for _ in footprint.rods]
     crossings = footprint.mesh.grid.crossings
@@ -286,7 +299,7 @@ def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, s
         for (k, other), distance in zip((pair, pair[::-1]), at, strict=True):
             name, start = footprint.rods[other].name, footprint.rods[k].start
             joints[k].append(RodJoint(other=name, at=distance - start))
-    rods = tuple(
+    rods = [
         Rod(
             id=rod.name,
             family=rod.family,
@@ -297,13 +310,27 @@ def _grid(footprint: Footprint, boundary: Floats, dropped: Iterable[tuple[str, s
             joints=tuple(sorted(on_rod, key=lambda joint: joint.at)),
         )
         for rod, on_rod in zip(footprint.rods, joints, strict=True)
-    )
+    ]
+    for k, rod in enumerate(footprint.rods):
+        if rod.profile is not None:
+            rods[k] = rods[k].changed(stiffness=_stiffness(rod.profile, rod.length, kind))
     return {
-        "rods": rods,
+        "rods": tuple(rods),
         "dropped": tuple(Dropped(id=name, reason=reason) for name, reason in dropped),
         "footprint": footprint.points.tolist(),
         "boundary": boundary.tolist(),
     }
+
+
+def _stiffness(profile: Profile, length: float, kind: RodModel) -> Stiffness:
+    """Of a rod of this length [m] and kind."""
+    cut = sizes(kind, profile.varies, np.array(profile.factors))
+    return Stiffness(
+        at=tuple(length * share for share in profile.stations),
+        factors=profile.factors,
+        varies=profile.varies,
+        **({} if cut is None else {"sizes": tuple(cut.tolist())}),
+    )
 
 
 def _effort(report: SolveReport) -> dict[str, Any]:

@@ -11,9 +11,10 @@ from math import isfinite
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 Ends = Literal["pinned", "clamped"]
+FEWEST_STATIONS = 2
 
 
 def printable(text: str) -> str:
@@ -337,6 +338,26 @@ class Bent(Record):
     utilisation: Number = key("stress over the strength")
 
 
+class Stiffness(Record):
+    """Bending stiffness along a rod whose section changes, over that of the rods' section; linear between stations."""
+
+    at: Rows[Real] = rows("stations, from the start to the end; given twice where the factor steps", "m")
+    factors: Rows[Real] = rows("factor on EI (EI1 where there are two) at each station")
+    varies: Literal["size", "width", "height", "a", "b", "laths"] | None = key(
+        "what changes: all lengths of the section (size), one of them by its name, or the number of laths on each other"
+    )
+    sizes: Rows[Real] = rows("that length at each station; of a round rod its diameter; none of laths", "m")
+
+    @model_validator(mode="after")
+    def _as_many(self) -> Self:
+        if not len(self.at) == len(self.factors) >= FEWEST_STATIONS or len(self.sizes) not in (0, len(self.at)):
+            raise ValueError(
+                f"{len(self.at)} stations, {len(self.factors)} factors and {len(self.sizes)} sizes: there must be as "
+                "many of each, two or more"
+            )
+        return self
+
+
 class RodLine(Record):
     """A rod's flat geometry, its joints, and how it is cut."""
 
@@ -351,6 +372,7 @@ class RodLine(Record):
     mass: Number = key("mass as cut", "kg")
     layer: Whole | None = key("layer in which it is laid, 1 the lowest")
     splices: Rows[Real] = rows("splices, from the start", "m")
+    stiffness: Stiffness | None = key("where its section changes along it: its bending stiffness")
 
 
 class Rod(Bent, RodLine):

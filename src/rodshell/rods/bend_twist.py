@@ -116,6 +116,16 @@ class BendTwist:
         strains = self.strains(state)
         return replace(self, natural_curvature=strains[:, :2].copy(), natural_twist=strains[:, 2].copy())
 
+    @property
+    def parts(self) -> tuple[Self, ...]:
+        """The energies of each stiffness alone, EI1, EI2 and GJ, of which this one is the sum."""
+        bend, no_bend, no_twist = self.bend_stiffness, 0.0 * self.bend_stiffness, 0.0 * self.twist_stiffness
+        return (
+            replace(self, bend_stiffness=bend * [1.0, 0.0], twist_stiffness=no_twist),
+            replace(self, bend_stiffness=bend * [0.0, 1.0], twist_stiffness=no_twist),
+            replace(self, bend_stiffness=no_bend),
+        )
+
     def strains(self, state: Floats) -> Floats:
         """(b, 3) curvatures k1, k2 (integrated, [-]) and twist tau [rad] at `state` (N, 3).
 

@@ -51,6 +51,62 @@ class Elements(Protocol):
         ...
 
 
+def each_gradient(elements: Elements, state: Floats) -> Floats:
+    """(m, k, 3) gradient of each element alone [N, for angles N m].
+
+    It is that of the same energy on an exploded state, in which no two elements share a block. An energy is linear in
+    its stiffness, so this is also the derivative of the gradient by the logarithm of the element's stiffness.
+
+    Parameters
+    ----------
+    elements : m of them, with one stiffness each (see `parts` of those that have several).
+    state : (N, 3) node positions [m] and twist angles [rad].
+    """
+    apart, local = _exploded(elements, state)
+    gradient = np.zeros_like(local)
+    apart.evaluate(local, gradient)
+    return gradient.reshape(*elements.blocks.shape, 3)
+
+
+def each_curvature(elements: Elements, state: Floats, motion: Floats) -> Floats:
+    """(m,) v'Hv of each element alone for displacements `motion` (N, 3) [J], H being its Hessian.
+
+    Parameters
+    ----------
+    elements : m of them.
+    state : (N, 3) node positions [m] and twist angles [rad].
+    motion : (N, 3) displacements v [m, rad].
+    """
+    m, k = elements.blocks.shape
+    hessians = np.zeros((m, 3 * k, 3 * k))
+    elements.evaluate(state, np.zeros_like(state), hessians)
+    local = motion[elements.blocks].reshape(m, -1)
+    return np.asarray(np.einsum("mi,mij,mj->m", local, hessians, local))
+
+
+def add_product(elements: Elements, state: Floats, motion: Floats, result: Floats) -> None:
+    """Add the product of the Hessian with displacements to `result` (N, 3) [N].
+
+    Parameters
+    ----------
+    elements : the energy.
+    state : (N, 3) node positions [m] and twist angles [rad].
+    motion : (N, 3) displacements [m, rad].
+    result : (N, 3), to which the product is added.
+    """
+    m, k = elements.blocks.shape
+    hessians = np.zeros((m, 3 * k, 3 * k))
+    elements.evaluate(state, np.zeros_like(state), hessians)
+    forces = np.einsum("mij,mj->mi", hessians, motion[elements.blocks].reshape(m, -1))
+    np.add.at(result, elements.blocks, forces.reshape(m, k, 3))
+
+
+def _exploded(elements: Elements, state: Floats) -> tuple[Elements, Floats]:
+    """The elements on blocks of their own, and the state there."""
+    rows = np.arange(elements.blocks.size, dtype=elements.blocks.dtype).reshape(elements.blocks.shape)
+    return replace(elements, blocks=rows), state[elements.blocks].reshape(-1, 3)  # type: ignore[type-var]
+
+
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """Elastic edges [HQK Eq 1a].
@@ -108,6 +164,26 @@ class Stretch:
         motion : (N, 3) displacements [m].
         """
         return np.asarray(_elongation(state, motion, self.blocks, self.rest_lengths))
+
+    def pulls(self, state: Floats) -> Floats:
+        """(e, 2, 3) gradient of each edge alone under an axial force of 1 N, at `state` (N, 3) [-].
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
+        along = state[self.blocks[:, 1]] - state[self.blocks[:, 0]]
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        return np.stack([-along, along], axis=1)
+
+    def by_rest_lengths(self, state: Floats) -> Floats:
+        """(e,) change of each edge's axial force by its rest length, -EA |e| / l^2 [N/m], at `state` (N, 3).
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        """
+        return np.asarray(-self.stiffness * (1.0 + self.strains(state)) / self.rest_lengths)
 
     def add_axial(self, state: Floats, forces: Floats, gradient: Floats) -> None:
         """Add to `gradient` (N, 3) that of edges with the axial `forces` (e,) [N].

@@ -42,6 +42,11 @@ class IsotropicBend:
 
     __repr__ = brief
 
+    @property
+    def parts(self) -> tuple[Self, ...]:
+        """The energies of each stiffness alone: it has one."""
+        return (self,)
+
     def curvatures(self, state: Floats) -> Floats:
         """(b,) |kappa| = 2 tan(phi/2) at `state` (N, 3), integrated [-].
 
@@ -72,6 +77,12 @@ class IsotropicBendTwist(BendTwist):
     def relaxed(self, state: Floats) -> Self:
         """The same elements with the twist of `state` as their natural twist: these rods are naturally straight."""
         return replace(self, natural_twist=self.strains(state)[:, 2].copy())
+
+    @property
+    def parts(self) -> tuple[Self, ...]:
+        """The bending and the twist."""
+        bend, twist = self.bend_stiffness, self.twist_stiffness
+        return replace(self, twist_stiffness=0.0 * twist), replace(self, bend_stiffness=0.0 * bend)
 
     def evaluate(self, state: Floats, gradient: Floats, hessians: Floats = NO_HESSIANS) -> float:
         """Energy [J], gradient and Hessians: see `Elements.evaluate`."""

@@ -18,7 +18,15 @@ from rodshell.output.drawings.sheets import (
 )
 from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing, erection_drawing, supports_drawing
 from rodshell.output.options import PAPERS
-from rodshell.output.schedules import bracing_table, joints_table, rods_table, seams_table, stock_table, supports_table
+from rodshell.output.schedules import (
+    bracing_table,
+    joints_table,
+    rods_table,
+    seams_table,
+    sections_table,
+    stock_table,
+    supports_table,
+)
 from rodshell.results import Archive
 
 __all__ = ["drawing_set", "sheet_set"]
@@ -70,6 +78,8 @@ def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[fl
             sheets += table("Bracing", bracing_table(archive), paper)
     sheets += table("Rods", rods_table(archive, brief=True), paper)
     sheets += table("Joints", joints_table(archive, brief=True), paper)
+    if any(rod.stiffness for rod in results.rods):
+        sheets += table("Sections along the rods", sections_table(archive), paper)
     if results.seams:
         sheets += table("Seams", seams_table(archive), paper)
     if results.fabrication and results.fabrication.stock:

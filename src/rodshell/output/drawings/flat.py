@@ -19,6 +19,7 @@ from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_
 from rodshell.output.labels import Label, Room, callouts, closed_segments, lines_meet, outward, place, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
+from rodshell.results.records import Stiffness
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
 FAMILY = {"u": "#1f5f8b", "v": "#a8552a", "free": "#1f5f8b"}
@@ -30,7 +31,8 @@ CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
 STRIPS_LEGEND = (
     "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice. "
-    "Open triangle: support."
+    "Open triangle: support. Arrow: the section's size "
+    "there [mm], or how many laths (L) lie on each other from there on."
 )
 TALL = 15.0  # text sizes from strip to strip
 
@@ -325,14 +327,36 @@ def _strip(pencil: Pencil, rod: GridRod, y: float, text: float, layer: dict[str,
         words.append(f"with {mm(rod.allowance)} at each end for the supports")
     pencil.write("   ".join(filter(None, words)), (0.0, y + 7.2 * text), 1.1 * text, "LABEL", bold=True)
     joints = ((1e3 * rod.from_cut_end(at), other, "joint") for other, at in rod.joints)
-    stops = [(0.0, "", ""), *joints, (cut, "", "")]
+    along = rod.record.stiffness
+    first, last = _end_sizes(along) if along is not None else ("", "")
+    stops = [(0.0, first, ""), *joints, (cut, last, "")]
     stops += [(1e3 * rod.from_cut_end(at), "S", "splice") for at in rod.record.splices]
+    if along is not None:
+        stops += [(1e3 * rod.from_cut_end(at), size, "section") for at, size in _section_marks(along)]
     if start > 0:
         stops += [(start, "", "support"), (cut - start, "", "support")]
     stops.sort(key=lambda stop: stop[0])
     spaced = spread([at for at, _, _ in stops], 1.15 * text)
     for (at, name, kind), x in zip(stops, spaced, strict=True):
         _stop(pencil, rod, at, float(x), y, text, name, kind, layer, mm)
+
+
+def _section_marks(along: Stiffness) -> list[tuple[float, str]]:
+    """Where a rod's section is marked between its ends [m], and what it is there: a size in mm, or the laths that lie
+    on each other from there on."""
+    if along.varies == "laths":
+        inner = range(1, len(along.at))
+        return [(along.at[k], f"{along.factors[k]:g} L") for k in inner if along.at[k] == along.at[k - 1]]
+    return [(at, _size(size)) for at, size in zip(along.at[1:-1], along.sizes[1:-1], strict=False)]
+
+
+def _end_sizes(along: Stiffness) -> tuple[str, str]:
+    """The same at both ends."""
+    return (_size(along.sizes[0]), _size(along.sizes[-1])) if along.sizes else ("", "")
+
+
+def _size(metres: float) -> str:
+    return f"\N{EMPTY SET}{1e3 * metres:.3g}"
 
 
 def _stop(
@@ -354,6 +378,9 @@ def _stop(
         pencil.mark((at, y), 0.35 * text, "MARK", pen=Pen("#b3372c", 0.07 * text, fill="#b3372c" if below else PAPER))
     elif kind == "splice":
         pencil.line([(at, y - 0.5 * text), (at, y + 0.5 * text)], "MARK", pen=Pen(INK, 0.2 * text))
+    elif kind == "section":
+        corners = [(at - 0.25 * text, y - 0.5 * text), (at, y), (at + 0.25 * text, y - 0.5 * text)]
+        pencil.line(corners, "MARK", pen=Pen(INK, 0.07 * text))
     elif kind == "support":
         corners = [(at, y), (at - 0.4 * text, y - 0.7 * text), (at + 0.4 * text, y - 0.7 * text)]
         pencil.line(corners, "MARK", closed=True, pen=Pen(INK, 0.07 * text))

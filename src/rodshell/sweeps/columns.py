@@ -1,0 +1,154 @@
+"""The columns of a sweep's table: those of every sweep, and keys of result.json that the user names.
+
+Of every finished job the store keeps result.json without its long lists, so that a column can be added later without
+computing anything again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
+from typing import Any
+
+from rodshell.errors import InputError
+from rodshell.results.results import Results, json_schema
+from rodshell.units import shown
+
+STANDARD = ("verdict", "status", "rms_pinned", "rms_clamped", "min_angle_deg", "total_length", "seconds")
+JOB = "job"  # its identity, by which its result folder is called
+CONVERGED = "converged"
+SHORT = 3  # a list with so many numbers is kept: a point, a pair
+
+Short = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A key of result.json.
+
+    Parameters
+    ----------
+    name : dotted, such as "bending.pop_up.utilisation".
+    counts : whether it is a list, of which the table shows the number of entries.
+    """
+
+    name: str
+    counts: bool = False
+
+    def of(self, short: Mapping[str, Any]) -> Any:
+        """Its value in the short content of a result; None where there is none."""
+        found: Any = short
+        for name in self.name.split("."):
+            found = found.get(name) if isinstance(found, Mapping) else None
+        return len(found) if self.counts and isinstance(found, list) else found
+
+
+def read_columns(given: object, taken: Sequence[str]) -> tuple[Column, ...]:
+    """The columns named in `columns`.
+
+    Parameters
+    ----------
+    given : keys of result.json, or "job".
+    taken : names of the axes' keys.
+
+    Raises
+    ------
+    InputError : result.json has no such key, it is a table, or it is already a column.
+    """
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        raise InputError(f'columns = {shown(given)}: give a list of keys of result.json, such as ["net.min_angle_deg"]')
+    found = tuple(read_column(name) for name in given)
+    names = [*taken, *STANDARD, *(column.name for column in found)]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"columns: {shown(name)} is a column already: leave it out")
+    return found
+
+
+def read_column(name: object) -> Column:
+    """The column of a key of result.json; see `read_columns`."""
+    if not isinstance(name, str):
+        raise InputError(f"columns: {shown(name)} is not a key: give text such as net.min_angle_deg")
+    if name == JOB:
+        return Column(name)
+    node: Mapping[str, Any] = _schema()
+    path = ""
+    for part in name.split("."):
+        inside = _inside(node)
+        if part not in inside:
+            if path in ("target", "rod.section"):  # whose keys depend on its kind
+                return Column(name)
+            near = get_close_matches(part, inside, n=1)
+            prefix = f"{path}." if path else ""
+            hint = f"did you mean {prefix}{near[0]}?" if near else f"{path or 'result.json'} has {', '.join(inside)}"
+            raise InputError(f"columns: result.json has no key {name}: {hint}" if inside else _too_deep(name, path))
+        node, path = inside[part], f"{path}.{part}" if path else part
+    if inside := _inside(node):
+        raise InputError(f"columns: {name} is a table: name one of its keys, such as {name}.{next(iter(inside))}")
+    return Column(name, any("items" in choice for choice in _choices(node)))
+
+
+def _too_deep(name: str, path: str) -> str:
+    return f"columns: {name}: {path} is a single value or a list, of which the number of entries is shown: use {path}"
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return json_schema()
+
+
+def _choices(node: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """What a node of the schema may be, references opened; null left out."""
+    if "$ref" in node:
+        return [_schema()["$defs"][node["$ref"].rpartition("/")[2]]]
+    members = node.get("anyOf", [node])
+    return [choice for member in members for choice in (_choices(member) if member is not node else [member])]
+
+
+def _inside(node: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a table of the schema by name; none of a value or a list."""
+    found = dict[str, Any]()
+    for choice in _choices(node):
+        found |= choice.get("properties", {})
+        each, names = choice.get("additionalProperties"), choice.get("propertyNames", {})
+        if isinstance(each, Mapping):
+            found |= dict.fromkeys(names.get("enum", ()), each)
+    return found
+
+
+def row_of(results: Results, *, verdict: str, seconds: float) -> dict[str, Any]:
+    """What is kept of a form: the standard columns, and the short content of its result.json.
+
+    Parameters
+    ----------
+    results : of the form.
+    verdict : its level; "" where it was not checked.
+    seconds : processor time [s].
+    """
+    drape = results.drape
+    return {
+        "verdict": verdict,
+        "status": results.status,
+        "rms_pinned": _rms(results, "pinned"),
+        "rms_clamped": _rms(results, "clamped"),
+        "min_angle_deg": drape.min_angle_deg if drape else None,
+        "total_length": sum(rod.length or 0.0 for rod in results.rods) if results.rods else None,
+        "seconds": seconds,
+        "results": _short(results.plain()),
+    }
+
+
+def _rms(results: Results, ends: Any) -> float | None:
+    """The gap over the size of a shell that converged: of no other it means anything."""
+    shell, gap = results.pop_up.get(ends), results.agreement.get(ends)
+    return gap.rms_relative if shell and gap and shell.status == CONVERGED else None
+
+
+def _short(value: Any) -> Any:
+    """Plain content, of longer lists their number of entries."""
+    if isinstance(value, dict):
+        return {name: _short(item) for name, item in value.items()}
+    if isinstance(value, list):
+        few = len(value) <= SHORT and all(item is None or isinstance(item, int | float | str) for item in value)
+        return value if few else len(value)
+    return value

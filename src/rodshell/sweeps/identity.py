@@ -1,0 +1,70 @@
+"""By what a job is known: its resolved case, the content of its files, and the program.
+
+The same job in another folder, with its files called otherwise, is the same job.
+"""
+
+import hashlib
+import json
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import rodshell
+from rodshell.errors import InputError
+from rodshell.job import Job
+from rodshell.units import shown
+
+DIGITS = 32
+
+
+def job_identity(job: Job, until: str) -> str:
+    """32 hexadecimal digits of SHA-256.
+
+    Parameters
+    ----------
+    job : of a case that a file can describe.
+    until : the last stage that is run.
+
+    Raises
+    ------
+    InputError : a file of the case cannot be read.
+    """
+    tables: dict[str, Any] = job.case.model_dump(exclude_none=True)
+    for key in ("file", "boundary"):
+        if key in tables["target"]:
+            tables["target"][key] = content_digest(Path(tables["target"][key]))
+    content = json.dumps([program_version(), until, tables], sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(content.encode()).hexdigest()[:DIGITS]
+
+
+def content_digest(path: Path) -> str:
+    """The type and the SHA-256 of a file, read again only if it changed; of a glTF file also those that it names."""
+    try:
+        stat = path.stat()
+        return _digest(path.absolute(), stat.st_mtime_ns, stat.st_size)
+    except OSError as error:
+        raise InputError(f"target.file = {shown(str(path))} cannot be read: {error.strerror}") from None
+    except (ValueError, AttributeError, TypeError):
+        raise InputError(f"target.file = {shown(str(path))} cannot be read: it is not a glTF file") from None
+
+
+@cache
+def _digest(path: Path, _modified: int, _size: int) -> str:
+    content = path.read_bytes()
+    digest = hashlib.sha256(content)
+    if path.suffix.lower() == ".gltf":
+        for part in json.loads(content).get("buffers", ()):
+            if not str(part.get("uri", "data:")).startswith("data:"):
+                digest.update((path.parent / part["uri"]).read_bytes())
+    return f"{path.suffix.lower()} {digest.hexdigest()}"
+
+
+@cache
+def program_version() -> str:
+    """The version, and twelve digits of SHA-256 of the sources, which may have changed since."""
+    digest = hashlib.sha256()
+    home = Path(rodshell.__file__).parent
+    for file in sorted(home.rglob("*.py")):
+        digest.update(f"{file.relative_to(home).as_posix()}\n".encode() + file.read_bytes())
+    return f"{version('rodshell')}+{digest.hexdigest()[:12]}"

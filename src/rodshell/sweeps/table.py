@@ -1,0 +1,185 @@
+"""The table of a sweep: table.csv, Parquet, and Arrow for pandas or polars; a row for each finished design."""
+
+import csv
+import json
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from rodshell.errors import InputError, OutputError
+from rodshell.sweeps.columns import JOB, STANDARD, Column, read_column
+from rodshell.sweeps.store import Finished, Store
+from rodshell.validation import instance
+
+if TYPE_CHECKING:
+    import pyarrow
+
+CSV, PARQUET = "table.csv", "table.parquet"
+SHARE = 0.05  # of the time at most is spent on writing table.csv
+PAUSE = 2.0  # s between two of them at least
+HEADER = "header"  # note of the store: {"keys", "columns"}
+
+
+def header_of(store: Store) -> tuple[list[str], list[Column]]:
+    """The axes' keys of a sweep, and its own columns."""
+    noted = json.loads(store.note(HEADER) or '{"keys": [], "columns": []}')
+    return noted["keys"], [read_column(name) for name in noted["columns"]]
+
+
+def note_header(store: Store, keys: Sequence[str], columns: Sequence[Column]) -> None:
+    """Keep what the table's columns are.
+
+    Parameters
+    ----------
+    store : of the sweep; keys : of the axes; columns : of the sweep, in addition to those of every sweep.
+    """
+    store.take_note(HEADER, json.dumps({"keys": list(keys), "columns": [column.name for column in columns]}))
+
+
+def table_rows(store: Store, columns: Sequence[Column]) -> Iterator[list[Any]]:
+    """The rows of the finished designs, one by one: the axes' keys, the standard columns, and `columns`.
+
+    Parameters
+    ----------
+    store : of the sweep; columns : in addition to those of every sweep.
+    """
+    for design in store.finished():
+        yield [*design.keys, *(design.row.get(name) for name in STANDARD), *(_cell(design, c) for c in columns)]
+
+
+def _cell(design: Finished, column: Column) -> Any:
+    return design.job if column.name == JOB else column.of(design.row.get("results", {}))
+
+
+class Table:
+    """table.csv of a sweep, which is replaced in one step.
+
+    Parameters
+    ----------
+    store : whose designs it shows.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store, self._next = store, monotonic() + PAUSE
+
+    def refresh(self) -> None:
+        """Write it, unless that was done a moment ago: all of them together take `SHARE` of the time."""
+        begun = monotonic()
+        if begun >= self._next:
+            self.write()
+            self._next = monotonic() + max(PAUSE, (monotonic() - begun) / SHARE)
+
+    def write(self) -> None:
+        """Write it now.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        keys, columns = header_of(self._store)
+        file = self._store.folder / CSV
+        part = file.with_name(f".{CSV}.part")
+        try:
+            with part.open("w", encoding="utf-8", newline="") as stream:
+                writer = csv.writer(stream, lineterminator="\n")
+                writer.writerow([*keys, *STANDARD, *(column.name for column in columns)])
+                for row in table_rows(self._store, columns):
+                    writer.writerow([_text(value) for value in row])
+            os.replace(part, file)
+        except OSError as error:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+            if isinstance(error, OutputError):
+                raise
+            raise OutputError(
+                f"cannot write {file}: {error.strerror}; the finished designs are kept in {self._store.path}: make "
+                "room, and start the same sweep again"
+            ) from error
+
+
+def _text(value: Any) -> Any:
+    """A cell of a CSV."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return json.dumps(value) if isinstance(value, list | dict) else value
+
+
+def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pyarrow.Table":
+    """The table of a sweep, also of one that still runs; `.to_pandas()`, or `polars.from_arrow` of it.
+
+    Parameters
+    ----------
+    folder : of the sweep.
+    columns : further keys of result.json; nothing is computed again for them.
+
+    Returns
+    -------
+    A row for each finished design: the axes' keys, the columns of every sweep, those that it names, and `columns`.
+    Numbers are in SI, what is not known is null, lists and tables are JSON.
+
+    Raises
+    ------
+    InputError : pyarrow is not installed, or result.json has no such key. OutputError : there is no sweep.
+    """
+    instance("folder", folder, str | PathLike, "the path of a sweep's folder")
+    with Store(Path(folder).expanduser(), writing=False) as store:
+        keys, columns_of_sweep = header_of(store)
+        there = [column.name for column in columns_of_sweep]
+        asked = [*columns_of_sweep, *(read_column(name) for name in columns if name not in there)]
+        return arrow_table([*keys, *STANDARD, *(column.name for column in asked)], table_rows(store, asked))
+
+
+def arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Table":
+    """Rows as an Arrow table.
+
+    Parameters
+    ----------
+    names : of the columns; rows : of plain values.
+
+    Raises
+    ------
+    InputError : pyarrow is not installed.
+    """
+    try:
+        import pyarrow
+    except ImportError:
+        raise InputError(
+            'reading a sweep as a table needs the package pyarrow: pip install "rodshell[sweep]"'
+        ) from None
+    table = list(rows)
+    cells = {name: [row[k] for row in table] for k, name in enumerate(names)}
+    return pyarrow.table({name: pyarrow.array(_alike(values)) for name, values in cells.items()})
+
+
+def _alike(values: list[Any]) -> list[Any]:
+    """Cells of one type: numbers, truth values, or text."""
+    known = [value for value in values if value is not None]
+    if all(isinstance(value, bool) for value in known) or all(isinstance(value, str) for value in known):
+        return values
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
+        return [None if value is None else float(value) for value in values]
+    return [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
+
+
+def write_parquet(store: Store) -> None:
+    """Write table.parquet, if pyarrow is installed.
+
+    Parameters
+    ----------
+    store : of the sweep.
+    """
+    with suppress(ImportError):
+        import pyarrow.parquet
+
+        keys, columns = header_of(store)
+        names = [*keys, *STANDARD, *(column.name for column in columns)]
+        part = store.folder / f".{PARQUET}.part"
+        try:
+            pyarrow.parquet.write_table(arrow_table(names, table_rows(store, columns)), part)
+            os.replace(part, store.folder / PARQUET)
+        except OSError as error:
+            raise OutputError(f"cannot write {store.folder / PARQUET}: {error.strerror or error}") from error

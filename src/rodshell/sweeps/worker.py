@@ -1,0 +1,89 @@
+"""The process that runs jobs: a task a line in, a reply a line out.
+
+It is started with one thread for each library, loads the kernels once, and ends with the process that started it.
+"""
+
+import json
+import os
+import signal
+import sys
+import threading
+from queue import SimpleQueue
+from time import process_time
+from typing import Any, TextIO
+
+READY = "ready"
+SMALL = {"layout.rods": "5x5", "layout.spacing": "80 mm", "layout.edge": "40 mm"}
+
+
+def main() -> None:
+    """Read tasks and reply to each, until the input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; the coordinator decides
+    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what libraries print goes to stderr
+    tasks = SimpleQueue[str]()
+    threading.Thread(target=_read, args=(tasks,), daemon=True).start()
+    _load_kernels()
+    _reply(replies, {READY: True})
+    while True:
+        _reply(replies, reply_to(json.loads(tasks.get())))
+
+
+def _read(tasks: "SimpleQueue[str]") -> None:
+    for line in sys.stdin:
+        tasks.put(line)
+    os._exit(0)  # the parent is gone: nobody waits for the job that runs
+
+
+def _reply(replies: TextIO, content: dict[str, Any]) -> None:
+    replies.write(json.dumps(content) + "\n")
+    replies.flush()
+
+
+def _load_kernels() -> None:
+    """Run a small job, so that the time of the first job is that of a job."""
+    from rodshell.job import Job
+
+    Job.load("hemisphere", SMALL).run()
+
+
+def reply_to(task: dict[str, Any]) -> dict[str, Any]:
+    """Run a job: {"outcome", "row"}; {"mismatch"} in a process of another version; {"unwritten"} for a form not saved.
+
+    Parameters
+    ----------
+    task : "case", its text; "until", the last stage; "archive", the folder for its files, or None; "version", of the
+        coordinator.
+    """
+    from rodshell.errors import OutputError, RodshellError
+    from rodshell.job import Job
+    from rodshell.sweeps.columns import row_of
+    from rodshell.sweeps.identity import program_version
+    from rodshell.sweeps.store import FOUND
+
+    if task["version"] != program_version():
+        return {"mismatch": program_version()}
+    begun = process_time()
+    try:
+        form = Job.load(task["case"]).run(until=task["until"])
+        if task["until"] == "fabrication":
+            archive = form.archive()
+            results, verdict = archive.results, str(archive.verdict.level)
+        else:
+            results, verdict = form.results(), ""
+        row = row_of(results, verdict=verdict, seconds=process_time() - begun)
+    except RodshellError as error:
+        return {"outcome": "refused", "row": {"status": _line(error), "seconds": process_time() - begun}}
+    except Exception as error:
+        said = f"{type(error).__name__}: {_line(error)}"
+        return {"outcome": "failed", "row": {"status": said, "seconds": process_time() - begun}}
+    if task["archive"] is not None:
+        try:
+            form.save(task["archive"], kinds=["report"])
+        except OutputError as error:
+            return {"unwritten": _line(error)}
+    return {"outcome": FOUND, "row": row}
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,86 @@
+"""Rods whose sections change along them, from the form to its files and back."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.errors import OutputError
+from rodshell.formfinding import Footprint
+from rodshell.formfinding.pipeline import popped_again
+from rodshell.output.grid import joint_places
+from rodshell.results.results import Results
+
+REMESHED = 2e-5  # of the size: the result's mesh and that of the table of rods divide the tails differently
+TAPER = rs.Profile.symmetric((0.15, 0.7, 1.0))
+DOUBLE = rs.Profile.double(0.65)
+
+
+def varied_form(profile):
+    form = rs.Job.load("hemisphere", layout__spacing="60 mm", checks__stages=0).run(until="pop-up")
+    stages = form.patches[0]
+    footprint = Footprint(stages.footprint.mesh.with_profiles(profile))
+    return replace(form, stages=popped_again(stages, footprint, stages.boundary, "pinned"))
+
+
+@pytest.fixture(scope="module", params=[TAPER, DOUBLE], ids=["taper", "double"])
+def form(request):
+    return varied_form(request.param)
+
+
+def test_an_archive_keeps_profiles_and_its_rods_pop_up_from_flat_to_the_same_shape(form, tmp_path):
+    folder = form.save(tmp_path / "first", kinds="csv")
+    archive = rs.read(folder)
+    again = rs.Job.of_table(folder).run(until="pop-up")
+    for rod, other in zip(again.footprint.rods, form.footprint.rods, strict=True):
+        assert rod.profile.stations == pytest.approx(other.profile.stations, abs=1e-12)
+        assert (rod.profile.factors, rod.profile.varies) == (other.profile.factors, other.profile.varies)
+    before = joint_places(archive, archive.states["popped_pinned"])
+    popped = again.archive()
+    after = joint_places(popped, popped.states["popped_pinned"])
+    assert before.keys() == after.keys()
+    assert max(np.abs(before[name] - after[name]).max() for name in before) < REMESHED * form.target.size
+    for rod, other in zip(popped.results.rods, archive.results.rods, strict=True):
+        assert rod.mass == pytest.approx(other.mass, rel=1e-9)
+        assert rod.max_stress == pytest.approx(other.max_stress, rel=1e-2)
+
+
+def test_the_schedule_of_sections_gives_every_segment(form, tmp_path):
+    folder = form.save(tmp_path, kinds="csv")
+    with (folder / "schedule" / "sections.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    profile, rod = form.footprint.rods[0].profile, form.rod
+    own = [row for row in rows if row["rod"] == form.footprint.rods[0].name]
+    length = 1e3 * form.footprint.rods[0].length
+    steps = [s for s in profile.stations if 0 < s < 1]
+    borders = [0.0, *[s * length for s in dict.fromkeys(steps)], length]
+    assert [float(row["from_mm"]) for row in own] == pytest.approx(borders[:-1], abs=0.01)
+    assert [float(row["to_mm"]) for row in own] == pytest.approx(borders[1:], abs=0.01)
+    if profile is TAPER:
+        assert [float(row["size_from_mm"]) for row in own] == pytest.approx(
+            [2e3 * rod.section.radius * f**0.25 for f in (0.15, 0.7, 1.0, 0.7)], rel=1e-3
+        )
+        assert float(own[1]["EI_to_Nm2"]) == pytest.approx(rod.bend_stiffness, rel=1e-5)
+    else:
+        assert [row["laths"] for row in own] == ["1", "2", "1"]
+        assert float(own[1]["EI_from_Nm2"]) == pytest.approx(2 * rod.bend_stiffness, rel=1e-5)
+
+
+def test_drawings_and_models_of_rods_that_vary_can_be_made(form, tmp_path):
+    folder = form.save(tmp_path, kinds="svg, gltf, report, pdf")
+    strips = (folder / "drawings" / "strips.svg").read_text()
+    assert ("2 L" if form.footprint.rods[0].profile is DOUBLE else "1.24") in strips  # 2 mm times 0.15^(1/4)
+
+
+def test_uniform_rods_have_no_stiffness_in_the_result(tmp_path):
+    results = varied_form(None).results()
+    assert all("stiffness" not in rod.plain() for rod in results.rods)
+
+
+def test_damaged_stations_are_one_sentence(form):
+    plain = form.results().plain()
+    plain["rods"][1]["stiffness"]["factors"] = [1.0]
+    with pytest.raises(OutputError, match=r"rods\[1\].stiffness"):
+        Results.of(plain)

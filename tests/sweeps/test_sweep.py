@@ -1,0 +1,230 @@
+"""Whole sweeps of small shells: the table against single runs, going on after kills, limits, and both engines."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+import rodshell as rs
+from rodshell.cli import main
+from rodshell.sweeps.store import Store
+from rodshell.sweeps.table import CSV
+
+SMALL = {"layout": {"rods": [5, 5], "spacing": 0.08, "edge": 0.04, "length": 0.9}}
+BASE = {"target": {"kind": "hemisphere"}, "rod": {"section": {"radius": 0.001}}, **SMALL}
+PROGRAM = "from rodshell.cli import entry; entry()"
+
+
+def plan(**changes: Any) -> dict[str, Any]:
+    """A sweep of six designs, of which two cannot be computed."""
+    axes = {"layout.spacing": ["80 mm", "75 mm", "1 mm"], "joint.kind": ["ball", "pin"]}
+    run = {"until": "pop-up"}
+    return {"base": BASE, "axes": axes} | changes | {"run": run | changes.get("run", {})}
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    """The table without times."""
+    with (folder / CSV).open() as stream:
+        return [{key: value for key, value in row.items() if key != "seconds"} for row in csv.DictReader(stream)]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("whole") / "sweep"
+    found = rs.sweep(plan(), folder)
+    assert (found.designs, found.computed, found.verdicts) == (6, 6, {"not checked": 4, "no form": 2})
+    return folder
+
+
+def test_the_table_holds_what_single_runs_find(whole: Path):
+    rows = rows_of(whole)
+    assert [(row["layout.spacing"], row["joint.kind"]) for row in rows] == [
+        (spacing, kind) for spacing in ("0.08", "0.075", "0.001") for kind in ("ball", "pin")
+    ]
+    for row in rows[:4]:
+        case = {"layout.spacing": float(row["layout.spacing"]), "joint.kind": row["joint.kind"]}
+        form = rs.Job.load(BASE, case).run(until="pop-up")
+        assert float(row["rms_pinned"]) == form.agreement["pinned"].rms_relative
+        assert float(row["rms_clamped"]) == form.agreement["clamped"].rms_relative
+        assert float(row["total_length"]) == sum(rod.length for rod in form.footprint.rods)
+        assert row["status"] == form.status == "converged"
+        assert row["verdict"] == ""
+    for row in rows[4:]:
+        assert "edge 0.04 m is longer than the spacing 0.001 m" in row["status"]
+        assert row["rms_pinned"] == ""
+
+
+def test_a_changed_sweep_computes_only_what_is_new(whole: Path):
+    assert rs.sweep(plan(), whole).computed == 0
+    wider = {"layout.spacing": ["75 mm", 0.08, "70 mm"], "joint.kind": ["ball"]}
+    found = rs.sweep(plan(axes=wider, columns=["rods"]), whole)
+    assert (found.designs, found.computed) == (3, 1)
+    rows = rows_of(whole)
+    assert [row["layout.spacing"] for row in rows] == ["0.075", "0.08", "0.07"]
+    assert [row["rods"] for row in rows] == ["10", "10", "10"]
+
+
+def test_the_best_form_is_kept_and_follows_the_sweep(tmp_path: Path):
+    axes = {"layout.spacing": ["80 mm", "75 mm"]}
+    rs.sweep(plan(axes=axes, run={"keep": "best"}), tmp_path)
+    rows = rows_of(tmp_path)
+    best = min(rows, key=lambda row: float(row["rms_pinned"]))
+    assert rs.read(tmp_path / "best").results.layout.spacing[0] == float(best["layout.spacing"])
+    again = rs.sweep(plan(axes=axes, run={"keep": "best", "best": "total_length"}), tmp_path)
+    assert again.computed <= 1
+    shortest = min(rows, key=lambda row: float(row["total_length"]))
+    assert rs.read(tmp_path / "best").results.layout.spacing[0] == float(shortest["layout.spacing"])
+
+
+def test_all_forms_are_kept_by_their_job(tmp_path: Path):
+    found = rs.sweep(plan(columns=["job"], run={"keep": "all"}), tmp_path)
+    assert found.computed == 6
+    for row in rows_of(tmp_path)[:4]:
+        kept = rs.read(tmp_path / "archives" / row["job"])
+        assert kept.results.layout.spacing[0] == float(row["layout.spacing"])
+    assert rs.sweep(plan(columns=["job"], run={"keep": "all"}), tmp_path).computed == 0
+
+
+def test_nothing_is_computed_where_a_design_is_not_valid(tmp_path: Path):
+    with pytest.raises(rs.InputError, match=r"layout\.edge"):
+        rs.sweep(plan(axes={"layout.edge": ["40 mm", "-1 mm"]}), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_table_of_somebody_else_is_not_replaced(tmp_path: Path):
+    (tmp_path / CSV).write_text("mine")
+    with pytest.raises(rs.OutputError, match="will not replace"):
+        rs.sweep(plan(), tmp_path)
+    assert (tmp_path / CSV).read_text() == "mine"
+
+
+def test_the_command_checks_without_computing_and_says_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    file = tmp_path / "sweep.toml"
+    file.write_text('base = "hemisphere"\n[axes]\n"layout.spacing" = ["30 mm", "30 mm", "35 mm"]\n')
+    assert main(["sweep", str(file), "--out", str(tmp_path / "out"), "--dry-run"]) == 0
+    assert "3 designs, 1 of them the same as another; 0 jobs are finished" in capsys.readouterr().out
+    assert not (tmp_path / "out").exists()
+    file.write_text('base = "hemisphere"\n[axes]\n"layout.spacin" = ["30 mm"]\n')
+    assert main(["sweep", str(file), "--dry-run"]) == 2
+    assert capsys.readouterr().err == "rodshell: error: unknown key layout.spacin: did you mean layout.spacing?\n"
+    assert main(["sweep", str(tmp_path / "missing.toml")]) == 2
+    assert "there is no file named" in capsys.readouterr().err
+
+
+@contextmanager
+def watched_children(act: Callable[[psutil.Process], None], times: int) -> Iterator[list[int]]:
+    """Meanwhile do something to worker processes that are busy, so many times."""
+    done, over = list[int](), threading.Event()
+
+    def look() -> None:
+        while not over.wait(0.02) and len(done) < times:
+            for child in psutil.Process().children():
+                try:
+                    ours = any("rodshell.sweeps.worker" in word for word in child.cmdline())
+                    if ours and child.pid not in done and child.cpu_times().user > 3.0:
+                        act(child)
+                        done.append(child.pid)
+                except psutil.Error:
+                    pass
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    try:
+        yield done
+    finally:
+        over.set()
+        thread.join()
+
+
+LONG = {"drape.method": ["bound", "paper"]}
+"""A design that takes no time, and one that falls for some seconds of processor time."""
+LARGE = {
+    "layout.rods, layout.spacing, layout.edge": [["5x5", 0.08, 0.04], ["33x33", 0.012, 0.0015], ["5x5", 0.08, 0.03]]
+}
+"""A design between two small ones that takes some 400 MB, where those take 230."""
+
+
+@pytest.mark.slow
+def test_a_job_whose_process_dies_is_run_again_once(tmp_path: Path):
+    with watched_children(lambda child: child.send_signal(signal.SIGKILL), 9) as killed:
+        found = rs.sweep(plan(axes=LONG), tmp_path)
+    assert len(killed) == 2
+    assert found.failures == (("its process died twice: SIGKILL, as for lack of memory", 1),)
+    assert found.verdicts == {"not checked": 1, "no form": 1}
+    assert rs.sweep(plan(axes=LONG), tmp_path).computed == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["processes", "dask"])
+def test_a_job_over_a_limit_is_stopped_alone(tmp_path: Path, engine: str):
+    run = {"memory_limit": "320 MB", "workers": 2, "engine": engine}
+    found = rs.sweep(plan(axes=LARGE, run=run), tmp_path)
+    assert found.failures == (("stopped: it took more memory than the limit of 320 MB", 1),)
+    assert found.verdicts == {"not checked": 2, "no form": 1}
+
+
+@pytest.mark.slow
+def test_a_process_that_hangs_is_stopped_at_the_time_limit(tmp_path: Path):
+    with watched_children(lambda child: child.suspend(), 1) as hung:
+        found = rs.sweep(plan(axes=LONG, run={"time_limit": "10 s"}), tmp_path)
+    assert len(hung) == 1
+    assert found.failures == (("stopped: it took longer than the time limit of 10 s", 1),)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_sweep_that_is_stopped_goes_on_where_it_was(tmp_path: Path, whole: Path, number: int):
+    file, out = tmp_path / "sweep.toml", tmp_path / "out"
+    rods = ", ".join(f'"{count} mm"' for count in range(60, 80))
+    (tmp_path / "base.toml").write_text(rs.Job.load(BASE).to_toml())
+    file.write_text(f'base = "base.toml"\n[axes]\n"layout.spacing" = [{rods}]\n[run]\nuntil = "pop-up"\n')
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "sweep", str(file), "--out", str(out)],
+        stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    workers = list[psutil.Process]()
+    while process.poll() is None and not (1 <= _recorded(out) < 20):
+        time.sleep(0.01)
+        workers = psutil.Process(process.pid).children()
+    os.kill(process.pid, number)
+    said = process.communicate()[1]
+    assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}[signal.Signals(number)]
+    if number != signal.SIGKILL:
+        assert f"designs are in {out / CSV}; the same command continues from there" in said
+        assert len(rows_of(out)) == _recorded(out)
+    kept = _recorded(out)
+    assert rs.sweep(file, out).computed == 20 - kept
+    assert psutil.wait_procs(workers, timeout=10)[1] == []
+
+
+def _recorded(folder: Path) -> int:
+    try:
+        with Store(folder, writing=False) as store:
+            return sum(store.outcomes().values())
+    except rs.RodshellError:
+        return 0
+
+
+@pytest.mark.slow
+def test_engines_and_numbers_of_workers_give_the_same_table(tmp_path: Path):
+    tables = []
+    for engine, workers in (("processes", 1), ("processes", 2), ("dask", 2)):
+        folder = tmp_path / f"{engine}-{workers}"
+        rs.sweep(plan(run={"engine": engine, "workers": workers, "until": "fabrication"}), folder)
+        tables.append(rows_of(folder))
+    assert tables[0] == tables[1] == tables[2]
+    assert {row["verdict"] for row in tables[0][:4]} <= {"good", "check", "unbuildable"}
