@@ -12,7 +12,7 @@ edge: at the solution the strain vanishes and N0 is the axial force.
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 import numba as nb
 import numpy as np
@@ -48,6 +48,24 @@ class Elements(Protocol):
 
     def refreshed(self, state: Floats) -> Self:
         """The same energy with its source frames moved to `state`; called at each accepted iterate."""
+        ...
+
+
+@runtime_checkable
+class Stressed(Elements, Protocol):
+    """Energies of strains whose internal forces stiffen or soften a structure: those that buckling looks at."""
+
+    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+        """How the Hessians change with the internal forces alone, the geometry being frozen: the sum over the strains e
+        of (ds/de de/dx . motion) d2e/dx2, with s the internal force. The rest of the Hessian's derivative turns the
+        stiffness of the material with the motion, and is wrong by far without its terms of second order.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad], the source frames being at, or near, it.
+        motion : (N, 3) along which the internal forces change, to first order [m, rad].
+        hessians : (m, 3k, 3k), which are filled.
+        """
         ...
 
 
@@ -213,6 +231,22 @@ class Stretch:
                 hessians,
             )
         )
+
+    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+        """Of the change of the axial forces: see `Stressed.stress_stiffness`."""
+        self.axial_stiffness(state, self.stiffness * self.elongation(state, motion), hessians)
+
+    def axial_stiffness(self, state: Floats, forces: Floats, hessians: Floats) -> None:
+        """Geometric stiffness of axial forces alone.
+
+        Parameters
+        ----------
+        state : (N, 3) node positions [m] and twist angles [rad].
+        forces : (e,) axial forces [N].
+        hessians : (e, 6, 6), which are filled [N/m].
+        """
+        limp = replace(self, stiffness=np.zeros_like(self.stiffness), forces=forces)
+        limp.evaluate(state, np.zeros_like(state), hessians)
 
     def refreshed(self, state: Floats) -> Self:
         """The same: there are no source frames."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import unit
-from rodshell.rods.bend_twist import BendTwist, spread
+from rodshell.rods.bend_twist import BendTwist, spread, strain_rates
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 
@@ -77,6 +77,17 @@ class IsotropicBendTwist(BendTwist):
     def relaxed(self, state: Floats) -> Self:
         """The same elements with the twist of `state` as their natural twist: these rods are naturally straight."""
         return replace(self, natural_twist=self.strains(state)[:, 2].copy())
+
+    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+        """Of the change of the torsional moments: see `Stressed.stress_stiffness`.
+
+        Bending knows no frames, and no strains that could stay while its moments change: it keeps its stiffness.
+        """
+        twist = strain_rates(self, state, motion)[:, 2]
+        scrap, before = np.zeros_like(state), np.zeros_like(hessians)
+        self.evaluate(state, scrap, before)
+        replace(self, natural_twist=self.natural_twist - twist).evaluate(state, scrap, hessians)
+        hessians -= before
 
     @property
     def parts(self) -> tuple[Self, ...]:
