@@ -63,17 +63,10 @@ if TYPE_CHECKING:
         Spring,
     )
     from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
-    from rodshell.loads.kinds import (
-        LineLoad,
-        Loads,
-        PointLoad,
-        SelfWeight,
-        Settlement,
-        Snow,
-        Stability,
-        Temperature,
-        Wind,
-    )
+    from rodshell.loads.bracing import Cables
+    from rodshell.loads.combinations import Loads, Stability
+    from rodshell.loads.kinds import LineLoad, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
+    from rodshell.loads.laths import Laths
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -121,9 +114,10 @@ _HOMES = {
     "rodshell.job": ("Job", "find_form", "pop_up_table"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
-    "rodshell.loads.kinds": (
-        "LineLoad", "Loads", "PointLoad", "SelfWeight", "Settlement", "Snow", "Stability", "Temperature", "Wind",
-    ),
+    "rodshell.loads.bracing": ("Cables",),
+    "rodshell.loads.combinations": ("Loads", "Stability"),
+    "rodshell.loads.kinds": ("LineLoad", "PointLoad", "SelfWeight", "Settlement", "Snow", "Temperature", "Wind"),
+    "rodshell.loads.laths": ("Laths",),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
@@ -145,18 +139,19 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
-    "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse", "Ellipsoid",
-    "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform",
-    "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
-    "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "LineLoad", "Linker", "Loads", "Material", "Motion",
-    "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement",
-    "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod",
-    "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight", "Settlement", "SharedDofs", "Shell",
-    "Snow", "Spring", "Stability", "StabilityError", "Target", "Temperature", "TimeSeries", "Trimmed", "Tube",
-    "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads", "drape", "dynamic_pop_up", "export",
-    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up", "pop_up_table", "read", "read_sweep",
-    "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
+    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet", "Circle", "ConvergenceError",
+    "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse",
+    "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form",
+    "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere",
+    "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Laths", "LineLoad", "Linker", "Loads",
+    "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid",
+    "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection",
+    "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight",
+    "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Target", "Temperature",
+    "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads",
+    "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
+    "pop_up_table", "read", "read_sweep", "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from",
+    "sweep", "trim",
 ]  # fmt: skip
 
 

@@ -25,15 +25,17 @@ from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
-from rodshell.loads.check import LoadChecks, Strength, check_shells
-from rodshell.loads.kinds import Loads
+from rodshell.layout.cells import Pattern
+from rodshell.loads.check import LoadChecks, check_shells
+from rodshell.loads.combinations import Loads
+from rodshell.loads.structure import Strength
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
 from rodshell.output.pictures import picture_svg
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
-from rodshell.results.from_loads import loaded_results, loaded_states
 from rodshell.results.from_form import results_of, states_of, with_seam_forces
+from rodshell.results.from_loads import loaded_results, loaded_states
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance
@@ -187,7 +189,12 @@ class Form:
         ends = final_ends(self.checks)
         shape = None if ends is None else self.popped[ends].positions
         return fabricate(
-            self.footprint.mesh, self.rod, self.options.fabrication, curvature=sharpest(self.checks), final=shape
+            self.footprint.mesh,
+            self.rod,
+            self.options.fabrication,
+            curvature=sharpest(self.checks),
+            final=shape,
+            pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
         )
 
     @cached_property

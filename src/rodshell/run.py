@@ -30,7 +30,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "trim": (),
     "pop-up": ("pop_up",),
     "checks": ("checks",),
-    "fabrication": ("fabrication",),
+    "fabrication": ("fabrication", "bracing"),
     "loads": ("loads", "combinations", "stability"),
     "files": ("drawings",),
 }

@@ -1,5 +1,7 @@
 """Cells of a flat grid and the lines that brace them."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -57,14 +59,14 @@ def test_lines_use_each_diagonal_once() -> None:
     grid = lattice()
     found, places = diagonals(grid), flat_places(grid)
     rows = lines(found, places)
-    used = [frozenset(pair) for row in rows for pair in zip(row[:-1], row[1:], strict=True)]
+    used = [frozenset(pair) for row in rows for pair in pairwise(row)]
     assert sorted(map(sorted, used)) == sorted(map(sorted, found.tolist()))
     assert len(rows) == 2 * (3 + 4 - 1)
 
 
 @pytest.mark.parametrize("words", ["", "all", "every", "every = 0", "every = x", "every 1.5"])
 def test_another_pattern_is_refused(words: str) -> None:
-    with pytest.raises(InputError, match="the pattern of the bracing must be"):
+    with pytest.raises(InputError, match="a pattern of diagonals must be"):
         Pattern.of(words)
 
 

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from rodshell.rods.cable import Cables
+from rodshell.rods.cable import CableStretch
 
 
-def some_cables(seed: int = 0) -> tuple[Cables, np.ndarray]:
+def some_cables(seed: int = 0) -> tuple[CableStretch, np.ndarray]:
     """Twenty cables between twelve nodes, about half of them slack, none near the switch."""
     rng = np.random.default_rng(seed)
     state = rng.normal(size=(12, 3))
     blocks = np.array([rng.choice(12, 2, replace=False) for _ in range(20)])
     lengths = np.linalg.norm(state[blocks[:, 1]] - state[blocks[:, 0]], axis=1)
     rest = lengths * np.where(rng.random(20) < 0.5, 0.8, 1.1)
-    return Cables(blocks, rest, rng.uniform(1.0, 9.0, 20)), state
+    return CableStretch(blocks, rest, rng.uniform(1.0, 9.0, 20)), state
 
 
-def gradient_of(cables: Cables, state: np.ndarray) -> np.ndarray:
+def gradient_of(cables: CableStretch, state: np.ndarray) -> np.ndarray:
     gradient = np.zeros_like(state)
     cables.evaluate(state, gradient)
     return gradient
@@ -44,7 +44,7 @@ def test_gradient_and_hessian_match_central_differences() -> None:
 def test_a_slack_cable_has_exactly_no_energy_force_or_stiffness() -> None:
     state = np.array([[0.0, 0, 0], [0.3, 0.4, 0.0]])
     for rest in (0.5, 0.6):  # just taut without strain, and slack
-        cable = Cables(np.array([[0, 1]]), np.array([rest]), np.array([1e9]))
+        cable = CableStretch(np.array([[0, 1]]), np.array([rest]), np.array([1e9]))
         gradient, hessians = np.zeros((2, 3)), np.ones((1, 6, 6))
         assert cable.evaluate(state, gradient, hessians) == 0.0
         assert not gradient.any()

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from pydantic import Field
 
-from rodshell.case.load_tables import CombinationTable, LoadKinds, StabilityTable
+from rodshell.case.load_tables import (
+    BracingKinds,
+    CombinationTable,
+    LoadKinds,
+    NoBracingTable,
+    StabilityTable,
+)
 from rodshell.case.rod_tables import BallTable, JointKinds, RodTable
 from rodshell.case.stage_tables import (
     ChecksTable,
@@ -30,7 +36,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.popup import Ends
     from rodshell.joints import Joint
     from rodshell.layout import GridLayout
-    from rodshell.loads.kinds import Loads
+    from rodshell.loads.combinations import Loads
     from rodshell.output.options import OutputOptions
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
@@ -69,10 +75,13 @@ class Case(Table):
     checks: ChecksTable = ChecksTable()
     fabrication: FabricationTable = FabricationTable()
     drawings: DrawingsTable = DrawingsTable()
-    loads: tuple[LoadKinds, ...] = Field(default=(), description="loads, each in a table [[loads]]; in a case file only")
-    combinations: tuple[CombinationTable, ...] = Field(
-        default=(), description="combinations of loads, each in a table [[combinations]]; in a case file only"
+    loads: tuple[LoadKinds, ...] = Field(
+        default=(), description="file with [[loads]] and their [[combinations]]; in a case file tables"
     )
+    combinations: tuple[CombinationTable, ...] = Field(
+        default=(), description="combinations of loads; in a case file only"
+    )
+    bracing: BracingKinds = Field(default=NoBracingTable(), discriminator="kind")
     stability: StabilityTable = StabilityTable()
 
     @property
@@ -80,9 +89,7 @@ class Case(Table):
         """Objects that tables were made of and that their keys do not describe, by the name of the table."""
         tables = {name: getattr(self, name) for name in type(self).model_fields}
         return {
-            name: table.held
-            for name, table in tables.items()
-            if isinstance(table, Table) and table.held is not None
+            name: table.held for name, table in tables.items() if isinstance(table, Table) and table.held is not None
         }
 
     def to_toml(self) -> str:
@@ -99,7 +106,9 @@ class Case(Table):
                     f"no case file can describe {held.what} ({name}): keep the Python that makes it, or save the form"
                 )
             notes += [f"# {held.note}\n"] if held.note else []
-        return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True))
+        idle = {"stability"} if not self.loads else set[str]()
+        idle |= {"bracing"} if self.bracing.kind == "none" else set()
+        return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
 
     def text(self) -> str:
         """As `to_toml`, or a comment on why no case file can give the same again."""
@@ -198,6 +207,7 @@ class Case(Table):
         target = target or built(self.target)
         layout = built(self.layout, target)
         self._require_stock(layout)
+        self.bracing.build()
         self.built_loads()
         rod = self.rod_on(target, layout, anchor=anchor)
         self.output_options().require_known_stress(rod, joint)
@@ -236,7 +246,7 @@ class Case(Table):
         """
         if not self.loads and not self.combinations:
             return None
-        from rodshell.loads.kinds import Loads
+        from rodshell.loads.combinations import Loads
 
         for tables, rows in (("loads", self.loads), ("combinations", self.combinations)):
             names = [row.name for row in rows]
@@ -246,6 +256,7 @@ class Case(Table):
         return Loads(
             loads={load.name: load.build() for load in self.loads},
             combinations={row.name: dict(row.factors) for row in self.combinations},
+            bracing=self.bracing.build(),
             stability=self.stability.build(),
         )
 
@@ -282,14 +293,25 @@ def toml_text(case: Mapping[str, Any]) -> str:
     tables = [
         f"{head}\n" + "".join(f"{key} = {_value(value)}\n" for key, value in table.items())
         for name, entry in case.items()
-        for head, table in ([(f"[{name}]", entry)] if isinstance(entry, Mapping) else [(f"[[{name}]]", row) for row in entry])
+        for head, table in _headed(name, entry)
     ]
     return "\n".join([HEADER, *tables])
 
 
+def _headed(name: str, entry: Any) -> list[tuple[str, Mapping[str, Any]]]:
+    """A table, or each of the tables in a row, with its head."""
+    return [(f"[{name}]", entry)] if isinstance(entry, Mapping) else [(f"[[{name}]]", table) for table in entry]
+
+
+def _key(name: str) -> str:
+    """A key, in quotation marks where it is not a bare word of TOML."""
+    bare = name.replace("-", "").replace("_", "")
+    return name if bare.isascii() and bare.isalnum() else _value(name)
+
+
 def _value(value: object) -> str:
     if isinstance(value, Mapping):
-        inside = ", ".join(f"{key} = {_value(item)}" for key, item in value.items())
+        inside = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
         return f"{{ {inside} }}" if inside else "{}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"

@@ -22,6 +22,8 @@ BY_KIND: dict[str, str] = {
     "target": Case().target.kind,
     "rod.section": Case().rod.section.kind,
     "joint": Case().joint.kind,
+    "bracing": Case().bracing.kind,
+    "bracing.section": "circle",
 }
 """Tables whose `kind` decides which keys they have, and the kind that they are by default."""
 

@@ -159,6 +159,8 @@ def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
         table = _table(raw, path)
         if path == "rod.section" and (table or any(key.startswith("rod.section.") for key in overrides)):
             kind = "circle"
+        if path == "bracing.section" and not (table or any(key.startswith(f"{path}.") for key in overrides)):
+            continue
         table.setdefault("kind", kind)
     _drop_for_another_kind(raw, overrides)
     for path, value in overrides.items():
@@ -190,7 +192,7 @@ def _rename(raw: Raw, overrides: dict[str, object]) -> None:
                 del raw[old_table]
 
 
-LOAD_TABLES = ("loads", "combinations", "stability")
+LOAD_TABLES = ("loads", "combinations", "bracing", "stability")
 """What a file of loads may have; it replaces all of these that the case has."""
 
 

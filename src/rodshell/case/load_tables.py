@@ -1,12 +1,21 @@
 """The tables of loads: each kind of load, their combinations, the bracing and how stability is looked at."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
+from rodshell.case.rod_tables import (
+    CircleTable,
+    EllipseTable,
+    GivenTable,
+    MaterialTable,
+    RectangleTable,
+    TubeTable,
+)
 from rodshell.case.values import (
     Angle,
+    Distance,
     ForcePerLength3,
     Forces3,
     KelvinChange,
@@ -14,16 +23,22 @@ from rodshell.case.values import (
     Point,
     Point3,
     Pressure,
+    Share,
     Table,
     Whole,
     not_negative,
     polylines,
     positive,
 )
+from rodshell.errors import InputError
 from rodshell.units import read_quantity, shown
 
 if TYPE_CHECKING:
-    from rodshell.loads.kinds import Load, Stability
+    from rodshell.loads.bracing import Cables
+    from rodshell.loads.combinations import Stability
+    from rodshell.loads.kinds import Load
+    from rodshell.loads.laths import Laths
+    from rodshell.rods.section import Rod
 
 
 def _coefficient(value: object) -> float | str:
@@ -42,6 +57,22 @@ def _line(value: object) -> tuple[tuple[float, float], ...]:
     if len(rows) != 1:
         raise ValueError('give one line of two points or more, such as "-1, 0; 1, 0"')
     return rows[0]
+
+
+def _pattern(value: object) -> str:
+    """ "both", "one" or "every = n"."""
+    from rodshell.layout.cells import Pattern
+
+    if not isinstance(value, str):
+        raise ValueError('give "both", "one" or "every = 2"')
+    try:
+        Pattern.of(value)
+    except InputError as reason:
+        raise ValueError(str(reason)) from None
+    return value
+
+
+DiagonalPattern = Annotated[str, BeforeValidator(_pattern)]
 
 
 def _names(value: object) -> tuple[str, ...]:
@@ -149,9 +180,7 @@ class TemperatureTable(LoadTable):
     )
 
 
-AnyLoad = (
-    SelfWeightTable | SnowTable | WindTable | PointTable | LineTable | SettlementTable | TemperatureTable
-)
+AnyLoad = SelfWeightTable | SnowTable | WindTable | PointTable | LineTable | SettlementTable | TemperatureTable
 LoadKinds = Annotated[AnyLoad, Field(discriminator="kind")]
 
 
@@ -162,6 +191,109 @@ class CombinationTable(Table):
     )
 
 
+BracingSection = CircleTable | TubeTable | RectangleTable | EllipseTable | GivenTable
+
+
+class BracingMaterialTable(MaterialTable):
+    """The material of the bracing."""
+
+    _path = "bracing.material"
+
+
+class BracingTable(Table):
+    """Keys of every bracing."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_empty_tables(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """A table without keys stands for none; keys without a kind of bracing for a mistake."""
+        kept = {key: value for key, value in given.items() if value not in ({}, None)}
+        if kept.get("kind") == "none" and len(kept) > 1:
+            path, value = next(item for item in kept.items() if item[0] != "kind")
+            while isinstance(value, Mapping):
+                name, value = next(((key, item) for key, item in value.items() if key != "kind"), ("kind", "circle"))
+                path = f"{path}.{name}"
+            raise ValueError(
+                f'bracing.{path} = {shown(value)}: there is no bracing: set bracing.kind to "cables" or "laths"'
+            )
+        return kept
+
+    def _rod(self) -> "Rod | None":
+        """Section and material; None where neither is given."""
+        section, material = getattr(self, "section", None), getattr(self, "material", None)
+        if section is None and material is None:
+            return None
+        if section is None:
+            raise InputError(
+                "bracing.section is missing: give the section of the bracing, or leave its material out too"
+            )
+        if getattr(section, "radius", None) == "auto":
+            raise InputError('bracing.section.radius = "auto": nothing decides it: give a length such as "3 mm"')
+        if section.kind != "given" and material is None:
+            raise InputError("bracing.material is missing: give the material of the bracing")
+        from rodshell.rods.section import Rod
+
+        return Rod(section.build(), None if material is None else material.build())
+
+
+class NoBracingTable(BracingTable):
+    kind: Literal["none"] = "none"
+
+    def build(self) -> None:
+        """No bracing."""
+
+
+class CablesTable(BracingTable):
+    kind: Literal["cables"] = "cables"
+    pattern: DiagonalPattern = Field(default="both", description='diagonals: "both" of a cell, "one", or "every = n"')
+    prestrain: Share = Field(default=0.0, description="strain by which cables are shortened when they are put in")
+    across_openings: Literal["refuse", "leave out"] = Field(
+        default="refuse", description="what becomes of diagonals across an opening"
+    )
+    section: BracingSection | None = Field(default=None, discriminator="kind")
+    material: BracingMaterialTable | None = None
+
+    def build(self) -> "Cables":
+        """The cables.
+
+        Raises
+        ------
+        InputError : section or material is missing.
+        """
+        from rodshell.loads.bracing import Cables
+
+        rod = self._rod()
+        if rod is None:
+            raise InputError("bracing.section is missing: give section and material of the cables")
+        given = self.model_dump(exclude={"kind", "section", "material"})
+        return Cables(rod=rod, **given)
+
+
+class LathsTable(BracingTable):
+    kind: Literal["laths"] = "laths"
+    pattern: DiagonalPattern = Field(default="one", description='diagonals: "both" of a cell, "one", or "every = n"')
+    eccentricity: Distance = Field(default=0.0, description="distance of the laths' centre lines from the outer rods'")
+    across_openings: Literal["refuse", "leave out"] = Field(
+        default="refuse", description="what becomes of diagonals across an opening"
+    )
+    section: BracingSection | None = Field(default=None, discriminator="kind")
+    material: BracingMaterialTable | None = None
+
+    def build(self) -> "Laths":
+        """The laths; without section and material they are rods of the grid.
+
+        Raises
+        ------
+        InputError : section or material is missing.
+        """
+        from rodshell.loads.laths import Laths
+
+        return Laths(rod=self._rod(), **self.model_dump(exclude={"kind", "section", "material"}))
+
+
+BracingKinds = NoBracingTable | CablesTable | LathsTable
+
+
 class StabilityTable(Table):
     imperfection: Annotated[str | float, BeforeValidator(_imperfection)] | None = Field(
         default=None, description='largest imperfection: a length, or "span/500"; default: none'
@@ -170,6 +302,6 @@ class StabilityTable(Table):
 
     def build(self) -> "Stability":
         """What it says."""
-        from rodshell.loads.kinds import Stability
+        from rodshell.loads.combinations import Stability
 
         return Stability(imperfection=self.imperfection, modes=self.modes)

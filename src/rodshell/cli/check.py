@@ -25,7 +25,9 @@ def command(source: str, loads: str | None, **values: Any) -> int:
     output = read_output_options(values)
     path = Path(source)
     if path.is_dir() and not (path / "case.toml").is_file():
-        raise InputError(f"{source} has no case.toml that could be run again: give a result of rodshell form, or a case")
+        raise InputError(
+            f"{source} has no case.toml that could be run again: give a result of rodshell form, or a case"
+        )
     case = load_case(path / "case.toml" if path.is_dir() else source, {} if loads is None else {"loads": loads})
     if case.of_table:
         raise InputError(f"{shown(source)} comes from a table of rods: without a target no areas for loads are known")

@@ -92,7 +92,14 @@ def _kinds_of(arguments: tuple[str, ...]) -> dict[str, str] | None:
         case = load_case(arguments[0], overrides)
     except InputError:
         return None
-    return {"target": case.target.kind, "rod.section": case.rod.section.kind, "joint": case.joint.kind}
+    section = getattr(case.bracing, "section", None)
+    return {
+        "target": case.target.kind,
+        "rod.section": case.rod.section.kind,
+        "joint": case.joint.kind,
+        "bracing": case.bracing.kind,
+        "bracing.section": BY_KIND["bracing.section"] if section is None else section.kind,
+    }
 
 
 def case_options(*tables: str) -> list[click.Parameter]:

@@ -38,7 +38,7 @@ class Pattern:
         name, _, number = words.replace("=", " ").strip().partition(" ")
         if name == "every" and number.strip().isdecimal() and int(number) >= 1:
             return Pattern(2, int(number))
-        raise InputError(f'the pattern of the bracing must be "both", "one" or "every = 2", not {shown(words)}')
+        raise InputError(f'a pattern of diagonals must be "both", "one" or "every = 2", not {shown(words)}')
 
 
 def grid_cells(grid: FlatGrid) -> Ints:
@@ -148,7 +148,7 @@ def flat_places(grid: FlatGrid) -> Floats:
 
 
 def _rising(grid: FlatGrid, pairs: Ints) -> Floats:
-    """(k, 2) of both diagonals of each cell: rise times run in the flat grid, positive where it goes up to the right."""
+    """(k, 2) of both diagonals of each cell: rise times run in the flat grid, positive where it goes up rightwards."""
     places = flat_places(grid)
     way = places[pairs[..., 1]] - places[pairs[..., 0]]
     return np.asarray(way.prod(axis=-1))

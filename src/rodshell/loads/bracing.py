@@ -10,7 +10,7 @@ from rodshell.errors import InputError
 from rodshell.layout import GridMesh
 from rodshell.layout.cells import Pattern, diagonals
 from rodshell.loads.structure import Structure
-from rodshell.rods.cable import Cables as CableElements
+from rodshell.rods.cable import CableStretch
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.targets import Target
@@ -67,8 +67,8 @@ class Cables:
         lengths = np.linalg.norm(before.state[blocks[:, 1]] - before.state[blocks[:, 0]], axis=1)
         stiffness = np.full(len(blocks), self.rod.stretch_stiffness)
 
-        def stressed(prestrain: float) -> CableElements:
-            return CableElements(blocks, lengths / (1.0 + prestrain), stiffness)
+        def stressed(prestrain: float) -> CableStretch:
+            return CableStretch(blocks, lengths / (1.0 + prestrain), stiffness)
 
         found = before
         for count in (1, STEPS):
@@ -91,10 +91,7 @@ class Cables:
         for side in range(2):
             np.add.at(mass, blocks[:, side], 0.5 * lengths * self.rod.mass_per_length)
         shell = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
-        return Structure(shell, found, pairs, mass, members)
-
-
-Bracing = Cables
+        return replace(structure, shell=shell, equilibrium=found, braced=pairs, bracing_mass=mass, cables=members)
 
 
 def braced_diagonals(

@@ -8,27 +8,28 @@ whole combination, with the shell's weight if that is in it.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from rodshell.arrays import Floats
-from rodshell.checks.bending import VON_MISES, bending_of
+from rodshell.arrays import Floats, Ints
+from rodshell.checks.bending import bending_of
 from rodshell.checks.loads import Reactions
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding import PatchForm, PopUp
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.loads.kinds import Forces, LoadedNodes, Loads, Settlement, Temperature
-from rodshell.loads.structure import Structure
+from rodshell.loads.combinations import Loads
+from rodshell.loads.kinds import Forces, LoadedNodes, Settlement, Temperature
+from rodshell.loads.laths import Laths
+from rodshell.loads.structure import Strength, Structure
 from rodshell.loads.tributary import Tributary, tributary_areas
-from rodshell.rods.section import Rod
-from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
-from rodshell.solve.load_path import LoadPath, Limit, load_path
+from rodshell.solve.load_path import Limit, load_path
 from rodshell.solve.modes import LinearBuckling, linear_buckling
+from rodshell.solve.sparse_ldl import SingularError
 from rodshell.units import shown
 from rodshell.validation import brief
 
@@ -43,12 +44,14 @@ class LoadedShell:
     ----------
     at_factor : of the combination under which all but the factors stands: 1, or the last stable factor where the shell
         loses its stability before; 0 where it is not stable without loads.
-    limit_factor : up to which the shell is stable, at most 0.2 % below where it loses its stability; None: above `MOST`.
+    limit_factor : up to which the shell is stable, at most 0.2 % below where it loses its stability; None: above
+        `MOST`.
     limit_kind : what ends the path, see `LoadPath.limit`; "lost": nothing is known above the factor.
     linear_factor : lowest linear buckling factor about the unloaded shell; None: none up to `MOST`.
-    imperfect_factor : as `limit_factor`, of the shell with imperfections; None: above `MOST`, not asked for, or not found.
-    imperfect_kind : what ends the path of the shell with imperfections; "lost": nothing is known above its factor; None:
-        not asked for.
+    imperfect_factor : as `limit_factor`, of the shell with imperfections; None: above `MOST`, not asked for, or not
+        found.
+    imperfect_kind : what ends the path of the shell with imperfections; "lost": nothing is known above its factor;
+        None: not asked for.
     load_sum : (3,) sum of the loads, those on supports included [N].
     reactions : of the supports, without those of the unloaded shell.
     displacements : (n, 3) of the mesh's nodes against the unloaded shell [m].
@@ -56,6 +59,9 @@ class LoadedShell:
     stress : (k,) largest stress of bending, axial force and torsion at each entry of `rod_nodes` [Pa]; None: unknown.
     utilisation : largest stress over the strength; None: one of them is not known.
     governs : entry of `rod_nodes` with the largest stress.
+    bracing_forces : (d,) axial force of each brace, tension positive, of slack cables exactly 0 [N].
+    bracing_utilisation : as `utilisation`, of the laths of a third layer; None: there are none, or their strength is
+        not known.
     modes : (j, n, 3) lowest linear buckling modes, the largest component being 1.
     mode : (n, 3) how the shell gives way at the limit, or None.
     factorizations : what it took.
@@ -74,6 +80,8 @@ class LoadedShell:
     stress: Floats | None
     utilisation: float | None
     governs: int | None
+    bracing_forces: Floats
+    bracing_utilisation: float | None
     modes: Floats
     mode: Floats | None
     factorizations: int
@@ -99,11 +107,13 @@ class LoadChecks:
     ----------
     asked : the loads and combinations.
     shells : by combination and end condition; an end condition whose shell did not converge is left out.
+    braced : (d, 2) crossings that each brace joins; without bracing there are none.
     stopped, missing : when a time limit came, or "", and which combinations were not reached.
     """
 
     asked: Loads
     shells: Mapping[str, Mapping[Ends, LoadedShell]]
+    braced: Ints
     stopped: str = ""
     missing: tuple[str, ...] = ()
 
@@ -136,20 +146,6 @@ class LoadChecks:
         return (*late, *lost, *imperfect)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Strength:
-    """What stresses are judged by.
-
-    Parameters
-    ----------
-    strength : of the rods' material [Pa]; None: not known.
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
-    """
-
-    strength: float | None = None
-    shear_weight: float = VON_MISES
-
-
 def check_shells(
     stages: PatchForm, loads: Loads, *, strength: Strength = Strength(), progress: Progress = silent
 ) -> LoadChecks:
@@ -168,27 +164,50 @@ def check_shells(
     InputError : a load does not fit the form.
     """
     if stages.from_table:
-        raise InputError("the form comes from a table of rods: without a target the areas that loads act on are unknown")
+        raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
     areas = tributary_of(stages)
     done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
-    stopped = ""
+    stopped, braced = "", np.empty((0, 2), dtype=np.intp)
     try:
         for ends, popped in done.items():
-            structure = Structure.erected(popped)
+            structure = _locked(popped, ends, loads, stages)
+            braced = structure.braced
             nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
-                said = partial(progress, "loads")
-                found[name][ends] = loaded_shell(
-                    structure, load, loads, stages.rod,
-                    strength=strength, progress=lambda what, name=name, ends=ends, said=said: said(f"{name}, {ends} ends, {what}", 0.0),
-                )  # fmt: skip
+                said = partial(_said, progress, f"{name}, {ends} ends")
+                found[name][ends] = loaded_shell(structure, load, loads, strength=strength, progress=said)
                 missing.pop(0)
     except OutOfTimeError as late:
         stopped = str(late)
-    return LoadChecks(loads, found, stopped, tuple(missing) if stopped else ())
+    return LoadChecks(loads, found, braced, stopped, tuple(missing) if stopped else ())
+
+
+def _said(progress: Progress, where: str, what: str) -> None:
+    progress("loads", f"{where}, {what}", 0.0)
+
+
+def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Structure:
+    """The erected shell with its bracing locked.
+
+    Raises
+    ------
+    InputError : as of the bracing; the supports leave a mechanism.
+    """
+    structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
+    if bracing is not None:
+        own = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
+        structure = own.brace(structure, stages.target)
+    try:
+        _ = structure.equilibrium.tangent
+    except SingularError:
+        raise InputError(
+            f"with {ends} ends the supports and joints leave the shell a motion without any stiffness (a mechanism), "
+            "so that it bears no load: hold its ends' directions (clamped), use stiffer joints, or more rods"
+        ) from None
+    return structure
 
 
 def tributary_of(stages: PatchForm) -> Tributary:
@@ -239,7 +258,7 @@ def _move(structure: Structure, load: Settlement, factor: float, motions: Floats
 
 
 def loaded_shell(
-    structure: Structure, load: Load, loads: Loads, rod: Rod, *,
+    structure: Structure, load: Load, loads: Loads, *,
     strength: Strength = Strength(), progress: Callable[[str], None] = lambda what: None,
 ) -> LoadedShell:  # fmt: skip
     """A structure under one combination.
@@ -249,10 +268,10 @@ def loaded_shell(
     structure : in equilibrium without the loads.
     load : what acts at the combination's factor 1.
     loads : for how stability is looked at.
-    rod : of the grid.
     strength : what stresses are judged by.
     progress : called with what is being done.
     """
+
     def following(count: int, factor: float) -> None:
         progress(f"{factor:.3g} times the loads, {count} factorisations")
 
@@ -260,7 +279,11 @@ def loaded_shell(
     path = load_path(unloaded, load, most=MOST, progress=following)
     last = path.last_stable
     at = path.at(1.0)
-    factor, found = (1.0, at) if at is not None else (0.0, unloaded) if last is None else (last.factor, last.equilibrium)
+    factor, found = 0.0, unloaded
+    if at is not None:
+        factor, found = 1.0, at
+    elif last is not None:
+        factor, found = last.factor, last.equilibrium
     buckling = None
     if path.limit != "unstable unloaded":
         progress("linear buckling")
@@ -268,7 +291,7 @@ def loaded_shell(
     imperfect_factor, imperfect_kind, more = _with_imperfections(structure, load, loads, buckling, following)
     n = structure.shell.node_count
     positions, before = structure.shell.positions(found.state), structure.shell.positions(unloaded.state)
-    bent = bending_of(structure.shell_at(found), found.state, rod, shear_weight=strength.shear_weight)
+    bent = bending_of(structure.shell_at(found), found.state, structure.rod, shear_weight=strength.shear_weight)
     governs = None if bent.stress is None else int(np.argmax(bent.stress))
     used = None
     if bent.stress is not None and strength.strength is not None:
@@ -289,6 +312,8 @@ def loaded_shell(
         stress=bent.stress,
         utilisation=used,
         governs=governs,
+        bracing_forces=structure.bracing_forces(found),
+        bracing_utilisation=structure.bracing_utilisation(found, strength),
         modes=shapes,
         mode=None if path.mode is None else path.mode[:n],
         factorizations=path.factorizations + more,

@@ -6,7 +6,7 @@ no forces: they move supports, or change the length at which rods are free of st
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from math import cos, sin
 from typing import Literal, get_args
@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.loads.tributary import Tributary
 from rodshell.targets.heightfield import Formula, parse_formula
 from rodshell.units import length_text, shown
-from rodshell.validation import brief, choice, number, numbers, positive
+from rodshell.validation import brief, choice, not_negative, number, numbers, positive
 
 GRAVITY = 9.81  # [m/s2]
 Distribution = Literal["uniform", "half", "drifted"]
@@ -82,7 +82,7 @@ class SelfWeight:
     cladding: float = 0.0
 
     def __post_init__(self) -> None:
-        _not_negative("the cladding", self.cladding, "kg/m2")
+        not_negative("the cladding", self.cladding, "kg/m2")
 
     def forces(self, nodes: LoadedNodes) -> Floats:
         """(n, 3) [N].
@@ -114,7 +114,7 @@ class Snow:
     direction: float = 0.0
 
     def __post_init__(self) -> None:
-        _not_negative("the snow", self.value, "N/m2")
+        not_negative("the snow", self.value, "N/m2")
         choice("the snow's distribution", self.distribution, get_args(Distribution))
         number("the snow's direction", self.direction)
 
@@ -149,7 +149,7 @@ class Wind:
     direction: float = 0.0
 
     def __post_init__(self) -> None:
-        _not_negative("the wind", self.value, "N/m2")
+        not_negative("the wind", self.value, "N/m2")
         number("the wind's direction", self.direction)
         if isinstance(self.coefficient, str):
             parse_formula(self.coefficient)
@@ -293,91 +293,7 @@ Forces = SelfWeight | Snow | Wind | PointLoad | LineLoad
 """Loads that are forces."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Stability:
-    """How stability is looked at.
-
-    Parameters
-    ----------
-    imperfection : largest displacement of the geometry with imperfections [m], or a part of the span such as
-        "span/500"; None: the perfect geometry alone.
-    modes : lowest buckling modes that are looked for, in which imperfections are.
-    """
-
-    imperfection: float | str | None = None
-    modes: int = 3
-
-    def __post_init__(self) -> None:
-        if self.imperfection is not None:
-            self.amplitude(1.0)
-        if isinstance(self.modes, bool) or not isinstance(self.modes, int) or self.modes < 1:
-            raise InputError(f"the number of modes must be 1 or more, not {self.modes!r}")
-
-    def amplitude(self, span: float) -> float | None:
-        """Largest displacement of the geometry with imperfections [m]; None: the perfect geometry alone.
-
-        Parameters
-        ----------
-        span : of the shell [m].
-        """
-        given = self.imperfection
-        if not isinstance(given, str):
-            return None if given is None else positive("the imperfection", given, "m")
-        before, _, part = given.partition("/")
-        if before.strip() != "span" or not part.strip().replace(".", "", 1).isdecimal() or not float(part) > 0:
-            raise InputError(f'the imperfection must be a length in m or a part of the span, "span/500", not {shown(given)}')
-        return span / float(part)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Loads:
-    """What a shell is checked under.
-
-    Parameters
-    ----------
-    loads : by name.
-    combinations : by name, the factors of loads by their names.
-    stability : how stability is looked at.
-
-    Raises
-    ------
-    InputError : a combination names a load that is not there; there is no combination; a factor is not a number.
-    """
-
-    loads: dict[str, Load]
-    combinations: dict[str, dict[str, float]]
-    stability: Stability = field(default_factory=Stability)
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        if not self.loads or not self.combinations:
-            missing = "loads" if not self.loads else "combinations"
-            example = '{ name = "winter", factors = { snow = 1.5 } }' if self.loads else '{ name = "snow", kind = "snow" }'
-            raise InputError(f"there are no {missing} to check the shell under: give [[{missing}]] such as {example}")
-        for name, load in self.loads.items():
-            if not isinstance(load, Load):
-                raise InputError(f"the load {shown(name)} must be a load such as rodshell.Snow(500.0), not {load!r}")
-        for name, factors in self.combinations.items():
-            if not factors:
-                raise InputError(f"the combination {shown(name)} has no loads: give factors such as {{ snow = 1.5 }}")
-            for load_name, factor in factors.items():
-                if load_name not in self.loads:
-                    known = ", ".join(self.loads)
-                    raise InputError(
-                        f"the combination {shown(name)} has a factor for {shown(load_name)}, which is no load: the "
-                        f"loads are {known}"
-                    )
-                _not_negative(f"the factor of {shown(load_name)} in the combination {shown(name)}", factor, "")
-
-
 def _downwards(size: Floats) -> Floats:
     result = np.zeros((len(size), 3))
     result[:, 2] = -size
     return result
-
-
-def _not_negative(name: str, value: float, unit: str) -> None:
-    number(name, value, unit)
-    if value < 0:
-        raise InputError(f"{name} must not be negative, not {value:g}{' ' + unit if unit else ''}")

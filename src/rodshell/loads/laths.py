@@ -60,33 +60,34 @@ class Laths:
         not_negative("the bracing's eccentricity", self.eccentricity, "m")
         choice("across_openings", self.across_openings, ("refuse", "leave out"))
 
-    def brace(self, structure: Structure, target: Target, rod: Rod) -> Structure:
+    def brace(self, structure: Structure, target: Target) -> Structure:
         """The structure with its laths laid, in the equilibrium that both find.
 
         Parameters
         ----------
         structure : erected.
         target : whose openings the laths must not cross.
-        rod : of the grid, where the laths have none of their own.
 
         Raises
         ------
-        InputError : a lath crosses an opening; no stable equilibrium of both is found.
+        InputError : a lath crosses an opening; no stable equilibrium of both is found; the laths have no rod.
         """
-        mesh, before, own = structure.mesh, structure.equilibrium, self.rod or rod
+        mesh, before = structure.mesh, structure.equilibrium
+        if self.rod is None:
+            raise InputError("these laths have no rod of their own: give one, such as that of the grid")
         pairs = braced_diagonals(mesh, structure.positions(before), target, self.pattern, self.across_openings)
         rows = lines(pairs, flat_places(mesh.grid))
         normals = _normals(mesh, structure.positions(before))
         over = before.state[outer_nodes(mesh)] + self.eccentricity * normals
         laid = _Laid.over(rows, over, normals, float(np.median(mesh.edge_lengths)))
-        shell = Shell.of(laid.mesh, own)
+        shell = Shell.of(laid.mesh, self.rod)
         blocks = structure.size + np.arange(len(shell.like))
         if not self.eccentricity:
             joints = laid.mesh.rod_nodes[laid.entries]
             blocks[joints] = outer_nodes(mesh)[laid.crossings]
             kept = np.setdiff1d(np.arange(len(blocks)), joints)
             blocks[kept] = structure.size + np.arange(len(kept))
-        layer = LathLayer(shell, blocks, own, tuple(tuple(row) for row in rows), laid.entries)
+        layer = LathLayer(shell, blocks, self.rod, tuple(tuple(row) for row in rows), laid.entries)
         ties = _ties(structure, layer, laid.crossings, self.eccentricity) if self.eccentricity else ()
         return _joined(structure, layer, laid, ties)
 

@@ -12,13 +12,28 @@ from itertools import pairwise
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.checks.bending import VON_MISES, bending_of
 from rodshell.checks.loads import Reactions, reactions
 from rodshell.formfinding.popup import PopUp
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
-from rodshell.rods.cable import Cables
+from rodshell.rods.cable import CableStretch
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strength:
+    """What stresses are judged by.
+
+    Parameters
+    ----------
+    strength : of the rods' material [Pa]; None: not known.
+    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
+    """
+
+    strength: float | None = None
+    shear_weight: float = VON_MISES
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +84,7 @@ class Structure:
     ----------
     shell : the model of the grid, its source frames being at the equilibrium.
     equilibrium : of grid and bracing without loads, its ends held.
+    rod : of the grid.
     braced : (d, 2) crossings that its bracing joins.
     bracing_mass : (n,) mass of the bracing, lumped at the mesh's nodes [kg]; None: there is no bracing.
     cables : its energy; None: there are no cables.
@@ -77,18 +93,25 @@ class Structure:
 
     shell: Shell
     equilibrium: Equilibrium
+    rod: Rod
     braced: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.intp))
     bracing_mass: Floats | None = None
-    cables: Cables | None = None
+    cables: CableStretch | None = None
     laths: LathLayer | None = None
 
     def __repr__(self) -> str:
         return f"<Structure: {self.shell}, {self.equilibrium.report.status.value}>"
 
     @staticmethod
-    def erected(popped: PopUp) -> "Structure":
-        """The popped-up shell, without bracing."""
-        return Structure(popped.shell, popped.equilibrium)
+    def erected(popped: PopUp, rod: Rod) -> "Structure":
+        """The popped-up shell, without bracing.
+
+        Parameters
+        ----------
+        popped : the shell.
+        rod : of the grid.
+        """
+        return Structure(popped.shell, popped.equilibrium, rod)
 
     @property
     def mesh(self) -> GridMesh:
@@ -115,6 +138,28 @@ class Structure:
         if self.laths is not None:
             return self.laths.forces(found.forces[len(self.mesh.edges) :])
         return np.zeros(0) if self.cables is None else self.cables.forces(found.state)
+
+    def bracing_utilisation(self, found: Equilibrium, strength: Strength) -> float | None:
+        """Largest stress of the laths of a third layer over the strength, in an equilibrium of the structure; None:
+        there are none, or one of both is not known.
+
+        Parameters
+        ----------
+        found : an equilibrium of this structure.
+        strength : of the grid's rods; laths of another material are judged by its own.
+        """
+        if self.laths is None:
+            return None
+        layer, count = self.laths, len(self.shell.elements)
+        own = found.elements[count : count + len(layer.shell.elements)]
+        blocks = [element.blocks for element in layer.shell.elements]
+        alone = tuple(replace(element, blocks=at) for element, at in zip(own, blocks, strict=True))  # type: ignore[type-var]
+        bent = bending_of(
+            layer.shell.with_elements(alone), found.state[layer.blocks], layer.rod, shear_weight=strength.shear_weight
+        )
+        material = layer.rod.material
+        limit = strength.strength if layer.rod == self.rod else None if material is None else material.bending_strength
+        return None if bent.stress is None or limit is None else float(bent.stress.max()) / limit
 
     def shell_at(self, found: Equilibrium) -> Shell:
         """The grid's model with its source frames at an equilibrium of the structure.

@@ -63,7 +63,8 @@ def tributary_areas(
     at_corners = np.zeros((len(corners), 4))
     for k in range(3):
         np.add.at(at_corners, faces[:, k], shares)
-    distance, nearest = cKDTree(positions).query(corners, k=min(NEIGHBOURS, len(positions)))
+    wanted = range(1, 1 + min(NEIGHBOURS, len(positions)))
+    distance, nearest = map(np.asarray, cKDTree(positions).query(corners, k=list(wanted)))
     as_near = distance <= distance[:, :1] + AS_NEAR * target.size
     weight = as_near / as_near.sum(axis=1, keepdims=True)
     result, moments = np.zeros((len(positions), 4)), np.zeros((len(positions), 2))

@@ -5,9 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rodshell.arrays import Floats, Ints
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.check import LoadedShell as CheckedShell
+from rodshell.results.from_checks import joint_names
 from rodshell.results.loaded import Governs, LoadedShell
 from rodshell.results.results import Results
 
@@ -23,7 +25,10 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
     """
     found = results.changed(
         loads={
-            name: {ends: _record(mesh, shell) for ends, shell in by_ends.items()}
+            name: {
+                ends: _record(mesh, shell, _in_order(results, mesh, checks.braced, shell.bracing_forces))
+                for ends, shell in by_ends.items()
+            }
             for name, by_ends in checks.shells.items()
         },
         warnings=(*results.warnings, *checks.warnings),
@@ -53,7 +58,17 @@ def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
 _KINDS: dict[str, str] = {"lost": "not followed"}
 
 
-def _record(mesh: GridMesh, shell: CheckedShell) -> LoadedShell:
+def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) -> tuple[float | None, ...]:
+    """The force of each brace of the fabrication; None of those that are left out."""
+    names = joint_names(mesh)
+    known = {
+        frozenset((names[a], names[b])): force for (a, b), force in zip(braced.tolist(), forces.tolist(), strict=True)
+    }
+    rows = results.fabrication.bracing if results.fabrication else ()
+    return tuple(known.get(frozenset((brace.start, brace.end))) for brace in rows) if known else ()
+
+
+def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ...]) -> LoadedShell:
     governs = None
     if shell.governs is not None:
         rod = int(np.searchsorted(mesh.rod_start, shell.governs, side="right")) - 1
@@ -75,4 +90,6 @@ def _record(mesh: GridMesh, shell: CheckedShell) -> LoadedShell:
         uplift=float(max(0.0, -shell.reactions.forces[:, 2].min())),
         reactions=shell.reactions.forces.tolist(),
         moments=shell.reactions.moments.tolist(),
+        bracing=bracing,
+        bracing_utilisation=shell.bracing_utilisation,
     )

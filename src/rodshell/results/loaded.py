@@ -15,7 +15,7 @@ class Governs(Record):
 class LoadedShell(Record):
     """The shell under a combination of loads. Factors multiply the whole combination."""
 
-    at_factor: Number = key("of the combination, under which sums, deflection and utilisation hold: 1, or the last stable")
+    at_factor: Number = key("of the combination, under which all but the factors stands: 1, or the last stable one")
     load_sum: Point | None = key("sum of the loads, those on supports included", "N")
     reaction_sum: Point | None = key("sum of the support forces, without those of the unloaded shell", "N")
     max_deflection: Number = key("largest displacement of a node", "m")
@@ -30,6 +30,10 @@ class LoadedShell(Record):
     uplift: Number = key("largest force that pulls a support up; 0: none", "N")
     reactions: Rows[Point] = rows("force of each support, in the order of boundary, without the unloaded shell's", "N")
     moments: Rows[Point] = rows("moment of each support", "N m")
+    bracing: Rows[Number] = rows(
+        "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
+    )
+    bracing_utilisation: Number = key("utilisation of the laths of a third layer; null: none, or not known")
 
 
 LoadCases = dict[str, ByEnds[LoadedShell]]

@@ -218,7 +218,7 @@ class Fabrication(Record):
     stock_length: Number = key("length of the bars; null: every rod comes in one piece", "m")
     kerf: Number = key("length lost at each saw cut", "m")
     total_mass: Number = key("mass of rods and joints", "kg")
-    bracing: Rows[Brace] = rows("diagonals of the cells, both of a cell in a row")
+    bracing: Rows[Brace] = rows("diagonals of the cells, those of a cell in a row")
     stock: Stock | None = key("the cutting plan")
 
 
@@ -287,7 +287,7 @@ class Results(Record):
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
-    loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and end condition")
+    loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
     deployment: Deployment | None = key("the shell from flat to popped up")
     contact: Contact | None = key("contact of rods with each other")
     other_shapes: ByEnds[OtherShapes] = by_ends("other stable shapes on the same supports")
@@ -423,10 +423,13 @@ def contradictions(results: Results) -> Iterator[str]:
     counts = {"footprint": results.footprint, "boundary": results.boundary, "end_tangents": results.end_tangents}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}
-    for name, by_ends in results.loads.items():
-        for support, loaded in by_ends.items():
+    for name, supported in results.loads.items():
+        for support, loaded in supported.items():
             where = f"loads.{name}.{support}"
             counts |= {f"{where}.reactions": loaded.reactions, f"{where}.moments": loaded.moments}
+            braces = len(results.fabrication.bracing) if results.fabrication else 0
+            if len(loaded.bracing) not in (0, braces):
+                yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
     for name, points in counts.items():
         if len(points) not in (0, 2 * len(ids)):
             yield f"{name} has {len(points)} points for {len(ids)} rods: there must be two for each"
@@ -441,8 +444,8 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
             yield from ((f"joint_loads.{support}[{k}].rods", name) for name in load.rods)
     bent = results.bending.shapes() if results.bending else {}
     yield from ((f"bending.{shape}.rod", worst.rod) for shape, worst in bent.items() if worst.rod is not None)
-    for name, by_ends in results.loads.items():
-        for support, loaded in by_ends.items():
+    for name, supported in results.loads.items():
+        for support, loaded in supported.items():
             if loaded.governs is not None:
                 yield f"loads.{name}.{support}.governs.rod", loaded.governs.rod
     for shape in ("pinned", "clamped", "deployment"):

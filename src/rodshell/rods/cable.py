@@ -17,7 +17,7 @@ from rodshell.validation import brief
 
 
 @dataclass(frozen=True, eq=False)
-class Cables:
+class CableStretch:
     """Tension-only members.
 
     Parameters
