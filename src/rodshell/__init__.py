@@ -14,10 +14,6 @@ Names are imported when they are first used, so that the command line starts at 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from rodshell.uncached import allow_uncached
-
-allow_uncached()
-
 if TYPE_CHECKING:
     from rodshell.checks import check
     from rodshell.errors import (

@@ -177,6 +177,8 @@ class Job:
         ends, case = _ends_and_case(source, unit, changes)
         given = case_of_rod_ends(ends, rod, joint or built(case.joint), OutputOptions())
         tables = {name: getattr(case, name) for name in ("checks", "fabrication", "drawings")}
+        if not (case.drawings.name or isinstance(source, RodEnds)):
+            tables["drawings"] = case.drawings.model_copy(update={"name": Path(source).resolve().stem})
         return cls.of_case(given.model_copy(update=tables | ({} if rod is not None else {"rod": case.rod})))
 
     def changed(self, overrides: Mapping[str, object] | None = None, /, **more: object) -> Self:

@@ -204,9 +204,18 @@ def read_unit(text: str, kind: Kind) -> Decimal:
     if not units.factors:
         raise ValueError(f'takes no unit, and "{text}" follows the number; give {units.wanted}')
     near = {name.lower(): name for name in reversed(units.factors)}
-    close = get_close_matches(unit.lower(), near, n=1, cutoff=0.5)
+    close = _mistyped(unit.lower(), near) or get_close_matches(unit.lower(), near, n=1, cutoff=0.5)
     hint = f" (did you mean {near[close[0]]}?)" if close else ""
     raise ValueError(f'unknown unit "{text}"{hint}; give {units.wanted}')
+
+
+def _mistyped(unit: str, names: Iterable[str]) -> list[str]:
+    """The names from which only one letter differs, and not the first; the most usual one first.
+
+    By shared letters alone "mn" is as near to "m" as to "mm".
+    """
+    alike = (name for name in reversed(list(names)) if len(name) == len(unit) > 1 and name[0] == unit[0])
+    return [name for name in alike if sum(a != b for a, b in zip(name, unit, strict=True)) == 1]
 
 
 def wanted(kind: Kind) -> str:

@@ -17,7 +17,6 @@ from rodshell.cli import main
 from rodshell.output import export
 from rodshell.output.drawing import CAPITAL, Drawing
 from rodshell.output.drawings import sheet_set
-from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.files import KINDS
 from rodshell.output.options import DrawingStyle, OutputOptions
 from rodshell.results import Archive, read
@@ -93,7 +92,7 @@ def dome() -> Archive:
 
 
 def sheets_of(archive: Archive) -> list[Drawing]:
-    return sheet_set(archive, flat_plan(archive))[0]
+    return sheet_set(archive)[0]
 
 
 def hostile_rows() -> Iterator[Row]:

@@ -489,10 +489,12 @@ def test_popup_is_told_what_to_check_to_make_and_to_draw(finder: FakeFinder, dom
     wishes = {"checks.stages": "3", "checks.strength": "30 MPa", "fabrication.kerf": "2 mm", "drawings.author": "Ada"}
     wishes |= {"fabrication.stock_length": "6 m", "drawings.date": "2026-11-22", "drawings.tolerance": "2 mm"}
     options = [word for key, value in wishes.items() for word in (f"--{key}", value)]
-    for source in (["dome"], [write_table(Path("rods.csv"), CROSS), "--unit", "m"]):
+    table = write_table(Path("rods.csv"), CROSS)
+    for name, source in (("dome", ["dome"]), ("rods", [table, "--unit", "m"])):
         assert main(["popup", *source, *options]) == 0
         told = FakeForm.told[-1]
-        assert replace(told, rod_chosen=()) == load_case("hemisphere", wishes).output_options()
+        asked = load_case("hemisphere", {**wishes, "drawings.name": name}).output_options()
+        assert replace(told, rod_chosen=()) == asked
 
 
 def test_popup_writes_only_the_kinds_that_are_asked_for(

@@ -19,7 +19,7 @@ from rodshell.output.drawing import TEXT, Drawing, Pencil
 from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
 from rodshell.output.drawings.flat import diagonals, flat_drawing, flat_plan
-from rodshell.output.drawings.sheets import OVERLAP, SCALES, fitted, room, tiled
+from rodshell.output.drawings.sheets import OVERLAP, SCALES, laid_out, room, tiled
 from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing
 from rodshell.output.grid import joint_places, rods_of
 from rodshell.output.labels import boxes_meet, lines_meet, spread
@@ -58,15 +58,14 @@ def covered(drawing: Drawing) -> list[tuple[str, str]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_drawing_cover_each_other(name: str) -> None:
-    plan = flat_plan(named(name))
-    for drawing in drawing_set(named(name), plan).values():
+    for drawing in drawing_set(named(name)).values():
         assert covered(drawing) == [], drawing.name
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARCHIVES)
 def test_labels_of_no_sheet_cover_each_other(name: str) -> None:
-    sheets, paper = sheet_set(named(name), flat_plan(named(name)))
+    sheets, paper = sheet_set(named(name))
     for sheet in sheets:
         assert covered(sheet) == [], sheet.title
         low, high = sheet.box()
@@ -93,7 +92,8 @@ def test_every_rod_and_joint_is_labelled_on_the_plan(name: str) -> None:
 def test_scale_is_the_largest_standard_one_that_fits() -> None:
     plan = flat_plan(archive("dome"))
     low, high = room(PAPER)
-    sheet = fitted(lambda text: flat_drawing(plan, text), PAPER)
+    layout = laid_out(lambda text: flat_drawing(plan, text), np.zeros(2), PAPER, plan.text)
+    sheet = next(layout.sheets(PAPER))
     bottom, top = sheet.content.box()
     assert np.all(bottom >= low - 1e-9)
     assert np.all(top <= high + 1e-9)
@@ -106,7 +106,7 @@ def test_sheets_of_the_plan_meet_at_their_match_lines() -> None:
     """Within the match lines of all sheets each rod is there once and whole; every sheet goes on beyond them."""
     plan = flat_plan(archive("dome"))
     low, high = room(PAPER)
-    sheets = list(tiled(lambda text: flat_drawing(plan, text), PAPER))
+    sheets = list(tiled(flat_drawing(plan, TEXT), PAPER))
     assert len(sheets) > 1
     drawn = {rod.id: 0.0 for rod in plan.rods}
     for sheet in sheets:
@@ -125,9 +125,7 @@ def test_sheets_of_the_plan_meet_at_their_match_lines() -> None:
 def test_parts_are_named_as_they_lie_and_point_to_their_neighbours() -> None:
     """Row A is the top one; the line to the next row is at the bottom, that to the next column on the right."""
     plan = flat_plan(archive("dome"))
-    sheets = {
-        sheet.title.split(" part ")[1][:2]: sheet for sheet in tiled(lambda text: flat_drawing(plan, text), PAPER)
-    }
+    sheets = {sheet.title.split(" part ")[1][:2]: sheet for sheet in tiled(flat_drawing(plan, TEXT), PAPER)}
     assert list(sheets) == [row + column for row in "ABCD" for column in "12"]
     rods = {part: {path.name for path in sheet.content.paths if path.name} for part, sheet in sheets.items()}
     top = max(plan.rods, key=lambda rod: rod.record.offset or 0.0 if rod.family == "u" else -1.0).id
@@ -257,7 +255,7 @@ def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -
     export(made, tmp_path, ["dxf", "csv"])
     rods, joints, stock = (rows_of(tmp_path / f"schedule/{name}.csv") for name in ("rods", "joints", "stock"))
     pieces = dict(words.split() for row in stock for words in row["pieces_mm"].split("; "))
-    tables = [one for one in sheet_set(made, flat_plan(made))[0] if re.match("(Rods|Joints)(,|$)", one.title)]
+    tables = [one for one in sheet_set(made)[0] if re.match("(Rods|Joints)(,|$)", one.title)]
     printed = {word for sheet in tables for text in sheet.texts for word in text.text.split("; ")}
     entities = read_dxf(tmp_path / "drawings/strips.dxf")
     lines = sorted((one.points for one in entities if one.layer == "LASER"), key=lambda points: -points[0, 1])

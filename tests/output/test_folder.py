@@ -141,20 +141,21 @@ def test_a_manifest_from_elsewhere_reaches_nothing_outside_its_folder(dome: Path
 
 
 def test_files_that_stand_in_the_way_are_refused_before_the_work(tmp_path: Path) -> None:
-    (tmp_path / "mine/pictures").mkdir(parents=True)
-    (tmp_path / "mine/pictures/stage_3-stress.png").write_text("mine")
-    with pytest.raises(ForeignFileError, match=r"stage_3-stress.png in .*mine"), \
-         open_folder(tmp_path / "mine", reserved=NAMES["png"]):  # fmt: skip
+    (tmp_path / "mine/model/pop_up").mkdir(parents=True)
+    (tmp_path / "mine/model/pop_up/stage_3.vtp").write_text("mine")
+    with pytest.raises(ForeignFileError, match=r"stage_3.vtp in .*mine"), \
+         open_folder(tmp_path / "mine", reserved=NAMES["vtp"]):  # fmt: skip
         raise AssertionError
     with open_folder(tmp_path / "mine", reserved=NAMES["dxf"]):
         pass
-    assert list(contents(tmp_path)) == ["mine/pictures/stage_3-stress.png"]
+    assert list(contents(tmp_path)) == ["mine/model/pop_up/stage_3.vtp"]
 
 
 def test_every_name_of_every_kind_is_known_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     costly = (
         "pictures.drawing_png",
         "pictures.picture",
+        "pictures.deployment_picture",
         "pdf.drawings_pdf",
         "drawings.sheet_set",
         "report.report_html",

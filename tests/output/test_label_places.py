@@ -66,8 +66,9 @@ def test_ids_of_joints_can_be_read_on_the_sheet(name: str) -> None:
     """Capitals of 1.8 mm or more, each nearer to its own joint than to any other, and of most joints at 1:1."""
     _, plan = named(name)
     at = {joint.id: mark for joint, mark in zip(plan.joints, plan.marks, strict=True)}
-    for text in fitted(lambda size: flat_drawing(plan, size), (420.0, 297.0)).content.texts:
-        assert text.text not in at or 0.718 * text.size >= 1.8
+    whole, scale = fitted(lambda size: flat_drawing(plan, size), np.zeros(2), (420.0, 297.0))
+    for text in whole.texts:
+        assert text.text not in at or 0.718 * text.size / scale >= 1.8
     drawing = flat_drawing(plan, plan.text)
     written = [text for text in drawing.texts if text.text in at]
     assert len(written) > 0.8 * len(plan.joints)

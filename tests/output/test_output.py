@@ -20,6 +20,7 @@ from rodshell.output import export, picture_svg, save
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.labels import boxes_meet, lines_meet, place
 from rodshell.results import Archive, Results, read
+from rodshell.results.wording import shown_length
 from tests.output.sample_archive import sample_archive, table_archive
 
 TOLERANCE = 0.01  # mm: a tenth of what a saw or a laser holds
@@ -372,7 +373,7 @@ def test_pictures_share_the_view_and_the_scale(archive: Archive) -> None:
         texts = [text.text for text in ET.fromstring(pictures[state]).iter(f"{SVG}text")]
         assert "gap to target in mm, + outside" in texts
         assert {"\N{MINUS SIGN}1", "0", "1"} <= set(texts[-6:])
-        assert ("\N{MINUS SIGN}1.2 mm" in texts) == (state == "popped_pinned")
+        assert ("\N{MINUS SIGN}1.20 mm" in texts) == (state == "popped_pinned")
     with pytest.raises(OutputError, match="popped_clamped"):
         picture_svg(archive, "popped")
 
@@ -384,6 +385,17 @@ def test_the_ring_is_where_the_agreement_found_the_largest_gap(archive: Archive)
     root = ET.fromstring(picture_svg(replace(archive, results=Results.of(result)), "popped_pinned"))
     texts = [text.text for text in root.iter(f"{SVG}text")]
     assert "\N{MINUS SIGN}1.35 mm" in texts
+
+
+def test_the_label_of_the_largest_gap_is_no_finer_than_the_report(archive: Archive) -> None:
+    """With a tolerance of 2 mm both say how small it is, and no more."""
+    style = {"tolerance": 2e-3}
+    coarse = replace(archive, results=Results.of({**archive.results.plain(), "drawings": style}))
+    shown = shown_length(coarse.results)(coarse.results.agreement["clamped"].max)
+    texts = [text.text for text in ET.fromstring(picture_svg(coarse, "popped_clamped")).iter(f"{SVG}text")]
+    assert shown == "under 1 mm"
+    assert shown in texts
+    assert not any("0.12" in (text or "") for text in texts)
 
 
 @pytest.mark.slow

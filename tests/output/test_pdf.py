@@ -3,12 +3,14 @@
 import ctypes
 import re
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pypdfium2
 import pytest
+from reportlab import rl_config
 
 from rodshell.cli import main
 from rodshell.errors import OutputWarning
@@ -73,7 +75,7 @@ def test_a_line_of_known_length_is_as_long_on_the_rendered_page(paper: str) -> N
 def test_a_rod_is_as_long_on_its_strip_as_the_sheet_s_scale_says() -> None:
     """Its thick line on the page as it is rendered, against the scale that is printed there."""
     made = archive("dome")
-    sheets, paper = sheet_set(made, flat_plan(made))
+    sheets, paper = sheet_set(made)
     number = next(k for k, sheet in enumerate(sheets) if sheet.title.startswith("Rod strips"))
     page = pypdfium2.PdfDocument(drawings_pdf(sheets, paper, ""))[number]
     scale = float(re.search(r"Scale 1:([\d.]+)", read_text(page))[1])  # type: ignore[index]
@@ -92,7 +94,7 @@ def test_every_sheet_is_a_page_with_a_bookmark_and_the_file_has_a_title(tmp_path
     made = wished()
     export(made, tmp_path, ["pdf"])
     document = pypdfium2.PdfDocument(tmp_path / "drawings/drawings.pdf")
-    sheets, _ = sheet_set(made, flat_plan(made))
+    sheets, _ = sheet_set(made)
     assert len(document) == len(sheets)
     assert document.get_metadata_value("Title") == "hemisphere"
     assert document.get_metadata_value("Creator") == "rodshell"
@@ -211,7 +213,17 @@ def test_dashes_widths_and_fills_are_those_of_the_pen() -> None:
 
 def test_the_same_sheets_give_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     made: Archive = sample_archive(5)
-    sheets, paper = sheet_set(made, flat_plan(made))
+    sheets, paper = sheet_set(made)
     first = drawings_pdf(sheets, paper, "title")
     monkeypatch.setattr("time.time", lambda: 2e9)
     assert drawings_pdf(sheets, paper, "title") == first
+
+
+def test_two_threads_write_the_same_bytes_and_leave_reportlab_as_it_was() -> None:
+    """reportlab's switch for binary pages holds for the whole process."""
+    before, (sheets, paper) = rl_config.useA85, sheet_set(sample_archive(5))
+    with ThreadPoolExecutor(2) as threads:
+        files = list(threads.map(lambda _: drawings_pdf(sheets, paper, "title"), range(4)))
+    assert len(set(files)) == 1
+    assert b"/ASCII85Decode" not in files[0]
+    assert rl_config.useA85 == before

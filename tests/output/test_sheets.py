@@ -4,6 +4,7 @@ import os
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import rodshell as rs
@@ -12,7 +13,7 @@ from rodshell.joints import Joint, joint_parameters
 from rodshell.output.drawing import CAPITAL, LETTER, TEXT, Drawing
 from rodshell.output.drawings import sheet_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan
-from rodshell.output.drawings.sheets import MARGIN, fitted, parts, tiled, title_block
+from rodshell.output.drawings.sheets import MARGIN, laid_out, room, title_block
 from rodshell.output.options import PAPERS, DrawingStyle
 from rodshell.results import Archive, Results
 from tests.output.forms import archive, wished
@@ -21,7 +22,7 @@ from tests.output.sample_archive import sample_archive, table_archive
 
 
 def sheets(made: Archive) -> list[Drawing]:
-    return sheet_set(made, flat_plan(made))[0]
+    return sheet_set(made)[0]
 
 
 def styled(made: Archive, **style: object) -> Archive:
@@ -57,18 +58,38 @@ def test_parts_show_what_the_whole_leaves_out() -> None:
     def compose(text: float) -> Drawing:
         return flat_drawing(plan, text)
 
-    shown = list(parts(compose, paper, fitted(compose, paper)))
+    layout = laid_out(compose, np.zeros(2), paper, plan.text)
+    _, *shown = layout.sheets(paper)
     texts = {text.text for sheet in shown for text in sheet.content.texts}
     assert {joint.id for joint in plan.joints} <= texts
     coarser = {2.5: 3, 2: 2.5, 1: 2}[shown[0].scale]
-    assert next(tiled(compose, paper, coarser)).content.left_out
+    assert compose(TEXT * coarser).left_out
 
 
 def test_a_sheet_that_shows_all_needs_no_parts() -> None:
     plan, paper = flat_plan(table_archive()), PAPERS["A0"]
-    whole = fitted(lambda text: flat_drawing(plan, text), paper)
-    assert not whole.content.left_out
-    assert list(parts(lambda text: flat_drawing(plan, text), paper, whole)) == []
+    layout = laid_out(lambda text: flat_drawing(plan, text), np.zeros(2), paper, plan.text)
+    assert not layout.whole.left_out
+    assert layout.detail is layout.whole
+    assert len(list(layout.sheets(paper))) == 1
+
+
+def test_a_drawing_whose_sheet_shows_all_is_laid_out_once_for_files_and_paper() -> None:
+    """Only scales at which it does not fit are tried before; none at which it cannot."""
+    plan, paper, tried = flat_plan(table_archive()), PAPERS["A3"], list[float]()
+
+    def compose(text: float) -> Drawing:
+        tried.append(text)
+        return flat_drawing(plan, text)
+
+    extent = np.ptp(plan.cuts.reshape(-1, 2), axis=0)
+    layout = laid_out(compose, extent, paper, plan.text)
+    assert not layout.whole.left_out
+    assert layout.detail is layout.whole
+    assert tried[-1] == layout.whole.text == TEXT * layout.scale
+    low, high = room(paper)
+    assert len(tried) <= 3
+    assert np.all(extent / (min(tried) / TEXT) <= high - low)
 
 
 @pytest.mark.slow

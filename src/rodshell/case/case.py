@@ -65,24 +65,24 @@ class Built(NamedTuple):
 class Case(Table):
     """Everything that decides one job, complete and in SI. Make one with `load_case`."""
 
-    target: TargetTable = Field(default=HemisphereTable(), discriminator="kind")
-    layout: LayoutTable = LayoutTable()
-    rod: RodTable = RodTable()
-    joint: JointKinds = Field(default=BallTable(), discriminator="kind")
-    drape: DrapeTable = DrapeTable()
-    pop_up: PopUpTable = PopUpTable()
-    seams: SeamsTable = SeamsTable()
-    checks: ChecksTable = ChecksTable()
-    fabrication: FabricationTable = FabricationTable()
-    drawings: DrawingsTable = DrawingsTable()
+    target: TargetTable = Field(default_factory=HemisphereTable, discriminator="kind")
+    layout: LayoutTable = Field(default_factory=LayoutTable)
+    rod: RodTable = Field(default_factory=RodTable)
+    joint: JointKinds = Field(default_factory=BallTable, discriminator="kind")
+    drape: DrapeTable = Field(default_factory=DrapeTable)
+    pop_up: PopUpTable = Field(default_factory=PopUpTable)
+    seams: SeamsTable = Field(default_factory=SeamsTable)
+    checks: ChecksTable = Field(default_factory=ChecksTable)
+    fabrication: FabricationTable = Field(default_factory=FabricationTable)
+    drawings: DrawingsTable = Field(default_factory=DrawingsTable)
     loads: tuple[LoadKinds, ...] = Field(
         default=(), description="file with [[loads]] and their [[combinations]]; in a case file tables"
     )
     combinations: tuple[CombinationTable, ...] = Field(
         default=(), description="combinations of loads; in a case file only"
     )
-    bracing: BracingKinds = Field(default=NoBracingTable(), discriminator="kind")
-    stability: StabilityTable = StabilityTable()
+    bracing: BracingKinds = Field(default_factory=NoBracingTable, discriminator="kind")
+    stability: StabilityTable = Field(default_factory=StabilityTable)
 
     @property
     def held_objects(self) -> dict[str, Held]:

@@ -19,10 +19,10 @@ from rodshell.units import shown
 from rodshell.validation import either, not_a_choice
 
 BY_KIND: dict[str, str] = {
-    "target": Case().target.kind,
-    "rod.section": Case().rod.section.kind,
-    "joint": Case().joint.kind,
-    "bracing": Case().bracing.kind,
+    "target": "hemisphere",
+    "rod.section": "auto",
+    "joint": "ball",
+    "bracing": "none",
     "bracing.section": "circle",
 }
 """Tables whose `kind` decides which keys they have, and the kind that they are by default."""

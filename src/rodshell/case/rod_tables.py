@@ -151,7 +151,7 @@ class RodTable(Table):
     """Section and material; what is left out, or "auto", is chosen to fit the target."""
 
     section: AutoTable | CircleTable | TubeTable | EllipseTable | RectangleTable | GivenTable = Field(
-        default=AutoTable(), discriminator="kind"
+        default_factory=AutoTable, discriminator="kind"
     )
     material: MaterialTable | None = None
 

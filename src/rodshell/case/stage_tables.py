@@ -253,7 +253,7 @@ class DrawingsTable(Table):
     tolerance: Length | None = Field(
         default=None, description="tolerance of lengths, which are shown to a tenth of it or finer"
     )
-    layers: LayersTable = LayersTable()
+    layers: LayersTable = Field(default_factory=LayersTable)
     name: str = Field(default="", description="title of the drawings; default: the target's name")
     author: str = Field(default="", description="who drew them or is responsible for them, for the title block")
     date: IsoDate = Field(default="", description='date for the title block, such as "2026-11-22"; default: today')

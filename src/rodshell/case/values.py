@@ -21,7 +21,7 @@ T = TypeVar("T")
 class Table(BaseModel):
     """A table of a case file: frozen, and every key in it must be known."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     _held: "Held | None" = PrivateAttr(default=None)
 

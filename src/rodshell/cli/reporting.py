@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import click
 
 from rodshell.cli.interruption import Interruption
-from rodshell.uncached import kernels_are_kept
+from rodshell.kernels.cache import kernels_are_kept
 
 if TYPE_CHECKING:
     from rich.status import Status

@@ -13,7 +13,7 @@ import click
 from rodshell.cli.options import QUIET
 from rodshell.cli.reporting import UNKEPT, Progress
 from rodshell.errors import InputError
-from rodshell.uncached import kernels_are_kept
+from rodshell.kernels.cache import kernels_are_kept
 
 if TYPE_CHECKING:
     from rodshell.layout import GridLayout

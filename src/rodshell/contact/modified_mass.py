@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import dot
+from rodshell.kernels import njit
 from rodshell.model import Freedom
 from rodshell.targets import Target
 from rodshell.validation import brief, choice, instance, not_negative
@@ -232,7 +232,7 @@ class ModifiedMass:
         return result
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _turn(directions, count, nodes, stuck, along, cosine):  # type: ignore[no-untyped-def]
     """Reflect the directions of each node so that the last is the free part of the normal `along`; it becomes zero."""
     part, mirror = np.empty(3), np.empty(3)

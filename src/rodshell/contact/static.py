@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import dot
+from rodshell.kernels import njit
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.targets import Gap, Target
@@ -135,7 +135,7 @@ class UnilateralContact:
         return self
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _tangents(steepest, guides):  # type: ignore[no-untyped-def]
     """(n, 3, 3) two directions across `steepest` (n, 3), the first nearest to `guides` (n, 3); the third is zero."""
     directions = np.zeros((len(steepest), 3, 3))

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import degrees
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
@@ -20,6 +19,7 @@ from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.geometry.frames import dot
 from rodshell.joints import Joint
+from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import whole_rods
 from rodshell.layout.mesh import nodes_along
@@ -287,7 +287,7 @@ def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
     return target.retract(result)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _correct(points, normal, rod_nodes, rod_start, rod_stop, stations, joint, result):  # type: ignore[no-untyped-def]
     for rod in range(len(rod_start)):
         nodes, s = rod_nodes[rod_start[rod] : rod_stop[rod]], stations[rod_start[rod] : rod_stop[rod]]
@@ -315,13 +315,13 @@ def _correct(points, normal, rod_nodes, rod_start, rod_stop, stations, joint, re
                 _shift(result, nodes[k], far * (slope + 0.5 * far * moments[end]), side, k)
 
 
-@nb.njit(cache=True)
+@njit()
 def _shift(result, node, shift, side, k):  # type: ignore[no-untyped-def]
     for i in range(3):
         result[node, i] += shift * side[k, i]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _sideways(points, normal, nodes):  # type: ignore[no-untyped-def]
     """(n, 3) unit vectors in the surface across a rod."""
     side, last = np.empty((len(nodes), 3)), len(nodes) - 1
@@ -336,7 +336,7 @@ def _sideways(points, normal, nodes):  # type: ignore[no-untyped-def]
     return side
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _curvature(points, nodes, s, side):  # type: ignore[no-untyped-def]
     """(n,) geodesic curvature towards `side` by three nodes [1/m], extrapolated to the ends."""
     curvature = np.empty(len(nodes))
@@ -352,7 +352,7 @@ def _curvature(points, nodes, s, side):  # type: ignore[no-untyped-def]
     return curvature
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _moments(s, first, last):  # type: ignore[no-untyped-def]
     """(n,) second derivatives of the cubic spline that vanishes at `s` (n,), given those at its ends."""
     moments, share = np.zeros(len(s)), np.zeros(len(s))

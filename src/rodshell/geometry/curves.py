@@ -2,15 +2,15 @@
 
 from collections.abc import Iterable
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.kernels import njit
 
 TOUCH = 1e-6  # of the extent of all polylines: ends this close are joined
 
 
-@nb.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def lagrange(knots: Floats, points: Floats, s: Floats) -> Floats:
     """Interpolate with polynomials, one for each requested point.
 
@@ -54,7 +54,7 @@ def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:
     return np.asarray(_on_curve(knots, np.ascontiguousarray(points), s))
 
 
-@nb.njit(cache=True)
+@njit()
 def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     window = _nearest(knots, s)
     near, around = np.empty(window.shape), np.empty((*window.shape, points.shape[1]))
@@ -65,7 +65,7 @@ def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
     return lagrange(near, around, s)
 
 
-@nb.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+@njit()  # type: ignore[untyped-decorator, unused-ignore]
 def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: float) -> Floats:
     """Interpolate m lines with common knots, as `on_curve` does.
 
@@ -110,7 +110,7 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
     return result
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _window(knots, at, right, first, last, shares, row):  # type: ignore[no-untyped-def]
     """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, and their weights in
     `shares[row]` (4,)."""
@@ -124,7 +124,7 @@ def _window(knots, at, right, first, last, shares, row):  # type: ignore[no-unty
     return window
 
 
-@nb.njit(cache=True)
+@njit()
 def _nearest(knots, s):  # type: ignore[no-untyped-def]
     """(n, 4) the knots around each `s` (n,), or all if there are fewer."""
     count = min(4, len(knots))

@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol, Self, TypeVar
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import adapted, parallel_transport, unit
+from rodshell.kernels import njit
 from rodshell.layout import GridMesh
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import NO_HESSIANS
@@ -213,7 +213,7 @@ def _stencil(rod_nodes: RodNodes, pairs: Ints, has_edge: Bools) -> tuple[Ints, I
     return np.column_stack(columns), np.array(legs), np.array(middles), np.column_stack(weights)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore[no-untyped-def]
     """Length of an edge; its tangent, material directors, spin w, and (source + t) / (1 + source.t).
 
@@ -250,7 +250,7 @@ def frame(x, blocks, leg, source, director, t, m1, m2, w, half):  # type: ignore
     return length
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def by_edge(weight, length, t, m1, m2, w, jacobian):  # type: ignore[no-untyped-def]
     """(6, 4) derivatives of the edge's share of T and N by (e, theta); dm1 = -(m1.dt) t + m2 (dtheta - w.de).
 
@@ -270,7 +270,7 @@ def by_edge(weight, length, t, m1, m2, w, jacobian):  # type: ignore[no-untyped-
         jacobian[3 + i, 3] = weight * m2[i]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ignore[no-untyped-def]
     """Add the second derivatives of t and m1, contracted with the energy's derivatives by T and N, to `local` (4, 4).
 
@@ -309,7 +309,7 @@ def of_edge(weight, by_t, by_n, length, t, m1, m2, w, half, local):  # type: ign
     local[3, 3] -= n1
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def spread(local, leg, other, hessian):  # type: ignore[no-untyped-def]
     """Add `local` (4, 4), by (e, theta) of two edges, to the rows and columns of their nodes and angles.
 

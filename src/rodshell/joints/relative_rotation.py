@@ -26,13 +26,13 @@ from dataclasses import dataclass
 from math import pi
 from typing import Self
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted, cross, dot
 from rodshell.joints.crossings import by_edge, edge_tangents, frame, of_edge, spread, with_source
+from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 
@@ -157,7 +157,7 @@ class RelativeRotation:
         return np.column_stack([shear, dot(lean, ta), dot(nb_, ta), dot(lean, tb), -dot(na, tb)])
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _relative_rotation(  # type: ignore[no-untyped-def]
     x, blocks, legs, weights, stiffness, deviators, rest_angle, tangents, directors, gradient, hessians
 ):
@@ -226,7 +226,7 @@ def _relative_rotation(  # type: ignore[no-untyped-def]
 # are tangent and normal of the section of rod A, then those of rod B; the strains are (s, eA, eB), five numbers.
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _respond(strain, rest_angle, stiffness, deviators, force, tangent):  # type: ignore[no-untyped-def]
     """Energy of a joint at the strains (s, eA, eB) (5,); its derivatives by them, `force` (5,) and `tangent` (5, 5).
 
@@ -270,7 +270,7 @@ def _respond(strain, rest_angle, stiffness, deviators, force, tangent):  # type:
     return 0.5 * (stiffness[0, 0] * s * s + (f.conjugate() * e).real)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _shear_parts(y, by_up, by_flat):  # type: ignore[no-untyped-def]
     """Of the shear's tangent up / flat, n.(TA x TB) over |n| TA.TB with n = NA + NB: up, TA.TB, |n|, n, and slopes."""
     normal = (y[3] + y[9], y[4] + y[10], y[5] + y[11])
@@ -289,7 +289,7 @@ def _shear_parts(y, by_up, by_flat):  # type: ignore[no-untyped-def]
     return up, along, size, normal
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _strains(y, rest_angle, strain, slope, by_up, by_flat):  # type: ignore[no-untyped-def]
     """The strains (s, eA, eB) and their derivatives (5, 12) by y."""
     up, along, size, _ = _shear_parts(y, by_up, by_flat)
@@ -315,7 +315,7 @@ def _strains(y, rest_angle, strain, slope, by_up, by_flat):  # type: ignore[no-u
         strain[4] -= y[3 + k] * y[6 + k]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _curvatures(y, force, stiffness, slope, by_up, by_flat, curve):  # type: ignore[no-untyped-def]
     """(12, 12) second derivatives of the energy by y; `stiffness` (5, 5) are those by the strains."""
     up, along, size, normal = _shear_parts(y, by_up, by_flat)
@@ -357,7 +357,7 @@ def _curvatures(y, force, stiffness, slope, by_up, by_flat, curve):  # type: ign
         curve[6 + i, 3 + i] -= force[4]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _add_triple(factor, a, b, c, curve):  # type: ignore[no-untyped-def]
     """Add factor times the second derivatives of the triple product a.(b x c) by its arguments at a and b of y."""
     for i in range(3):

@@ -15,7 +15,6 @@ A lies above rod B.
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
@@ -30,6 +29,7 @@ from rodshell.joints.crossings import (
     stencils,
     with_source,
 )
+from rodshell.kernels import njit
 from rodshell.layout.flatgrid import sides
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.rods.section import Rod
@@ -216,7 +216,7 @@ def offset_ties(rod_nodes: RodNodes, eccentricity: Floats, stiffness: float, siz
     return sets
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _offset_tie(  # type: ignore[no-untyped-def]
     x, blocks, legs, middles, weights, stiffness, offsets, tangents, directors, gradient, hessians
 ):
@@ -274,7 +274,7 @@ def _offset_tie(  # type: ignore[no-untyped-def]
     return energy
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _with_nodes(factor, jacobian, leg, middles, hessian):  # type: ignore[no-untyped-def]
     """Add factor * dN/d(e, theta) between an edge and the joint's nodes: + with that on B, - with that on A."""
     for k in range(3):

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, Longs
+from rodshell.kernels import njit
 from rodshell.validation import brief
 
 
@@ -190,7 +190,7 @@ def _pattern(element_blocks: Sequence[Ints], count: Ints) -> tuple[Ints, Ints]:
     return kept, unique
 
 
-@nb.njit(cache=True)
+@njit()
 def _count_pairs(blocks, count, total):  # type: ignore[no-untyped-def]
     for m in range(blocks.shape[0]):
         for b in range(blocks.shape[1]):
@@ -200,7 +200,7 @@ def _count_pairs(blocks, count, total):  # type: ignore[no-untyped-def]
                     total[j + 1] += 1
 
 
-@nb.njit(cache=True)
+@njit()
 def _fill_pairs(blocks, count, end, rows):  # type: ignore[no-untyped-def]
     for m in range(blocks.shape[0]):
         for b in range(blocks.shape[1]):
@@ -211,7 +211,7 @@ def _fill_pairs(blocks, count, end, rows):  # type: ignore[no-untyped-def]
                     end[j] += 1
 
 
-@nb.njit(cache=True)
+@njit()
 def _unique_rows(start, rows):  # type: ignore[no-untyped-def]
     """Each column's rows ascending, once each; a few dozen at most, so by insertion."""
     n = len(start) - 1
@@ -232,7 +232,7 @@ def _unique_rows(start, rows):  # type: ignore[no-untyped-def]
     return kept, rows[:used].copy()
 
 
-@nb.njit(cache=True)
+@njit()
 def _columns(start, rows, first, count):  # type: ignore[no-untyped-def]
     """The pattern by unknowns; rows above each diagonal block; and where each stored block begins in the values."""
     n, unknowns = len(start) - 1, int(count.sum())
@@ -260,7 +260,7 @@ def _columns(start, rows, first, count):  # type: ignore[no-untyped-def]
     return indptr, indices, above, slot
 
 
-@nb.njit(cache=True)
+@njit()
 def _find_slots(blocks, count, start, rows, slot):  # type: ignore[no-untyped-def]
     """(m, k, k) where each pair of an element's blocks begins in the values, -1 if it is not stored."""
     k = blocks.shape[1]
@@ -277,7 +277,7 @@ def _find_slots(blocks, count, start, rows, slot):  # type: ignore[no-untyped-de
     return slots
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _scatter(hessians, blocks, slots, count, above, directions, data):  # type: ignore[no-untyped-def]
     """Add T' H T of every element; T holds the free directions of its blocks as columns."""
     k = blocks.shape[1]
@@ -304,7 +304,7 @@ def _scatter(hessians, blocks, slots, count, above, directions, data):  # type: 
                         )
 
 
-@nb.njit(cache=True)
+@njit()
 def _expand(q, directions, count):  # type: ignore[no-untyped-def]
     result, at = np.zeros((len(count), 3)), 0
     for i in range(len(count)):
@@ -315,7 +315,7 @@ def _expand(q, directions, count):  # type: ignore[no-untyped-def]
     return result
 
 
-@nb.njit(cache=True)
+@njit()
 def _reduce(gradient, directions, count, size):  # type: ignore[no-untyped-def]
     result, at = np.empty(size), 0
     for i in range(len(count)):

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from math import cos, degrees, sin
 from string import ascii_lowercase
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError, NetLimitError
 from rodshell.geometry.curves import on_curve
+from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import rod_name
@@ -221,7 +221,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
     return float(np.arctan2(np.linalg.norm(np.cross(along, across)), abs(along @ across))), (x, y, z)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _sharpest(points, inside):  # type: ignore[no-untyped-def]
     """Indices of the inside node with the smallest angle, which has the largest cosine; and whether the net has all
     nodes next to the inside ones."""

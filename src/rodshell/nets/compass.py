@@ -12,11 +12,11 @@ The net's points P are on the target, between the layers.
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.kernels import njit
 from rodshell.targets import Implicit, Target
 
 Heights = tuple[float, float]
@@ -191,7 +191,7 @@ def geodesics(target: Target | Layer, start: Floats, direction: Floats, steps: l
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # type: ignore[no-untyped-def]
     """One Newton step of all chords, in place; `swing` is the derivative of `chord` by `turn`. Returns whether another
     step is needed."""
@@ -232,7 +232,7 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None) -> Non
         net.points[i, j] = _compass(target, net.heights, *rest)
 
 
-@nb.njit(cache=True)
+@njit()
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
     Returns the anti-diagonal to continue from; their indices; the neighbours A towards the u axis, B towards the v
@@ -280,7 +280,7 @@ def _compass(
     return p
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change, sine):  # type: ignore[no-untyped-def]
     """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
     of the crossing angle before it. Returns whether another step is needed.
@@ -305,7 +305,7 @@ def _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change,
     return going
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """Newton's step towards |x| = from_a, |y| = from_b and f = 0 from x = P - A, y = P - B and f = level with the
     gradient g, to be subtracted from P; and the sine of the crossing angle, y x x along the normal.
@@ -333,7 +333,7 @@ def compass_step(x, y, by_x, by_y, g, from_a, from_b, level):  # type: ignore[no
     return step, -volume / (np.sqrt(_dot(g, g)) * from_a * from_b)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: ignore[no-untyped-def]
     """As `compass_step`, for x = P + h_v n - A and y = P + h_u n - B with n = g/|g|, A and B being points of layers.
 
@@ -356,7 +356,7 @@ def layered_step(p, a, b, g, hessian, heights, from_a, from_b, level):  # type: 
     return compass_step(x, y, by_x, by_y, g, from_a, from_b, level)
 
 
-@nb.njit(cache=True)
+@njit()
 def _by_point(x, height, n, hessian):  # type: ignore[no-untyped-def]
     """x (1 + h dn/dP) with dn/dP = (1 - n n) F''/|F'|; the height comes divided by |F'|."""
     out = _dot(x, n)
@@ -368,17 +368,17 @@ def _by_point(x, height, n, hessian):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(cache=True)
+@njit()
 def less(a, b):  # type: ignore[no-untyped-def]
     """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@nb.njit(cache=True)
+@njit()
 def _cross(a, b):  # type: ignore[no-untyped-def]
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@nb.njit(cache=True)
+@njit()
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

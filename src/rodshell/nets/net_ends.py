@@ -12,11 +12,11 @@ from itertools import pairwise
 from math import inf
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import lagrange
+from rodshell.kernels import njit
 from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets.compass import Net
 from rodshell.targets import Target
@@ -63,7 +63,7 @@ def inside_nodes(target: Target, net: Net) -> Bools:
     return reached
 
 
-@nb.njit(cache=True)
+@njit()
 def _connect(region, reached):  # type: ignore[no-untyped-def]
     """Extend the nodes `reached` (nu, nv) to all nodes of the `region` (nu, nv) that are connected with them."""
     nu, nv = region.shape
@@ -95,7 +95,7 @@ def _region(target: Target, net: Net) -> Bools:
     return np.asarray(inside)
 
 
-@nb.njit(cache=True)
+@njit()
 def _squares(points, u, v):  # type: ignore[no-untyped-def]
     """Indices (n, 2) of the middle of each square of nodes that are all known, and path lengths (n,) to its corners."""
     half, count = SQUARE // 2, 0
@@ -110,7 +110,7 @@ def _squares(points, u, v):  # type: ignore[no-untyped-def]
     return middles[:count], way[:count]
 
 
-@nb.njit(cache=True)
+@njit()
 def _by_squares(points, middles, margin):  # type: ignore[no-untyped-def]
     """Which nodes (nu, nv) are in squares with a positive `margin` (n,), and indices (m, 2) of the known nodes that
     are in no square with a margin other than 0."""

@@ -7,11 +7,11 @@ same net in longer steps; the first of these nets has only a few long steps.
 
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
+from rodshell.kernels import njit
 from rodshell.layout import GridLayout
 from rodshell.layout.flatgrid import Family
 from rodshell.layout.gridlayout import auto_edge
@@ -115,7 +115,7 @@ def wanted_nodes(near: Covering, past: int, u: Floats, v: Floats, margin: Floats
     return np.asarray(_wanted(near.inside, near.u, near.v, past, u, v, *margin))
 
 
-@nb.njit(cache=True)
+@njit()
 def _wanted(inside, known_u, known_v, past, u, v, margin_u, margin_v):  # type: ignore[no-untyped-def]
     """See `wanted_nodes`. In each quadrant the nodes are below a staircase that only descends, away from the axis."""
     wanted = np.zeros((len(u), len(v)), dtype=np.bool_)

@@ -6,12 +6,12 @@ models there. That is Newton's method for the whole net, whose matrix is triangu
 three rounds, whatever the number of nodes. The equations, and so the net, are those of `compass`.
 """
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.curves import resampled
 from rodshell.geometry.frames import cross, unit
+from rodshell.kernels import njit
 from rodshell.nets.compass import (
     NEWTON_STEPS,
     ON_SURFACE,
@@ -142,7 +142,7 @@ def _layers_of_axes(target: Target, heights: Heights, middle: int, stop: int) ->
     return (Layer(target, heights[0]), slice(0, middle)), (Layer(target, heights[1]), slice(middle, stop))
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _geodesic(start, direction, normal, steps, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Move the `points` of one arm of `compass.geodesics`, on second order models there; return by how much, or NaN."""
     point, tangent, normal, moved = start.copy(), direction.copy(), normal.copy(), 0.0
@@ -203,7 +203,7 @@ def _refine(target: Target, net: Net, wanted: Bools) -> None:
     _forget(net.points, moved >= CONVERGED * target.size, i0, j0)
 
 
-@nb.njit(cache=True)
+@njit()
 def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def]
     """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
     `row` (nu, nv) is the index of each in the result, -1 for the others; `models` (nu, nv, 3) is a copy of all."""
@@ -220,7 +220,7 @@ def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def
     return chosen[:count]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _sweep(  # type: ignore[no-untyped-def]
     points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
 ):
@@ -274,7 +274,7 @@ def _sweep(  # type: ignore[no-untyped-def]
                     points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
 
 
-@nb.njit(cache=True)
+@njit()
 def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
     """Value and gradient of the second order model r, at a distance `away` from its point."""
     x, y, z = away
@@ -286,7 +286,7 @@ def _model(r, away, value, gradient, hessian):  # type: ignore[no-untyped-def]
     return level, (gx + bx, gy + by, gz + bz)
 
 
-@nb.njit(cache=True)
+@njit()
 def _raised(point, height, normals, i, j):  # type: ignore[no-untyped-def]
     return (
         point[0] + height * normals[i, j, 0],
@@ -295,12 +295,12 @@ def _raised(point, height, normals, i, j):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(cache=True)
+@njit()
 def _at(points, i, j):  # type: ignore[no-untyped-def]
     return points[i, j, 0], points[i, j, 1], points[i, j, 2]
 
 
-@nb.njit(cache=True)
+@njit()
 def _plus(a, b):  # type: ignore[no-untyped-def]
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 

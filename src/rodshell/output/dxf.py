@@ -1,7 +1,6 @@
 """A drawing as DXF R2010 in millimetres, by ezdxf: named layers, line types, text styles; the same bytes each time."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from io import StringIO
 from itertools import chain, count
 from math import degrees
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 FORBIDDEN = '<>/\\":;?*|=`,'  # in a layer's name [DXF reference]; it holds LONGEST letters at most
 LONGEST = 200
 CAPITAL = 0.716  # height of Arial's capitals over the text size; a DXF text is as high as its capitals
+DATE = 2451544.5  # 2000-01-01, a Julian date
+IDENTIFIER = "{00000000-0000-0000-0000-000000000000}"
 STYLES = {False: ("SANS", "arial.ttf"), True: ("SANS-BOLD", "arialbd.ttf")}  # which every CAD program has or replaces
 
 
@@ -30,22 +31,17 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
     """
     import ezdxf
 
-    with _fixed_dates():
-        document = ezdxf.new("R2010", units=ezdxf.units.MM)
-        layers = layer_names(names or {})
-        _set_up(document, layers, drawing)
-        space = document.modelspace()
-        for path in drawing.paths:
-            _add_path(space, path, layers[path.layer])
-        for mark in drawing.marks:
-            space.add_circle(mark.at.tolist(), float(mark.radius), dxfattribs={"layer": layers[mark.layer]})
-        for text in drawing.texts:
-            _add_text(space, text, layers[text.layer])
-        for kind in sorted(document.entitydb.dxf_types_in_use()):
-            document.classes.add_class(kind)  # in a fixed order: `write` has that of a set
-        stream = StringIO()
-        document.write(stream)
-    return stream.getvalue()
+    document = ezdxf.new("R2010", units=ezdxf.units.MM)
+    layers = layer_names(names or {})
+    _set_up(document, layers, drawing)
+    space = document.modelspace()
+    for path in drawing.paths:
+        _add_path(space, path, layers[path.layer])
+    for mark in drawing.marks:
+        space.add_circle(mark.at.tolist(), float(mark.radius), dxfattribs={"layer": layers[mark.layer]})
+    for text in drawing.texts:
+        _add_text(space, text, layers[text.layer])
+    return _written(document)
 
 
 def layer_names(names: Mapping[str, str]) -> dict[str, str]:
@@ -65,17 +61,27 @@ def layer_names(names: Mapping[str, str]) -> dict[str, str]:
     return shown
 
 
-@contextmanager
-def _fixed_dates() -> Iterator[None]:
-    """Files of the same content are the same: without the time of writing and random identifiers."""
-    import ezdxf
+def _written(document: "Document") -> str:
+    """As `document.write`, but files of the same content are the same: no time of writing, no random identifiers.
 
-    before = ezdxf.options.write_fixed_meta_data_for_testing
-    ezdxf.options.write_fixed_meta_data_for_testing = True
-    try:
-        yield
-    finally:
-        ezdxf.options.write_fixed_meta_data_for_testing = before
+    ezdxf has a switch for that, which holds for the whole process, other threads included.
+    """
+    from ezdxf.document import CREATED_BY_EZDXF, WRITTEN_BY_EZDXF
+    from ezdxf.lldxf.tagwriter import TagWriter
+
+    for kind in sorted(document.entitydb.dxf_types_in_use()):
+        document.classes.add_class(kind)  # in a fixed order: `update_all` has that of a set
+    document.commit_pending_changes()
+    document.update_all()
+    for date in ("$TDCREATE", "$TDUCREATE", "$TDUPDATE", "$TDUUPDATE"):
+        document.header[date] = DATE
+    for identifier in ("$VERSIONGUID", "$FINGERPRINTGUID"):
+        document.header[identifier] = IDENTIFIER
+    about = document.ezdxf_metadata()
+    about[CREATED_BY_EZDXF] = about[WRITTEN_BY_EZDXF] = "rodshell"
+    stream = StringIO()
+    document.export_sections(TagWriter(stream, document.dxfversion))
+    return stream.getvalue()
 
 
 def _set_up(document: "Document", layers: Mapping[str, str], drawing: Drawing) -> None:

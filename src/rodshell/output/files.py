@@ -103,7 +103,7 @@ class Content:
     def drawings(self) -> "dict[str, Drawing]":
         from rodshell.output.drawings import drawing_set
 
-        return drawing_set(self.archive, self.plan)
+        return drawing_set(self.archive)
 
 
 def files_of(archive: Archive, kinds: Iterable[str] | None = None) -> Files:
@@ -199,7 +199,7 @@ def _pdf(content: Content) -> Files:
     from rodshell.output.drawings import sheet_set
     from rodshell.output.pdf import drawings_pdf
 
-    sheets, paper = sheet_set(content.archive, content.plan)
+    sheets, paper = sheet_set(content.archive)
     yield "drawings/drawings.pdf", drawings_pdf(sheets, paper, content.archive.name)
 
 
@@ -264,16 +264,19 @@ def _rhino(content: Content) -> Files:
 
 
 def _png(content: Content) -> Files:
-    from rodshell.output.grid import shape_names, shape_of
-    from rodshell.output.pictures import drawing_png, picture
+    from rodshell.output.grid import shape_of
+    from rodshell.output.pictures import deployment_picture, drawing_png, picture
 
     archive = content.archive
-    for name in shape_names(archive) if _meshed(archive) else []:
+    popped = [name for name in _shells(archive) if name != "draped"]
+    for name in ("flat", *(popped or _shells(archive))) if _meshed(archive) else []:
         shape = shape_of(archive, name)
         if shape.gap is not None or shape.stress is None:
             yield f"pictures/{name}.png", drawing_png(picture(archive, name))
         if shape.stress is not None:
             yield f"pictures/{name}-stress.png", drawing_png(picture(archive, name, "stress"))
+    if "history" in archive.states and _meshed(archive):
+        yield "pictures/pop_up.png", drawing_png(deployment_picture(archive))
 
 
 def _report(content: Content) -> Files:
@@ -314,7 +317,10 @@ NAMES: dict[str, list[str]] = {
     ],
     "compas": [f"model/{state}.json" for state in SHELLS],
     "3dm": ["model/rodshell.3dm"],
-    "png": [f"pictures/{state}{what}.png" for state in (*SHELLS, *_STAGES) for what in ("", "-stress")],
+    "png": [
+        *(f"pictures/{state}{what}.png" for state in ("flat", *SHELLS) for what in ("", "-stress")),
+        "pictures/pop_up.png",
+    ],
     "report": ["report.html"],
 }  # fmt: skip
 """Of the files of each kind: names that may conflict with files of others are checked before the work."""

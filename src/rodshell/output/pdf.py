@@ -10,6 +10,7 @@ from functools import cache
 from io import BytesIO
 from itertools import groupby
 from math import cos, sin
+from threading import Lock
 from typing import TYPE_CHECKING
 
 from rodshell.errors import OutputWarning
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 POINTS = 72 / 25.4  # of a millimetre
 SANS = {False: "rodshell-sans", True: "rodshell-sans-bold"}
+ONE_AT_A_TIME = Lock()
 MOST_NAMED = 10  # characters without a glyph that a warning shows
 
 
@@ -66,14 +68,18 @@ def drawings_pdf(sheets: Sequence[Drawing], paper: tuple[float, float], title: s
 
 @contextmanager
 def _binary_streams() -> Iterator[None]:
-    """Pages as bytes, not as text of ASCII letters, which reportlab prefers: a fifth shorter, and faster."""
+    """Pages as bytes, not as text of ASCII letters, which reportlab prefers: a fifth shorter, and faster.
+
+    The switch holds for the whole process, so that only one thread at a time writes a file.
+    """
     from reportlab import rl_config
 
-    before, rl_config.useA85 = rl_config.useA85, 0
-    try:
-        yield
-    finally:
-        rl_config.useA85 = before
+    with ONE_AT_A_TIME:
+        before, rl_config.useA85 = rl_config.useA85, 0
+        try:
+            yield
+        finally:
+            rl_config.useA85 = before
 
 
 @cache

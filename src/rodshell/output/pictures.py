@@ -5,7 +5,7 @@ draws soft edges, and written by Pillow, as their texts are.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from io import BytesIO
 from typing import TYPE_CHECKING
@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, length_unit, mixed, scale_of
+from rodshell.output.colour_scale import FINEST, Colour, Scale, colour_bar, largest_gap, mixed, scale_of
 from rodshell.output.drawing import BOLD, LAYERS, REGULAR, Drawing, Path, Pen, Pencil, Text
-from rodshell.output.grid import GridRod, Shape, opens, outlines_of, rods_of, shape_of
+from rodshell.output.grid import STAGE, GridRod, Shape, opens, outlines_of, rods_of, shape_names, shape_of
 from rodshell.output.svg import number, picture_document
 from rodshell.results.archive import SHELLS, Archive, made_once
-from rodshell.results.wording import MINUS, nice_ticks
+from rodshell.results.wording import MINUS, UNDER, nice_ticks, shown_length
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -121,6 +121,7 @@ Polylines = list[list[tuple[int, slice]]]
 
 WIDTH = 540.0  # drawing units of the shell itself
 SIDE, TOP, BELOW, BAR = 50.0, 22.0, 40.0, 28.0  # margins; the colour bar needs more below
+FRAMES, COLUMNS, GUTTER, CAPTION = 6, 3, 14.0, 34.0  # shapes of the deployment: all, a row; room at the sides, below
 PAPER, INK, SOFT, GROUND = "#fdfdfb", "#22282f", "#7b838a", "#f1efe8"
 FAMILIES = ("#1f5f8b", "#a8552a")
 DEPTHS = 20  # layers of depth: rods of a nearer layer pass over those of a farther one,
@@ -163,12 +164,26 @@ def picture_svg(archive: Archive, state: str, colour: Colour = "gap") -> str:
 
 
 def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
-    """The same as a drawing in units of about a pixel, y up, on a ground of paper.
+    """The same as a drawing in units of about a pixel, y up, on a ground of paper; laid out once for every format.
 
     Parameters
     ----------
     state, colour : as of `picture_svg`.
     """
+    kept = _pictures(archive)
+    if (state, colour) not in kept:
+        kept[state, colour] = _laid_out(archive, state, colour)
+    return kept[state, colour]
+
+
+@made_once
+def _pictures(archive: Archive) -> dict[tuple[str, Colour], Drawing]:
+    """The pictures of the archive that were asked for so far."""
+    return {}
+
+
+def _laid_out(archive: Archive, state: str, colour: Colour) -> Drawing:
+    """A picture, see `picture`."""
     shape, rods = shape_of(archive, state), rods_of(archive)
     points, view = shape.positions, _view(archive, shape)
     scale = scale_of(archive, shape, colour)
@@ -187,10 +202,47 @@ def picture(archive: Archive, state: str, colour: Colour = "gap") -> Drawing:
     if scale is not None:
         colour_bar(pencil, scale, WIDTH, -float(view.size[1]) - BELOW - BAR + 10)
     width, height = view.size + (2 * SIDE, TOP + BELOW + (0.0 if shape.flat else BAR))
+    return _on_paper(pencil.done(state, shape.caption, 12.5), width, height)
+
+
+def deployment_picture(archive: Archive) -> Drawing:
+    """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`.
+
+    Parameters
+    ----------
+    archive : one that holds stages of a deployment.
+    """
+    known = shape_names(archive)
+    names = [name for name in known if name.startswith(STAGE) or name in ("flat", "popped_pinned")]
+    chosen = np.unique(np.rint(np.linspace(0, len(names) - 1, FRAMES)).astype(int))
+    view, rods, whole, last = _view_of_all(archive), rods_of(archive), Pencil(), None
+    width = WIDTH + 2 * SIDE
+    share = (width - 2 * GUTTER) / COLUMNS / WIDTH
+    cell = np.array([share * WIDTH, -share * float(view.size[1]) - CAPTION])
+    for k, name in enumerate(names[entry] for entry in chosen):
+        shape, pencil = shape_of(archive, name), Pencil()
+        scale = scale_of(archive, shape, "stress")
+        last = scale or last
+        _ground_curves(pencil, view, shape, rods)
+        _Rods.of(archive, view, shape, scale).draw(pencil, range(DEPTHS), halos=False)
+        corner = cell * (k % COLUMNS, k // COLUMNS) + (GUTTER - SIDE, 0.0)
+        whole.paths += pencil.done("", "", 12.5).placed(share, corner).paths
+        middle = corner[0] + share * float(view.project(shape.positions)[:, 0].mean())
+        words = shape.caption.partition(",")[0]
+        whole.write(words, (middle, corner[1] + cell[1] + 0.6 * CAPTION), 12.5, "TITLE", anchor="middle")
+    bottom = float(cell[1]) * -(-len(chosen) // COLUMNS)
+    if last is not None:
+        bottom -= BAR + 10.0
+        colour_bar(whole, replace(last, caption=last.caption.partition(",")[0]), WIDTH, bottom)
+    return _on_paper(whole.done("pop_up", "Deployment", 12.5), width, 2 * TOP - bottom)
+
+
+def _on_paper(drawing: Drawing, width: float, height: float) -> Drawing:
+    """The drawing on a rectangle of paper whose upper left corner is (-SIDE, TOP)."""
     corners = [(-SIDE, TOP), (width - SIDE, TOP), (width - SIDE, TOP - height), (-SIDE, TOP - height)]
     paper = Pencil()
     paper.line(corners, "TITLE", closed=True, pen=Pen(PAPER, 0.0, fill=PAPER))
-    return paper.done(state, shape.caption, 12.5) + pencil.done("", "", 12.5)
+    return paper.done(drawing.name, drawing.title, 12.5) + drawing
 
 
 def _view(archive: Archive, shape: Shape) -> View:
@@ -261,10 +313,10 @@ class _Rods:
         halos, lines = (_polylines(pieces, layer, shades) for shades in (np.zeros_like(shade), shade))
         return _Rods(view.project(shape.positions)[nodes], halos, lines, palette, fade, pen)
 
-    def draw(self, pencil: Pencil, layers: range) -> None:
+    def draw(self, pencil: Pencil, layers: range, *, halos: bool = True) -> None:
         """Some layers from far to near, each over halos of paper that set off what passes over it and farther ones."""
         for depth in layers:
-            for nearer in range(0 if depth == 0 else depth + LAG, min(depth + LAG + 1, DEPTHS)):
+            for nearer in range(0 if depth == 0 else depth + LAG, min(depth + LAG + 1, DEPTHS) if halos else 0):
                 halo = Pen(PAPER, 2.2 * self._width(nearer))
                 pencil.paths += [Path(self.plane[chain], "CUT", pen=halo) for _, chain in self.halos[nearer]]
             near, width = _nearness(depth), self._width(depth)
@@ -333,14 +385,15 @@ def _largest(pencil: Pencil, archive: Archive, shape: Shape, view: View) -> None
         return
     x, y = view.project(at[None])[0]
     side = -1 if x > view.size[0] / 2 else 1
-    factor, unit = length_unit(abs(gap))
-    text = f"{gap / factor:+.3g} {unit}".replace("-", MINUS)
+    size = shown_length(archive.results)(1e-3 * abs(gap))
+    text = size if size.startswith(UNDER) else f"{MINUS if gap < 0 else '+'}{size}"
     _dot(pencil, np.array([x, y]), 6.0, Pen(INK, 1.1))
     anchor = "end" if side < 0 else "start"
     pencil.write(text, (x + 9 * side, y + 7), 13.0, "TITLE", anchor=anchor, bold=True, halo=PAPER)
 
 
 CAP = 0.5  # pixels
+COLOURS = 256  # of a file at most: a third of the bytes, and no colour off by more than a tenth
 HALO = 2.0  # width of a text's halo, in drawing units
 
 
@@ -372,6 +425,8 @@ def drawing_png(drawing: Drawing, width: int = 1280) -> bytes:
     for text in drawing.texts:
         _write(letters, text, _pixels(text.at, corner, scale), scale)
     stream = BytesIO()
+    if image.getcolors(COLOURS) is None:
+        image = image.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     image.save(stream, "PNG", compress_level=3)
     return stream.getvalue()
 

@@ -10,7 +10,6 @@ from math import degrees
 from platform import python_version
 from typing import Any
 
-import numba
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.seams import End
 from rodshell.joints import joint_parameters
 from rodshell.joints.joint import Joint as JointModel
+from rodshell.kernels import description
 from rodshell.layout import Profile
 from rodshell.nets import ChebyshevNet
 from rodshell.results.records import (
@@ -70,7 +70,7 @@ def results_of(stages: PatchForm | PatchedForm) -> Results:
     """
     if isinstance(stages, PatchedForm):
         return patches_results(stages)
-    return table_results(stages, "popup") if stages.from_table else form_results(stages)
+    return table_results(stages, "rods") if stages.from_table else form_results(stages)
 
 
 def states_of(stages: PatchForm | PatchedForm) -> States:
@@ -211,11 +211,11 @@ def rod_type(rod: RodModel) -> RodType:
 
 def _head(name: str, status: str, warnings: Iterable[str]) -> dict[str, Any]:
     """What every result begins with."""
-    versions = {module.__name__: module.__version__ for module in (np, scipy, numba)}
+    versions = {module.__name__: module.__version__ for module in (np, scipy)}
     return {
         **{key: Results.model_fields[key].default for key in ("format", "version", "units")},
         "version_rodshell": version("rodshell"),
-        "versions": {"python": python_version(), **versions},
+        "versions": {"python": python_version(), **versions, "kernels": description()},
         "name": name,
         "status": status,
         "warnings": tuple(warnings),

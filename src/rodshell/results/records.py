@@ -52,7 +52,7 @@ Point = tuple[Number, Number, Number]
 class Record(BaseModel):
     """A part of result.json: frozen, with the keys that the file has."""
 
-    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, populate_by_name=True)
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, populate_by_name=True, defer_build=True)
 
     def plain(self) -> dict[str, Any]:
         """The record as it stands in result.json: plain dictionaries, lists and numbers, without absent keys."""

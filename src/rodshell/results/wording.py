@@ -57,6 +57,7 @@ def rounding_of(results: Results) -> Rounding:
 EXACT = Rounding(FINEST)
 UNKNOWN = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
+UNDER = "under "  # before the smallest length that is shown
 
 CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of the case, by its key
     **dict.fromkeys(
@@ -111,7 +112,7 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
         return UNKNOWN
     value = 1e3 * metres
     if value and abs(value) < rounding.step:
-        return f"under {rounding.words}"
+        return f"{UNDER}{rounding.words}"
     whole = len(str(int(abs(value)))) if abs(value) >= 1 else 0
     return f"{value:.{min(max(digits - whole, 0), rounding.digits)}f} mm"
 

@@ -31,12 +31,12 @@ The branch of m_ref holds while m_ref changes by less than pi, which a node that
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numba as nb
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import adapted, cross, dot, parallel_transport, signed_angle, unit
+from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 
@@ -226,7 +226,7 @@ def _reference_twist(tangents: Floats, directors: Floats) -> Floats:
     return signed_angle(parallel_transport(directors[:, 0], te, tf), directors[:, 1], tf)
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", fastmath={"contract"})
 def _shares_edge(stencils, b):  # type: ignore[no-untyped-def]
     """Whether the edge e of element b is the edge f of the delta before it, as along a rod; both have one frame."""
     if b == 0:
@@ -235,7 +235,7 @@ def _shares_edge(stencils, b):  # type: ignore[no-untyped-def]
     return here[1] == before[3] and here[0] == before[2] and here[2] == before[4]
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", fastmath={"contract"})
 def _transported(x, stencils, sources, source_directors, source_twist, tangents, directors, twist):  # type: ignore[no-untyped-def]
     """Frames and reference twists transported from the sources to the state x; fills the last three arguments."""
     for b in range(stencils.shape[0]):
@@ -277,7 +277,7 @@ def _transported(x, stencils, sources, source_directors, source_twist, tangents,
         twist[b] = angle + 2.0 * np.pi * np.floor((source_twist[b] - angle) / (2.0 * np.pi) + 0.5)
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", fastmath={"contract"})
 def _bend_twist(  # type: ignore[no-untyped-def]
     x, stencils, bend, twist, natural, natural_twist, tangents, directors, source_twist, gradient, hessians
 ):
@@ -449,7 +449,7 @@ def _bend_twist(  # type: ignore[no-untyped-def]
     return energy
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
+@njit(error_model="numpy", fastmath={"contract"}, inline="always")
 def spread(hee, hef, hff, he3, he7, hf3, hf7, h33, h37, h77, h):  # type: ignore[no-untyped-def]
     """Fill the element Hessian h (15, 15), by x_0, theta_e, x_1, theta_f, x_2, from that by e, theta_e, f, theta_f.
 

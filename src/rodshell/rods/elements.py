@@ -14,10 +14,10 @@ edge: at the solution the strain vanishes and N0 is the axial force.
 from dataclasses import dataclass, replace
 from typing import Protocol, Self, runtime_checkable
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.kernels import njit
 from rodshell.validation import brief
 
 NO_HESSIANS = np.empty((0, 0, 0))
@@ -253,7 +253,7 @@ class Stretch:
         return self
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_a, x_b) [m]; energies [J], from HQK Eq 1a."""
     wanted = hessians.shape[0] > 0
@@ -288,7 +288,7 @@ def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, he
     return energy
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
     result = np.empty(len(edges))
     for e in range(len(edges)):
@@ -299,7 +299,7 @@ def _strains(x, edges, rest):  # type: ignore[no-untyped-def]
     return result
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
     result = np.empty(len(edges))
     for e in range(len(edges)):
@@ -313,7 +313,7 @@ def _elongation(x, motion, edges, rest):  # type: ignore[no-untyped-def]
     return result
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _add_axial(x, edges, forces, gradient):  # type: ignore[no-untyped-def]
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]

@@ -17,11 +17,11 @@ triangles, each by
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import unit
+from rodshell.kernels import njit
 from rodshell.rods.bend_twist import BendTwist, spread, strain_rates
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
@@ -112,7 +112,7 @@ class IsotropicBendTwist(BendTwist):
         )
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, x_1, x_2) [m]; energies [J]. e = x_1 - x_0, f = x_2 - x_1; s, t their unit vectors."""
     wanted = hessians.shape[0] > 0
@@ -172,7 +172,7 @@ def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no
     return energy
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", fastmath={"contract"})
 def _isotropic_bend_twist(x, stencils, bend, twist, natural_twist, sources, source_twist, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, theta_e, x_1, theta_f, x_2) [m, rad]; energies [J].
 

@@ -4,10 +4,10 @@ A front of `width` pivots is stored row after row, its rows padded to a multiple
 `room`: kernels read up to a register past the end of what they need, and begin where a register would.
 """
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.kernels import njit
 from rodshell.solve.simd_kernels import BYTES, LANES, REGISTERS, ROWS, adding, eliminating, multiplying, subtracting
 
 PAD = 8  # numbers in the largest register
@@ -16,7 +16,7 @@ DEPTH = 128  # pivots whose rows are multiplied at a time: so many stay in the n
 TALL = 48  # rows of a product from which on they are packed first
 
 _WIDE = LANES * REGISTERS
-_FACTORS = ROWS * LANES  # where they lie in the workspace, behind the rows they are found from
+_FACTORS = ROWS * PAD  # where they lie in the workspace, behind the rows they are found from
 _PACKED = 2 * _FACTORS  # where packed rows begin
 
 _subtract_43, _subtract_42, _subtract_41 = (subtracting(ROWS, k) for k in (3, 2, 1))
@@ -39,19 +39,19 @@ def workspace(largest: int) -> Floats:
     return room(_PACKED + DEPTH * (largest + ROWS))
 
 
-@nb.njit(cache=True, inline="always")
+@njit(inline="always")
 def padded(length):  # type: ignore[no-untyped-def]
     """The length of a row with its padding."""
     return (length + PAD - 1) // PAD * PAD
 
 
-@nb.njit(cache=True, inline="always")
+@njit(inline="always")
 def _place(matrix, row, column):  # type: ignore[no-untyped-def]
     """The address of an element."""
     return matrix.ctypes.data + row * matrix.strides[0] + column * BYTES
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
     """Eliminate the pivots of a front: D L^T in `rows` (width, stride), which holds the front's upper triangle before;
     L^T in `panel` (width, stride), D in `pivots` (width,). False where a pivot vanishes or is not finite.
@@ -78,7 +78,7 @@ def eliminate(rows, panel, pivots, work):  # type: ignore[no-untyped-def]
     return True
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _find_factors(rows, panel, begin, k, count, pivots, work):  # type: ignore[no-untyped-def]
     """The `count` pivots from k on, and in the workspace the factors that the kernel asks for."""
     left, stride = k // LANES * LANES, rows.shape[1]
@@ -105,7 +105,7 @@ def _find_factors(rows, panel, begin, k, count, pivots, work):  # type: ignore[n
     return True
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-untyped-def]
     """The rows of `count` pivots from k on, whose factors are known, after those of the pivots from `begin` on."""
     stride, depth = rows.shape[1], k - begin
@@ -128,7 +128,7 @@ def _eliminate_rows(rows, panel, begin, k, count, work):  # type: ignore[no-unty
             _eliminate_11(c, d, a, b, stride, depth, factors)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def subtract_product(panel, rows, begin, end, first, keep, target, work):  # type: ignore[no-untyped-def]
     """target = keep target - panel[begin:end, first:]^T rows[begin:end, first:], except below the diagonal.
 
@@ -155,7 +155,7 @@ def subtract_product(panel, rows, begin, end, first, keep, target, work):  # typ
         keep = 1
 
 
-@nb.njit(cache=True)
+@njit()
 def _pack(panel, start, depth, first, n, work):  # type: ignore[no-untyped-def]
     """`n` columns of the panel into the workspace, packed `ROWS` at a time."""
     at = _PACKED
@@ -167,7 +167,7 @@ def _pack(panel, start, depth, first, n, work):  # type: ignore[no-untyped-def]
             at += ROWS
 
 
-@nb.njit(cache=True, inline="always")
+@njit(inline="always")
 def _subtract(rows, registers, c, stride_c, a, stride_a, b, stride_b, depth, keep):  # type: ignore[no-untyped-def]
     """A tile; one of fewer rows row by row."""
     for _ in range(1 if rows == ROWS else rows):
@@ -187,7 +187,7 @@ def _subtract(rows, registers, c, stride_c, a, stride_a, b, stride_b, depth, kee
         c, a = c + stride_c * BYTES, a + BYTES
 
 
-@nb.njit(cache=True)
+@njit()
 def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
     """Add to the rows from `begin` to `end` of a front, whose columns from `begin` on are `target`, what a child's
     update matrix has for them, upper triangle. Its rows go there in `runs` (k, 2): from which on, and where to.
@@ -210,7 +210,7 @@ def add_rows(target, update, runs, begin, end):  # type: ignore[no-untyped-def]
                 _add(_place(target, i + shift, runs[high, 1] - begin), _place(update, i, first), stop - first)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def forward(panel, values, aside):  # type: ignore[no-untyped-def]
     """Solve L y = b for the pivots of a front, b being the first of `values` (stride,), and subtract from the others
     what that takes. `aside` (width,) is scratch.
@@ -236,7 +236,7 @@ def forward(panel, values, aside):  # type: ignore[no-untyped-def]
     values[begin:width] = aside[begin:width]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
     """Solve D L^T x = y for the pivots of a front, y being the first of `values` (stride,), the others x; the padding
     of the panel itself is 0. `aside` (2 width,) is scratch.

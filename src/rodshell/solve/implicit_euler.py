@@ -27,11 +27,11 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from math import isfinite
 from typing import Protocol, Self, TypeVar
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.kernels import njit
 from rodshell.model import Freedom
 from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
@@ -431,7 +431,7 @@ def _parts(elements: Elements, most: int) -> list[Elements]:
     ]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyped-def]
     """Add a share of the part of `field` in the free directions."""
     for i in range(len(motion)):
@@ -442,7 +442,7 @@ def _add_free(share, field, directions, count, motion):  # type: ignore[no-untyp
                 motion[i, k] += part * d[k]
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+@njit(error_model="numpy", fastmath={"reassoc", "contract"})
 def _mass_norm(mass, motion):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(len(motion)):

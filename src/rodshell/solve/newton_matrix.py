@@ -10,12 +10,12 @@ D are the inertia. Matrices of any other pattern go to a sparse solver (`SparseS
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-import numba as nb
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodshell.arrays import Floats, Ints
+from rodshell.kernels import njit
 from rodshell.model import Assembly, Freedom
 from rodshell.solve.sparse_ldl import Factors, LinearSolver, Multifrontal, Qdldl, SingularError
 
@@ -244,7 +244,7 @@ def _reach(blocks: Ints, first: Ints, count: Ints) -> int:
     return max(0, int((highest - lowest).max(initial=0)))
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _add(hessians, blocks, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' H T of every element; T holds the free directions of its blocks as columns, or leaves plain ones alone.
 
@@ -290,7 +290,7 @@ def _add(hessians, blocks, first, count, directions, plain_blocks, band):  # typ
                     band[at, to - at] += row[component[q]]
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _turn(h, blocks, count, directions, turned):  # type: ignore[no-untyped-def]
     """T' h T of one element: entry r of a block is that of its r-th free direction."""
     for a in range(len(blocks)):
@@ -305,7 +305,7 @@ def _turn(h, blocks, count, directions, turned):  # type: ignore[no-untyped-def]
                     turned[3 * a + r, 3 * b + c] = value
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  # type: ignore[no-untyped-def]
     """Add T' (diag(diagonal) + full) T of each block."""
     for i in range(len(diagonal)):
@@ -326,7 +326,7 @@ def _add_blocks(diagonal, full, first, count, directions, plain_blocks, band):  
                 band[first[i] + c, r - c] += value
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
     """Turn rows and columns of blocks of three unknowns from x, y, z to their directions; blocked ones get a one."""
     block = np.empty((3, 3))
@@ -353,7 +353,7 @@ def _turn_whole(band, b, first, directions):  # type: ignore[no-untyped-def]
                 band[at + r, 0] = 1.0
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _factor(a, size, b):  # type: ignore[no-untyped-def]
     """L D L^T in place: a[j, k] holds A[j + k, j], and then 1 / D[j] (k = 0) and L[j + k, j].
 
@@ -381,7 +381,7 @@ def _factor(a, size, b):  # type: ignore[no-untyped-def]
     return negative, -1
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+@njit(error_model="numpy", fastmath={"reassoc", "contract"})
 def _solve(a, size, b, field, first, count, directions, x, solution):  # type: ignore[no-untyped-def]
     """Solve L D L^T for the part of the field in the free directions; `x` is room for the unknowns, b zeros behind."""
     for i in range(len(field)):

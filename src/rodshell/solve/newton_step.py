@@ -10,10 +10,10 @@ those strains.
 
 from dataclasses import dataclass, replace
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats
+from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements
 from rodshell.solve.problem import Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
@@ -301,7 +301,7 @@ class NewtonStep:
         return v, smallest
 
 
-@nb.njit(cache=True)
+@njit()
 def _add_product(hessians, blocks, motion, result):  # type: ignore[no-untyped-def]
     """Add to `result` (n, 3) what elements with `hessians` (m, 3k, 3k) on `blocks` (m, k) make of displacements."""
     for m in range(blocks.shape[0]):

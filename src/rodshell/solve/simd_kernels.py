@@ -9,34 +9,33 @@ A kernel is called in compiled code, with integers: addresses, strides and count
 Nothing is checked. Each has a twin in NumPy, which serves where nothing is compiled (NUMBA_DISABLE_JIT=1).
 """
 
+from __future__ import annotations
+
 import ctypes
 from collections.abc import Callable, Sequence
 from itertools import chain
 
-import numba as nb
 import numpy as np
-from llvmlite import binding, ir
-from numba.core import cgutils, types
-from numba.extending import intrinsic
 
 from rodshell.arrays import Floats
+from rodshell.kernels import COMPILED
 
 Kernel = Callable[..., None]
 
-
-def _lanes() -> int:
-    """Numbers in a register of this processor; a wider one than it has is made of two."""
-    try:
-        return 8 if binding.get_host_cpu_features().get("avx512f") else 4
-    except RuntimeError:  # a processor that LLVM does not know
-        return 4
-
-
-LANES = _lanes()
+LANES = 4  # numbers in a register; a wider one than there is is made of two
 ROWS, REGISTERS = 4, 3  # of a whole tile: twelve sums under way; of sixteen registers four are left for what is read
 BYTES = 8
 
-_NUMBER, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+if COMPILED is None:
+    from llvmlite import ir
+    from numba.core import cgutils, config, types
+    from numba.core.codegen import get_host_cpu_features
+    from numba.extending import intrinsic
+
+    _features = get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
+    if "+avx512f" in _features:
+        LANES = 8
+    _NUMBER, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
 
 
 def subtracting(rows: int, registers: int) -> Kernel:
@@ -50,7 +49,7 @@ def subtracting(rows: int, registers: int) -> Kernel:
     registers : number of registers, of `LANES` numbers each, that a row of B and C takes.
     """
 
-    def emit(code: "_Code", c, stride_c, a, stride_a, b, stride_b, depth, keep) -> None:  # type: ignore[no-untyped-def]
+    def emit(code: _Code, c, stride_c, a, stride_a, b, stride_b, depth, keep) -> None:  # type: ignore[no-untyped-def]
         sums = chain(*code.product(rows, registers, a, stride_a, b, stride_b, depth))
         tile = list(zip(chain(*code.addresses(c, stride_c, rows, registers)), sums, strict=True))
         with code.builder.if_else(code.is_not_zero(keep)) as (keeping, fresh):
@@ -78,7 +77,7 @@ def eliminating(rows: int, registers: int) -> Kernel:
     the rows above, then one over its own pivot.
     """
 
-    def emit(code: "_Code", c, d, a, b, stride, depth, factors) -> None:  # type: ignore[no-untyped-def]
+    def emit(code: _Code, c, d, a, b, stride, depth, factors) -> None:  # type: ignore[no-untyped-def]
         sums = code.product(rows, registers, a, stride, b, stride, depth)
         into, scaled = code.addresses(c, stride, rows, registers), code.addresses(d, stride, rows, registers)
         done = list[list[ir.Value]]()
@@ -108,7 +107,7 @@ def eliminating(rows: int, registers: int) -> Kernel:
 def multiplying(rows: int) -> Kernel:
     """y = A x for A (rows, count), count being a multiple of `LANES`. Arguments: y, A, its stride, x, count."""
 
-    def emit(code: "_Code", y, a, stride, x, count) -> None:  # type: ignore[no-untyped-def]
+    def emit(code: _Code, y, a, stride, x, count) -> None:  # type: ignore[no-untyped-def]
         def onward(k: ir.Value, sums: Sequence[ir.Value]) -> list[ir.Value]:
             right = code.load(code.past(x, k))
             left = (code.load(place) for (place,) in code.addresses(code.past(a, k), stride, rows, 1))
@@ -126,7 +125,7 @@ def multiplying(rows: int) -> Kernel:
 def adding() -> Kernel:
     """c += a, both of `count` numbers. Arguments: c, a, count."""
 
-    def emit(code: "_Code", c, a, count) -> None:  # type: ignore[no-untyped-def]
+    def emit(code: _Code, c, a, count) -> None:  # type: ignore[no-untyped-def]
         def add(at: ir.Value, lanes: int) -> None:
             place = code.past(c, at)
             code.store(code.builder.fadd(code.load(place, lanes), code.load(code.past(a, at), lanes)), place)
@@ -257,7 +256,7 @@ class _Code:
 
 def _kernel(count: int, emit: Callable[..., None], twin: Callable[..., None]) -> Kernel:
     """A kernel of so many arguments, compiled from what `emit` writes, or else its twin."""
-    if nb.config.DISABLE_JIT:
+    if COMPILED is not None or config.DISABLE_JIT:
         return twin
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]

@@ -15,12 +15,12 @@ import os
 from threading import Thread
 from typing import NamedTuple, Protocol
 
-import numba as nb
 import numpy as np
 import qdldl
 from scipy.sparse import csc_matrix
 
 from rodshell.arrays import Floats, Longs
+from rodshell.kernels import njit
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
 from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
 
@@ -202,7 +202,7 @@ def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats
     starts = plan.part_start
     separate, regular = iter(range(len(starts) - 2)), [True]
 
-    def eliminate(part: int, memory: tuple[Floats, Floats]) -> bool:
+    def run(part: int, memory: tuple[Floats, Floats]) -> bool:
         return bool(
             _numeric(
                 plan.parts[starts[part] : starts[part + 1]], data, plan.first, plan.row_start,
@@ -214,7 +214,7 @@ def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats
 
     def work(memory: tuple[Floats, Floats]) -> None:
         for part in separate:
-            regular.append(eliminate(part, memory))
+            regular.append(run(part, memory))
 
     others = [Thread(target=work, args=(memory,)) for memory in scratch.threads[1 : len(starts) - 2]]
     for thread in others:
@@ -222,12 +222,14 @@ def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats
     work(scratch.threads[0])
     for thread in others:
         thread.join()
-    return all(regular) and eliminate(len(starts) - 2, scratch.threads[0])
+    return all(regular) and run(len(starts) - 2, scratch.threads[0])
 
 
 def threads() -> int:
     """Threads of a factorisation: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
-    return min(int(nb.config.NUMBA_NUM_THREADS), os.cpu_count() or 1, MOST_THREADS)
+    asked = os.environ.get("NUMBA_NUM_THREADS", "")
+    processors = os.cpu_count() or 1
+    return min(int(asked) if asked.isdigit() else processors, processors, MOST_THREADS)
 
 
 def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:
@@ -250,7 +252,7 @@ def _minimum_degree(indptr: Longs, indices: Longs) -> Longs:
     return np.asarray(solver.factors()[2], dtype=np.int64)
 
 
-@nb.njit(cache=True, error_model="numpy", nogil=True)
+@njit(error_model="numpy", nogil=True)
 def _numeric(  # type: ignore[no-untyped-def]
     part, data, first, row_start, child_start, children, run_start, runs, entry_start, entry_source, entry_place,
     panel_start, update_start, stacks, unscaled, work, panels, pivots,
@@ -281,7 +283,7 @@ def _numeric(  # type: ignore[no-untyped-def]
     return True
 
 
-@nb.njit(cache=True, inline="always")
+@njit(inline="always")
 def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyped-def]
     """The update matrix (n, padded) of a front."""
     size = row_start[s + 1] - row_start[s] - (first[s + 1] - first[s])
@@ -289,7 +291,7 @@ def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyp
     return stacks[update_start[s] : update_start[s] + size * stride].reshape(size, stride)
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     """right - A x of a matrix stored by its upper triangle, and the largest entry of |A| |x|."""
     residual, size = right.copy(), np.zeros(len(x))
@@ -306,7 +308,7 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     return residual, size.max() if len(x) else 0.0
 
 
-@nb.njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
     """Forward and backward substitution in place, supernode by supernode."""
     supers = len(first) - 1
@@ -345,11 +347,11 @@ def dissect(coordinates: Floats, start: Longs, neighbours: Longs) -> Longs:
     -------
     (n,) blocks in the order of their elimination.
     """
-    along = np.argsort(coordinates, axis=0, kind="stable").T.astype(np.int64)
+    along = np.argsort(coordinates.T, axis=1, kind="stable").astype(np.int64)
     return np.asarray(_dissect(np.ascontiguousarray(coordinates, dtype=np.float64), along, start, neighbours))
 
 
-@nb.njit(cache=True)
+@njit()
 def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-def]
     """Segments of the rows of `along` (d, n), blocks sorted by each coordinate, are divided in place until they are
     small, and stay sorted; `segment` is the segment of each block."""
@@ -391,7 +393,7 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
     return along[0].copy()
 
 
-@nb.njit(cache=True)
+@njit()
 def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
     """The coordinate in which a segment is longest."""
     axis, longest = 0, -1.0
@@ -402,7 +404,7 @@ def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
     return axis
 
 
-@nb.njit(cache=True)
+@njit()
 def _best_cut(blocks, segment, here, rank, start, neighbours, crossing):  # type: ignore[no-untyped-def]
     """Rank of the last block before the straight cut that few couplings cross, near the middle."""
     n = len(blocks)
@@ -423,7 +425,7 @@ def _best_cut(blocks, segment, here, rank, start, neighbours, crossing):  # type
     return best
 
 
-@nb.njit(cache=True)
+@njit()
 def _separate(blocks, segment, here, rank, best, start, neighbours, part):  # type: ignore[no-untyped-def]
     """Parts 0 before and 1 after the cut, and 2, which joins them: those on one side that are coupled to the other."""
     touching = np.zeros(2, dtype=np.int64)

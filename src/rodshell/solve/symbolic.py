@@ -7,10 +7,10 @@ how the fronts share threads and memory.
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Longs
+from rodshell.kernels import njit
 from rodshell.solve.dense import padded
 
 
@@ -77,7 +77,7 @@ def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan
     return Plan(*maps)
 
 
-@nb.njit(cache=True)
+@njit()
 def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
     """The other blocks to which each block of unknowns is coupled, as start and neighbours."""
     n = len(begin) - 1
@@ -108,7 +108,7 @@ def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
     return start, neighbours
 
 
-@nb.njit(cache=True)
+@njit()
 def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
     """Blocks in a postorder of their elimination tree; and for each, its parent, unknowns, and rows of its columns."""
     n = len(order)
@@ -136,7 +136,7 @@ def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
     return order, parent, weight, count
 
 
-@nb.njit(cache=True)
+@njit()
 def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyped-def]
     """Parent of each permuted block (Liu 1990), -1 for roots."""
     n = len(order)
@@ -153,7 +153,7 @@ def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyp
     return parent
 
 
-@nb.njit(cache=True)
+@njit()
 def _postorder(parent):  # type: ignore[no-untyped-def]
     """Nodes of the forest, children before parents and every subtree in a row."""
     n = len(parent)
@@ -182,7 +182,7 @@ def _postorder(parent):  # type: ignore[no-untyped-def]
     return post
 
 
-@nb.njit(cache=True)
+@njit()
 def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
     """First block of each supernode: blocks of one structure, and small ones merged for a few zeros more."""
     n = len(parent)
@@ -217,7 +217,7 @@ def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
     return first[: kept + 1].copy()
 
 
-@nb.njit(cache=True)
+@njit()
 def _children(parent, first):  # type: ignore[no-untyped-def]
     """Parent of each supernode, -1 for roots; and the children of each, ascending."""
     supers = len(first) - 1
@@ -239,7 +239,7 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
     return up, start, children
 
 
-@nb.njit(cache=True)
+@njit()
 def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def]
     """Blocks of each front, ascending, its own ones first: rows[row_start[s] : row_start[s + 1]].
 
@@ -275,7 +275,7 @@ def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def
     return row_start, rows
 
 
-@nb.njit(cache=True)
+@njit()
 def _maps(  # type: ignore[no-untyped-def]
     indptr, indices, begin, order, weight, first, up, row_start, rows, child_start, children
 ):
@@ -333,7 +333,7 @@ def _maps(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@nb.njit(cache=True)
+@njit()
 def _by_front(indptr, indices, place, owner, supers):  # type: ignore[no-untyped-def]
     """The values of the matrix front by front: which value, and its permuted column and row, column <= row."""
     start = np.zeros(supers + 1, dtype=np.int64)
@@ -356,7 +356,7 @@ SHARE = 1 / 12  # of all work: no part that is eliminated by itself holds more
 WORTHWHILE = 1e8  # multiplications from which on work is shared
 
 
-@nb.njit(cache=True)
+@njit()
 def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them.
 
@@ -393,7 +393,7 @@ def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     return np.array(start), parts
 
 
-@nb.njit(cache=True)
+@njit()
 def stacks_of(up, below, child_start, children, part_start, parts):  # type: ignore[no-untyped-def]
     """Where update matrices (rows `below`) lie, and room for all.
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 import numpy as np
-from numba import njit
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.kernels import njit
 from rodshell.targets.smooth_field import TERMS, CellList, SmoothField
 from rodshell.targets.trianglemesh import TriangleMesh, unique_rows
 
@@ -238,7 +238,7 @@ def _frames(normals: Floats) -> Floats:
     return np.stack([first, cross(normals, first), normals], axis=1)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp"})
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp"})
 def _fit(centres, frames, spacing, start, near, points, normals, areas, coefficients):  # type: ignore[no-untyped-def]
     """Weighted least squares of cubics over the tangent planes, (m, 10) in units of the spacing."""
     system, right, row = np.empty((TERMS, TERMS)), np.empty(TERMS), np.empty(TERMS)
@@ -268,7 +268,7 @@ def _fit(centres, frames, spacing, start, near, points, normals, areas, coeffici
         coefficients[m] = np.linalg.solve(system, right)
 
 
-@njit(cache=True)
+@njit()
 def _along(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -318,7 +318,7 @@ def _ring(field: SmoothField, sites: Floats) -> SmoothField:
     return replace(field, centres=centres, frames=frames, coefficients=coefficients)
 
 
-@njit(cache=True)
+@njit()
 def _weight(distance, index, frames, spacing):  # type: ignore[no-untyped-def]
     """Weights (k,) of the cubics nearby, with sum 1; 0 for those of another sheet than the nearest."""
     weight, total = np.zeros(len(index)), 0.0
@@ -329,14 +329,14 @@ def _weight(distance, index, frames, spacing):  # type: ignore[no-untyped-def]
     return weight / total
 
 
-@njit(cache=True)
+@njit()
 def _local(site, centre, e, spacing):  # type: ignore[no-untyped-def]
     """Coordinates of a point over the plane of a cubic, those in the plane in spacings."""
     d = site - centre
     return _along(e[0], d) / spacing, _along(e[1], d) / spacing, _along(e[2], d)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _means(sites, distance, index, centres, frames, coefficients, spacing, mean, normals):  # type: ignore[no-untyped-def]
     """Weighted means (n, 3) of the points above `sites` (n, 3) on the cubics nearby, and of their normals."""
     for n in range(len(sites)):
@@ -355,7 +355,7 @@ def _means(sites, distance, index, centres, frames, coefficients, spacing, mean,
                 normals[n, i] += weight[k] * (e[2, i] - (slope_a * e[0, i] + slope_b * e[1, i]) / spacing) / steep
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _curvatures(  # type: ignore[no-untyped-def]
     sites, distance, index, centres, frames, coefficients, spacing, turned, quadrics
 ):

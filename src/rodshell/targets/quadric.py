@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
 
-import numba as nb
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.kernels import njit
 from rodshell.targets.rim import Disc, Domain, EllipseDomain
 from rodshell.targets.target import Implicit
 from rodshell.targets.wall_below_rim import WalledTarget
@@ -59,7 +59,7 @@ class _Quadric(WalledTarget):
         return np.sqrt(np.where(rest >= 0.0, rest, np.nan) / w[2])
 
 
-@nb.njit(cache=True)
+@njit()
 def _level(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     value, gradient = np.empty(len(x)), np.empty((len(x), 3))
     for n in range(len(x)):
@@ -72,7 +72,7 @@ def _level(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     return value, gradient
 
 
-@nb.njit(cache=True)
+@njit()
 def _implicit(x, weights, slope, scale):  # type: ignore[no-untyped-def]
     value, gradient = _level(x, weights, slope, scale)
     hessian = np.zeros((len(x), 3, 3))

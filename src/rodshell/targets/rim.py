@@ -11,11 +11,11 @@ from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import on_curve
 from rodshell.geometry.frames import cross, dot, unit
+from rodshell.kernels import njit
 from rodshell.validation import numbers, positive
 
 CORNER = 0.5  # cosine of 60 degrees: a loop is not rounded where its edges turn by more
@@ -186,7 +186,7 @@ class Rectangle:
         return d, n * np.where(xy < 0, -1.0, 1.0), hessian * along[:, :, None] * along[:, None, :]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _find_roots(ap, shift, least, t):  # type: ignore[no-untyped-def]
     """Newton's method on  sum_k (a_k p_k / (t + shift_k))^2 = 1  for each row of ap, in place from below the root."""
     for n in range(len(t)):
@@ -288,7 +288,7 @@ class Rim:
         return np.asarray(first + share[:, None] * (self.points[self.after[edge]] - first))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _distance(x, points, inward, after, before, start, centres, radii, result):  # type: ignore[no-untyped-def]
     """Distances from the nearest edge; from the mean of both edges where a corner is nearest."""
     edge = 0
@@ -307,7 +307,7 @@ def _distance(x, points, inward, after, before, start, centres, radii, result): 
         result[n] = (ox * ix + oy * iy + oz * iz) / np.sqrt(ix * ix + iy * iy + iz * iz)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _feet(x, points, after, before, start, centres, radii, edges, shares):  # type: ignore[no-untyped-def]
     edge = 0
     for n in range(len(x)):
@@ -315,7 +315,7 @@ def _feet(x, points, after, before, start, centres, radii, edges, shares):  # ty
         edges[n] = edge
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _nearest(x, n, points, after, before, start, centres, radii, guess):  # type: ignore[no-untyped-def]
     """The nearer of the two edges that meet in the rim's point nearest to the n-th point, and the fraction of it before
     the closest point. With a near `guess` most balls are too far away to be searched."""
@@ -340,12 +340,12 @@ def _nearest(x, n, points, after, before, start, centres, radii, guess):  # type
     return edge, along
 
 
-@njit(cache=True)
+@njit()
 def _square(px, py, pz, points, k):  # type: ignore[no-untyped-def]
     return (px - points[k, 0]) ** 2 + (py - points[k, 1]) ** 2 + (pz - points[k, 2]) ** 2
 
 
-@njit(cache=True)
+@njit()
 def _edge(points, k, after):  # type: ignore[no-untyped-def]
     return points[after, 0] - points[k, 0], points[after, 1] - points[k, 1], points[after, 2] - points[k, 2]
 

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from rodshell.arrays import Floats, Ints
+from rodshell.kernels import njit
 from rodshell.targets.target import Implicit
 
 MOST_CELLS = 64  # of a cell list, for each of its points
@@ -101,7 +101,7 @@ class CellList:
         return np.flatnonzero(free)
 
 
-@njit(cache=True)
+@njit()
 def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
     """Corner, number of cells each way, and their width, for a lattice that holds all points."""
     low, high = points[0].copy(), points[0].copy()
@@ -115,7 +115,7 @@ def _lattice_over(points, cell):  # type: ignore[no-untyped-def]
         cell *= 1.3
 
 
-@njit(cache=True)
+@njit()
 def _sorted(points, low, shape, cell):  # type: ignore[no-untyped-def]
     """Sort points into their cells, by counting."""
     cells = np.zeros(len(points), dtype=np.intp)
@@ -133,7 +133,7 @@ def _sorted(points, low, shape, cell):  # type: ignore[no-untyped-def]
     return start, order
 
 
-@njit(cache=True)
+@njit()
 def _box(x, n, low, shape, cell, reach):  # type: ignore[no-untyped-def]
     """First and last cell plus one along x, y and z, of those up to `reach` cells from that of the n-th point."""
     i, j, k = (
@@ -145,13 +145,13 @@ def _box(x, n, low, shape, cell, reach):  # type: ignore[no-untyped-def]
     return i_from, min(i + reach + 1, shape[0]), max(j - reach, 0), min(j + reach + 1, shape[1]), k_from, k_stop
 
 
-@njit(cache=True)
+@njit()
 def _square(x, n, points, c):  # type: ignore[no-untyped-def]
     """Square of the distance between the n-th and the c-th point."""
     return (x[n, 0] - points[c, 0]) ** 2 + (x[n, 1] - points[c, 1]) ** 2 + (x[n, 2] - points[c, 2]) ** 2
 
 
-@njit(cache=True)
+@njit()
 def _keep(distance, index, first, last, d, c):  # type: ignore[no-untyped-def]
     """Insert c at the distance d into the entries `first` to `last`, which are in order; the last one is dropped."""
     k = last
@@ -161,7 +161,7 @@ def _keep(distance, index, first, last, d, c):  # type: ignore[no-untyped-def]
     distance[k], index[k] = d, c
 
 
-@njit(cache=True)
+@njit()
 def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, index):  # type: ignore[no-untyped-def]
     """Squares of distances. A neighbour is final once it is nearer than the cells that were not searched."""
     for n in range(len(x)):
@@ -189,7 +189,7 @@ def _nearest(x, points, low, shape, cell, start, order, count, limit, distance, 
                     _keep(distance, index, first, last, d, c)
 
 
-@njit(cache=True)
+@njit()
 def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ignore[no-untyped-def]
     """An upper bound of the entries of all lists together."""
     count, reach = 0, int(np.ceil(radius / cell))
@@ -202,7 +202,7 @@ def _most_within(x, points, low, shape, cell, start, order, radius):  # type: ig
     return count
 
 
-@njit(cache=True)
+@njit()
 def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, near, away):  # type: ignore[no-untyped-def]
     """List the neighbours one after the other; each list begins at `begin` (n + 1,)."""
     reach = int(np.ceil(radius / cell))
@@ -220,7 +220,7 @@ def _within(x, points, low, shape, cell, start, order, radius, ordered, begin, n
         begin[n + 1] = last
 
 
-@njit(cache=True)
+@njit()
 def _thin(points, low, shape, cell, start, order, distance, free):  # type: ignore[no-untyped-def]
     """Each point that is still free removes the later ones that are too close to it."""
     reach = int(np.ceil(distance / cell))
@@ -306,7 +306,7 @@ _DXX, _DXY, _DXZ, _DYY, _DYZ, _DZZ, _HXX, _HXY, _HXZ, _HYY, _HYZ, _HZZ = range(1
 _ALL = 25 * LANES
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _blend(  # type: ignore[no-untyped-def]
     x, distance, nearest, radius, start, near, away, packed, width2, second, value, gradient, hessian
 ):
@@ -341,7 +341,7 @@ def _blend(  # type: ignore[no-untyped-def]
         first += count
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-untyped-def]
     """Start the sums of the point `first` and of those after it that can use its list. Returns their number, and the
     distance from its nearest centre up to which centres contribute to any of them, by the triangle inequality."""
@@ -361,7 +361,7 @@ def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-
     return count, furthest
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
     """Add one cubic to the sums of four points; see `SmoothField._packed` for its numbers."""
     x, y, z = p[0], p[1], p[2]
@@ -406,7 +406,7 @@ def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
             work[_HYZ + m] += 0.5 * (my * tz + mz * ty) - vy * e2 - sy * e5
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _exponential(fade):  # type: ignore[no-untyped-def]
     """exp(-fade) by arithmetic alone, to 1e-9 up to a fade of 16: the series of its 64th root, squared six times."""
     y = fade / -64.0

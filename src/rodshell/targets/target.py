@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from rodshell.arrays import Bools, Floats
 from rodshell.errors import InputError
+from rodshell.kernels import njit
 
 NEARLY = 1e-8  # of the size: a step of Newton leaves the square of the error before it, here less than round-off
 
@@ -250,7 +250,7 @@ class Target(ABC):
         return np.column_stack([xy, z])
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def offset_shape(shape: Floats, distance: Floats) -> Floats:
     """Hessians of the distance at points away from a surface, S (I + d S)^-1.
 
@@ -282,7 +282,7 @@ def offset_shape(shape: Floats, distance: Floats) -> Floats:
     return result
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  # type: ignore[no-untyped-def]
     """One step of Newton towards the closest points: y + t F'(y) = x, F(y) = 0.
 
@@ -329,7 +329,7 @@ def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  #
         step[m, 2] = out * nz + along_p * pz + along_q * qz
 
 
-@njit(cache=True)
+@njit()
 def _times(h, x, y, z):  # type: ignore[no-untyped-def]
     return (
         h[0, 0] * x + h[0, 1] * y + h[0, 2] * z,
@@ -338,7 +338,7 @@ def _times(h, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def shape_operators(gradient, hessian, normal, shape):  # type: ignore[no-untyped-def]
     """Unit normals n, and shape operators P F'' P / |F'| with P = 1 - n n.
 

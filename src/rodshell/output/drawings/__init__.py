@@ -1,22 +1,29 @@
-"""The drawing set: each drawing at 1:1 for DXF and SVG, and all of them on sheets of paper for the PDF."""
+"""The drawing set: each drawing laid out once, at 1:1 for DXF and SVG, all of them on sheets for the PDF."""
 
-from functools import cache
+import numpy as np
 
+from rodshell.arrays import Floats
 from rodshell.output.drawing import TEXT, Drawing
-from rodshell.output.drawings.flat import FlatPlan, flat_drawing, per_sheet, strips_drawing
+from rodshell.output.drawings.flat import FlatPlan, flat_drawing, flat_plan, per_sheet, strips_drawing
 from rodshell.output.drawings.sheets import (
     SCALES,
     Compose,
+    Layout,
     Sheet,
     bound,
-    fitted,
-    parts,
+    laid_out,
     room,
     table,
     title_block,
     with_title,
 )
-from rodshell.output.drawings.shell import bracing_drawing, elevations_drawing, erection_drawing, supports_drawing
+from rodshell.output.drawings.shell import (
+    bracing_drawing,
+    elevations_drawing,
+    erection_drawing,
+    rod_curves,
+    supports_drawing,
+)
 from rodshell.output.options import PAPERS
 from rodshell.output.schedules import (
     bracing_table,
@@ -28,50 +35,30 @@ from rodshell.output.schedules import (
     supports_table,
 )
 from rodshell.results import Archive
+from rodshell.results.archive import made_once
 
 __all__ = ["drawing_set", "sheet_set"]
 
 
-FINER = {"bracing": 0.45}  # texts of a drawing at 1:1 over those of the plan, where more of them find room
+FINER = {"bracing": 0.5}  # smallest texts of a drawing at 1:1 over those of the plan, where more of them find room
 
 
-def drawing_set(archive: Archive, plan: FlatPlan) -> dict[str, Drawing]:
-    """Every drawing that the archive has content for, at 1:1 with a title block, by name.
-
-    Parameters
-    ----------
-    plan : the flat plan of the archive.
-    """
+def drawing_set(archive: Archive) -> dict[str, Drawing]:
+    """Every drawing that the archive has content for, at 1:1 with a title block, by name."""
+    plan = flat_plan(archive)
     block = title_block(archive, plan.summary)
-    makers: dict[str, Compose] = {
-        "plan": lambda text: flat_drawing(plan, text),
-        "strips": lambda text: strips_drawing(plan, text),
-        **_of_the_shell(archive, plan),
-    }
-    return {name: with_title(make(FINER.get(name, 1.0) * plan.text), block) for name, make in makers.items()}
+    drawings = {name: layout.detail for name, layout in _layouts(archive).items()}
+    first = {"plan": drawings.pop("plan"), "strips": strips_drawing(plan, plan.text)}
+    return {name: with_title(drawing, block) for name, drawing in (first | drawings).items()}
 
 
-def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[float, float]]:
-    """All sheets in mm of paper, and the paper's size.
-
-    Parameters
-    ----------
-    plan : the flat plan of the archive.
-    """
-    results = archive.results
-    paper = PAPERS[results.drawings.paper if results.drawings else "A3"]
-
-    @cache  # the same text sizes are tried for one sheet and for its parts
-    def flat(text: float) -> Drawing:
-        return flat_drawing(plan, text)
-
-    whole = fitted(flat, paper)
-    sheets = [whole, *parts(flat, paper, whole, true_size=True)]
-    sheets += _strips(plan, paper)
-    for name, compose in _of_the_shell(archive, plan).items():
-        make = cache(compose)
-        whole = fitted(make, paper)
-        sheets += [whole, *parts(make, paper, whole)]
+def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
+    """All sheets in mm of paper, and the paper's size."""
+    results, plan, paper = archive.results, flat_plan(archive), _paper(archive)
+    layouts = dict(_layouts(archive))
+    sheets = [*layouts.pop("plan").sheets(paper), *_strips(plan, paper)]
+    for name, layout in layouts.items():
+        sheets += layout.sheets(paper)
         if name == "supports":
             sheets += table("Supports", supports_table(archive, brief=True), paper)
         elif name == "bracing":
@@ -87,17 +74,41 @@ def sheet_set(archive: Archive, plan: FlatPlan) -> tuple[list[Drawing], tuple[fl
     return bound(sheets, title_block(archive, plan.summary), paper), paper
 
 
-def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, Compose]:
-    """Drawings that need a shape in space."""
-    makers: dict[str, Compose] = {}
+@made_once
+def _layouts(archive: Archive) -> dict[str, Layout]:
+    """Every drawing but the strips, which are cut into sheets between two rods."""
+    plan, paper = flat_plan(archive), _paper(archive)
+
+    def of_the_plan(text: float) -> Drawing:
+        return flat_drawing(plan, text)
+
+    extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
+    layouts = {"plan": laid_out(of_the_plan, extent, paper, plan.text, true_size=True)}
+    for name, (compose, extent) in _of_the_shell(archive, plan).items():
+        layouts[name] = laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
+    return layouts
+
+
+def _paper(archive: Archive) -> tuple[float, float]:
+    """Width and height of a sheet [mm]."""
+    style = archive.results.drawings
+    return PAPERS[style.paper if style else "A3"]
+
+
+def _of_the_shell(archive: Archive, plan: FlatPlan) -> dict[str, tuple[Compose, Floats]]:
+    """Drawings that need a shape in space, and what each takes at least without its texts (2,) [mm]."""
     if archive.final is None or "rod_nodes" not in archive.states:
-        return makers
-    makers["supports"] = lambda text: supports_drawing(archive, plan, text)
-    makers["elevations"] = lambda text: elevations_drawing(archive, text)
+        return {}
+    width, depth, height = np.ptp(np.concatenate(rod_curves(archive, archive.states[archive.final])), axis=0)
+    above, both_sides = np.array([width, depth]), np.array([max(width, depth), 2 * height])
+    makers: dict[str, tuple[Compose, Floats]] = {
+        "supports": (lambda text: supports_drawing(archive, plan, text), above),
+        "elevations": (lambda text: elevations_drawing(archive, text), both_sides),
+    }
     if archive.results.fabrication and archive.results.fabrication.bracing:
-        makers["bracing"] = lambda text: bracing_drawing(archive, text)
+        makers["bracing"] = (lambda text: bracing_drawing(archive, text), above)
     if "history" in archive.states and archive.results.deployment:
-        makers["erection"] = lambda text: erection_drawing(archive, text)
+        makers["erection"] = (lambda text: erection_drawing(archive, text), above)
     return makers
 
 

@@ -19,6 +19,7 @@ from rodshell.output.grid import GridJoint, GridRod, joints_of, opens, outlines_
 from rodshell.output.labels import Label, Room, callouts, closed_segments, lines_meet, outward, place, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
+from rodshell.results.archive import made_once
 from rodshell.results.records import Stiffness
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
@@ -98,6 +99,7 @@ class FlatPlan:
         return any(rod.allowance for rod in self.rods)
 
 
+@made_once
 def flat_plan(archive: Archive) -> FlatPlan:
     """The flat plan of an archive."""
     rods = rods_of(archive)

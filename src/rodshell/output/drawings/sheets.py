@@ -221,46 +221,90 @@ def room(paper: tuple[float, float]) -> tuple[Floats, Floats]:
     return np.array([MARGIN + 4, MARGIN + BLOCK + 4]), np.array(paper) - MARGIN - 4
 
 
-def fitted(compose: Compose, paper: tuple[float, float]) -> Sheet:
-    """A drawing on one sheet, in the middle, at the largest standard scale at which it fits.
+@dataclass(frozen=True)
+class Layout:
+    """A drawing, laid out as few times as it takes: DXF and SVG show it at 1:1, sheets of paper from the same texts.
+
+    Parameters
+    ----------
+    whole : as its one sheet shows it; scale : of that sheet.
+    detail : with smaller texts where the sheet has no room for all, else the same; for files at 1:1.
+    parts : what the parts on several sheets are cut from; None: there are none.
+    scale_of_parts : of these sheets.
+    """
+
+    whole: Drawing
+    scale: float
+    detail: Drawing
+    parts: Drawing | None
+    scale_of_parts: float
+
+    def sheets(self, paper: tuple[float, float]) -> Iterator[Sheet]:
+        """The whole on one sheet of a paper [mm], in the middle, and its parts."""
+        low, high = room(paper)
+        bottom, top = self.whole.box()
+        shift = 0.5 * (low + high) - 0.5 * (bottom + top) / self.scale
+        yield Sheet(self.whole.title, self.whole.placed(1 / self.scale, shift), self.scale)
+        if self.parts is not None:
+            yield from tiled(self.parts, paper, self.scale_of_parts)
+
+
+def laid_out(
+    compose: Compose, extent: Floats, paper: tuple[float, float], finest: float, *, true_size: bool = False
+) -> Layout:
+    """A drawing, laid out for one sheet and, where that leaves something out, in detail.
+
+    The parts are at the smallest scale that shows all, or the largest there is.
 
     Parameters
     ----------
     compose : makes the drawing for a text size [mm at 1:1].
+    extent : (2,) at least what the drawing takes without texts [mm].
     paper : width and height of a sheet [mm].
+    finest : size of the texts with which a file at 1:1 shows all that it can [mm].
+    true_size : the parts are at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
+    """
+    whole, scale = fitted(compose, extent, paper)
+    detail, parts, of_parts = whole, None, 1.0
+    possible = [smaller for smaller in SCALES if smaller < scale and _fits_on(extent / smaller, paper)]
+    tried = possible[::-1] if whole.left_out else []
+    if true_size and 1 in possible:
+        tried = [1, *(smaller for smaller in tried if smaller > 1)]
+    for smaller in tried:
+        finer = compose(TEXT * smaller)
+        if _fits_on(_size(finer) / smaller, paper):
+            parts, of_parts = finer, smaller
+            if not finer.left_out or (true_size and smaller == 1):
+                break
+    if whole.left_out and parts is not None and (of_parts > 1 or not true_size):
+        detail = parts
+    if detail.left_out and detail.text > finest:
+        detail = compose(finest)
+    return Layout(whole, scale, detail, parts, of_parts)
+
+
+def fitted(compose: Compose, extent: Floats, paper: tuple[float, float]) -> tuple[Drawing, float]:
+    """A drawing with the texts of a sheet, and the largest standard scale at which one sheet has room for it.
+
+    Parameters
+    ----------
+    compose, extent, paper : as of `laid_out`.
     """
     low, high = room(paper)
-    bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
-    for scale in (scale for scale in SCALES if np.all(bare / scale <= high - low)):
+    for scale in SCALES:
+        if np.any(extent / scale > high - low) and scale != SCALES[-1]:
+            continue
         drawing = compose(TEXT * scale)
-        bottom, top = drawing.box()
-        if np.all((top - bottom) / scale <= high - low):
+        extent = _size(drawing)  # with larger texts it takes no less
+        if np.all(extent / scale <= high - low):
             break
-    shift = 0.5 * (low + high) - 0.5 * (bottom + top) / scale
-    return Sheet(drawing.title, drawing.placed(1 / scale, shift), scale)
+    return drawing, scale
 
 
-def parts(compose: Compose, paper: tuple[float, float], whole: Sheet, *, true_size: bool = False) -> Iterator[Sheet]:
-    """What a drawing's one sheet leaves out, on several: at the smallest scale that shows all, or the largest there is.
-
-    Parameters
-    ----------
-    compose : makes the drawing for a text size [mm at 1:1].
-    paper : width and height of the sheet [mm].
-    whole : its one sheet; nothing is yielded where that leaves nothing out.
-    true_size : at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
-    """
-    bare = np.subtract(*compose(0.01).box()[::-1])  # hardly any text: the least that it can take
-    possible = [scale for scale in SCALES if scale < whole.scale and _tiles(bare / scale, paper).prod() <= MOST_TILES]
-    best = list(tiled(compose, paper)) if true_size and 1 in possible else []
-    if best or not whole.content.left_out:
-        yield from best
-        return
-    for scale in reversed(possible):
-        best = list(tiled(compose, paper, scale)) or best
-        if best and not best[0].content.left_out:
-            break
-    yield from best
+def _size(drawing: Drawing) -> Floats:
+    """(2,) its width and height [mm]."""
+    low, high = drawing.box()
+    return np.asarray(high - low)
 
 
 def _tiles(extent: Floats, paper: tuple[float, float]) -> Ints:
@@ -269,16 +313,22 @@ def _tiles(extent: Floats, paper: tuple[float, float]) -> Ints:
     return np.maximum(np.ceil(extent / (high - low - 2 * OVERLAP)), 1).astype(np.intp)
 
 
-def tiled(compose: Compose, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
-    """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where those are too many.
+def _fits_on(extent: Floats, paper: tuple[float, float]) -> bool:
+    """Whether an extent (2,) of a drawing [mm of paper] takes no more sheets than it may."""
+    return bool(_tiles(extent, paper).prod() <= MOST_TILES)
+
+
+def tiled(drawing: Drawing, paper: tuple[float, float], scale: float = 1) -> Iterator[Sheet]:
+    """A drawing at 1:`scale` over as many sheets as it takes, with match lines; nothing where that is one or too many.
 
     Parameters
     ----------
-    compose, paper : as of `fitted`.
+    drawing : at 1:1 [mm].
+    paper : width and height of a sheet [mm].
     scale : lengths of the object over those of the sheet.
     """
     low, high = room(paper)
-    drawing = compose(TEXT * scale).placed(1 / scale, np.zeros(2))
+    drawing = drawing.placed(1 / scale, np.zeros(2))
     bottom, top = drawing.box()
     size, count = high - low - 2 * OVERLAP, _tiles(top - bottom, paper)
     if not 1 < count.prod() <= MOST_TILES:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rodshell import uncached
 from rodshell.cli import main
+from rodshell.kernels import cache
 
 DECLARED = """
 import numba.core.caching as caching
@@ -35,12 +35,12 @@ def test_kernels_that_cannot_be_kept_are_declared_and_that_is_one_sentence(tmp_p
 def test_a_folder_counts_that_can_be_written_or_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(uncached, "__file__", "/proc/rodshell/uncached.py")
+    monkeypatch.setattr(cache, "__file__", "/proc/rodshell/cache.py")
     monkeypatch.setenv("HOME", "/proc/nobody")
     monkeypatch.setattr(os, "access", lambda path, mode: str(path).startswith(str(tmp_path)))
-    assert not uncached.kernels_are_kept()
+    assert not cache.kernels_are_kept()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "made/later"))
-    assert uncached.kernels_are_kept()
+    assert cache.kernels_are_kept()
 
 
 def test_warming_up_what_would_be_lost_is_refused(

@@ -1,0 +1,93 @@
+"""Kernels: functions of plain loops that run as machine code.
+
+`njit` declares one. Where the wheel was built with a C compiler, kernels were compiled then, for one or more levels of
+the processor, and `njit` returns the compiled function of the highest level that this processor has; Numba is not
+needed. Elsewhere Numba compiles a kernel when it is first called. RODSHELL_KERNELS=jit chooses Numba in any case, and
+RODSHELL_KERNELS=FOLDER compiled libraries that are elsewhere.
+
+Kernels that are called from Python have a row in `table`; the others are part of those.
+"""
+
+import os
+from collections.abc import Callable
+from importlib import import_module
+from importlib.machinery import ExtensionFileLoader, ModuleSpec
+from importlib.util import module_from_spec
+from typing import Any
+
+Kernel = Callable[..., Any]
+
+PACKAGE = "rodshell."
+LEVELS = ("x86-64-v3", "generic")  # of processors, from the highest
+
+
+def levels_here() -> list[str]:
+    """The levels that this processor has, from the highest."""
+    features = import_module("numpy._core._multiarray_umath").__cpu_features__  # as numpy.show_runtime finds them
+    wide = features.get("X86_V3", False) or (features.get("AVX2", False) and features.get("FMA3", False))
+    return [level for level in LEVELS if level == "generic" or wide]
+
+
+def njit(**options: object) -> Callable[[Kernel], Kernel]:
+    """Declare a kernel: its machine code if it was compiled with the wheel, else what Numba makes of it when it is
+    called.
+
+    Parameters
+    ----------
+    options : of numba.njit, such as error_model="numpy".
+    """
+
+    def declared(function: Kernel) -> Kernel:
+        if COMPILED is None:
+            from rodshell.kernels.jit import dispatcher
+
+            return dispatcher(function, options)
+        return COMPILED.get(name_of(function), function)
+
+    return declared
+
+
+def name_of(function: Kernel) -> str:
+    """Its module and name, within the package."""
+    return f"{function.__module__.removeprefix(PACKAGE)}.{function.__name__}"
+
+
+def library_name(level: str, unit: int) -> str:
+    """The module of one of the libraries for a level."""
+    return f"compiled_{level.replace('-', '_')}_{unit}"
+
+
+def description() -> str:
+    """How kernels are compiled here: for which level of the processor, or by which version of Numba."""
+    if COMPILED is not None:
+        return f"compiled for {LEVEL}"
+    numba = import_module("numba")
+    return "plain Python" if numba.config.DISABLE_JIT else f"numba {numba.__version__}"
+
+
+def _compiled() -> tuple[dict[str, Kernel] | None, str]:
+    """The kernels of all libraries for the highest level that there is, and that level; None: there are none, or they
+    are not to be used."""
+    chosen = os.environ.get("RODSHELL_KERNELS", "")
+    if chosen == "jit" or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return None, ""
+    folder = chosen or os.path.dirname(__file__)
+    found = [name for name in sorted(os.listdir(folder)) if name.startswith("compiled_")]
+    for level in levels_here() if found else ():
+        libraries = [name for name in found if name.startswith(library_name(level, 0)[:-1])]
+        if libraries:
+            loaded = (_load(os.path.join(folder, file)) for file in libraries)
+            return {name: kernel for library in loaded for name, kernel in library.items()}, level
+    return None, ""
+
+
+def _load(path: str) -> dict[str, Kernel]:
+    """The kernels of a library, by their names."""
+    module_name = os.path.basename(path).split(".")[0]
+    loader = ExtensionFileLoader(module_name, path)
+    module = module_from_spec(ModuleSpec(module_name, loader, origin=path))
+    loader.exec_module(module)
+    return {name: kernel for name, kernel in vars(module).items() if "." in name}
+
+
+COMPILED, LEVEL = _compiled()

@@ -1,0 +1,34 @@
+"""Kernels compiled by Numba when they are first called, and kept on disk where a folder can be written."""
+
+from rodshell.errors import RodshellError
+from rodshell.kernels import Kernel
+from rodshell.kernels.cache import kernels_are_kept
+
+try:
+    from numba import njit, types
+except ModuleNotFoundError as error:
+    raise RodshellError(
+        "no compiled kernels for this processor are installed, nor Numba, which would compile them: pip install numba"
+    ) from error
+
+
+def dispatcher(function: Kernel, options: dict[str, object]) -> Kernel:
+    """The kernel of a function, which is compiled at its first call. Numba refuses to declare one that is to be kept
+    where no folder can be written."""
+    kernel: Kernel = njit(cache=kernels_are_kept(), **options)(function)
+    return kernel
+
+
+def arguments_of(row: str) -> tuple[types.Type, ...]:
+    """Numba's types of the arguments in a row of the table."""
+    return tuple(_type_of(code) for code in row.split())
+
+
+def _type_of(code: str) -> types.Type:
+    scalar = _SCALARS[code[0]]
+    if code[1:].isdigit():
+        return types.Array(scalar, int(code[1:]), "C")
+    return scalar if len(code) == 1 else types.UniTuple(scalar, len(code))
+
+
+_SCALARS = {"f": types.float64, "i": types.int64, "b": types.boolean, "c": types.complex128}

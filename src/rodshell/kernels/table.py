@@ -1,0 +1,130 @@
+"""Every kernel that is called from Python, with the types of its arguments: what is compiled when a wheel is built.
+
+A type is a letter and a number of dimensions, in C order: f float64, i int64, b bool, c complex128; f2 is an array
+(n, m) of float64, f alone a number; ff is a pair of numbers. Kernels that only kernels call need no row.
+"""
+
+KERNELS: dict[str, dict[str, str]] = {
+    "contact.modified_mass": {
+        "_turn": "f3 i1 i1 b1 f2 f1",
+    },
+    "contact.static": {
+        "_tangents": "f2 f2",
+    },
+    "formfinding.bound_drape": {
+        "_correct": "f2 f2 i1 i1 i1 f1 b1 f2",
+    },
+    "geometry.curves": {
+        "_on_curve": "f1 f2 f1",
+        "lagrange": "f2 f3 f1",
+        "resampled": "f1 f3 i f1 f",
+    },
+    "joints.relative_rotation": {
+        "_relative_rotation": "f2 i2 i2 f2 f3 c2 f1 f3 f3 f2 f3",
+        "_respond": "f1 f f2 c1 f1 f2",
+    },
+    "joints.ties": {
+        "_offset_tie": "f2 i2 i2 i1 f2 f1 f1 f3 f3 f2 f3",
+    },
+    "model.assembly": {
+        "_columns": "i1 i1 i1 i1",
+        "_count_pairs": "i2 i1 i1",
+        "_expand": "f1 f3 i1",
+        "_fill_pairs": "i2 i1 i1 i1",
+        "_find_slots": "i2 i1 i1 i1 i1",
+        "_reduce": "f2 f3 i1 i",
+        "_scatter": "f3 i2 i3 i1 i1 f3 f1",
+        "_unique_rows": "i1 i1",
+    },
+    "nets.chebyshev": {
+        "_sharpest": "f3 b2",
+    },
+    "nets.compass": {
+        "_next_nodes": "f3 b2 f1 f1 i i i",
+        "_towards": "f2 f2 f2 f1 f1 ff f1 f2 f3 f1 f1",
+        "_turned": "f2 f2 f1 f2 f1 f1 f1 f2 f2",
+    },
+    "nets.net_ends": {
+        "_by_squares": "f3 i2 f1",
+        "_connect": "b2 b2",
+        "_squares": "f3 f1 f1",
+    },
+    "nets.net_extent": {
+        "_wanted": "b2 f1 f1 i f1 f1 f f",
+    },
+    "nets.net_refinement": {
+        "_chosen": "f3 b2 i i f3 i2",
+        "_geodesic": "f1 f1 f1 f1 f2 f1 f2 f3",
+        "_sweep": "f3 f3 i2 f1 f2 f3 f1 f1 i i ff f3 b2 f2",
+    },
+    "rods.bend_twist": {
+        "_bend_twist": "f2 i2 f2 f1 f2 f1 f3 f3 f1 f2 f3",
+        "_transported": "f2 i2 f3 f3 f1 f3 f3 f1",
+    },
+    "rods.elements": {
+        "_add_axial": "f2 i2 f1 f2",
+        "_elongation": "f2 f2 i2 f1",
+        "_strains": "f2 i2 f1",
+        "_stretch": "f2 i2 f1 f1 f1 f1 b f2 f3",
+    },
+    "rods.isotropic": {
+        "_isotropic_bend": "f2 i2 f1 f2 f3",
+        "_isotropic_bend_twist": "f2 i2 f2 f1 f1 f3 f1 f2 f3",
+    },
+    "solve.implicit_euler": {
+        "_add_free": "f f2 f3 i1 f2",
+        "_mass_norm": "f1 f1",
+    },
+    "solve.newton_matrix": {
+        "_add": "f3 i2 i1 i1 f3 b1 f2",
+        "_add_blocks": "f2 f3 i1 i1 f3 b1 f2",
+        "_factor": "f2 i i",
+        "_solve": "f2 i i f2 i1 i1 f3 f1 f2",
+        "_turn_whole": "f2 i i1 f3",
+    },
+    "solve.newton_step": {
+        "_add_product": "f3 i2 f2 f2",
+    },
+    "solve.sparse_ldl": {
+        "_dissect": "f2 i2 i1 i1",
+        "_numeric": "i1 f1 i1 i1 i1 i1 i1 i2 i1 i1 i1 i1 i1 f1 f1 f1 f1 f1",
+        "_residual": "i1 i1 f1 f1 f1",
+        "_solve": "f1 i1 i1 i1 i1 f1 f1 f1 f1",
+    },
+    "solve.symbolic": {
+        "_children": "i1 i1",
+        "_coupled": "i1 i1 i1",
+        "_fronts": "i1 i1 i1 i1 i1",
+        "_maps": "i1 i1 i1 i1 i1 i1 i1 i1 i1 i1 i1",
+        "_supernodes": "i1 i1 i1",
+        "_tree": "i1 i1 i1 i1",
+    },
+    "targets.field_fitting": {
+        "_curvatures": "f2 f2 i2 f2 f3 f2 f f3 f2",
+        "_fit": "f2 f3 f i1 i1 f2 f2 f1 f2",
+        "_means": "f2 f2 i2 f2 f3 f2 f f2 f2",
+    },
+    "targets.quadric": {
+        "_implicit": "f2 f1 f f",
+        "_level": "f2 f1 f f",
+    },
+    "targets.rim": {
+        "_distance": "f2 f2 f2 i1 i1 i1 f2 f1 f1",
+        "_feet": "f2 f2 i1 i1 i1 f2 f1 i1 f1",
+        "_find_roots": "f2 f1 f f1",
+    },
+    "targets.smooth_field": {
+        "_blend": "f2 f1 i1 f i1 i1 f1 f2 f b f1 f2 f3",
+        "_lattice_over": "f2 f",
+        "_most_within": "f2 f2 f1 i1 f i1 i1 f",
+        "_nearest": "f2 f2 f1 i1 f i1 i1 i f f1 i1",
+        "_sorted": "f2 f1 i1 f",
+        "_thin": "f2 f1 i1 f i1 i1 f b1",
+        "_within": "f2 f2 f1 i1 f i1 i1 f b i1 i1 f1",
+    },
+    "targets.target": {
+        "newton_to_closest": "f2 f2 f1 f2 f3 f1 f2 b1",
+        "offset_shape": "f3 f1",
+        "shape_operators": "f2 f3 f2 f3",
+    },
+}

@@ -1,0 +1,75 @@
+"""The table of kernels: complete, and the types are those that jobs call them with."""
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import rodshell
+from rodshell.kernels.table import KERNELS
+
+SOURCE = Path(rodshell.__file__).parent
+
+
+def test_each_kernel_that_python_calls_has_a_row_and_no_other_name_has() -> None:
+    called = {resolved(module, name) for module in sources() for name in names_outside_kernels(module)} - {None}
+    assert called == {(module, name) for module, rows in KERNELS.items() for name in rows}
+
+
+def test_a_row_has_a_type_for_each_argument() -> None:
+    for module, rows in KERNELS.items():
+        for name, row in rows.items():
+            assert len(kernels_of(module)[name].args.args) == len(row.split()), f"{module}.{name}"
+
+
+@cache
+def sources() -> list[str]:
+    """Modules of the package, without its name."""
+    return [
+        ".".join(path.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__")
+        for path in SOURCE.rglob("*.py")
+    ]
+
+
+@cache
+def tree_of(module: str) -> ast.Module:
+    path = SOURCE.joinpath(*module.split("."))
+    return ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8"))
+
+
+@cache
+def kernels_of(module: str) -> dict[str, ast.FunctionDef]:
+    """Functions that are declared by `njit`."""
+    functions = [node for node in tree_of(module).body if isinstance(node, ast.FunctionDef)]
+    return {
+        one.name: one for one in functions if any(ast.unparse(mark).startswith("njit(") for mark in one.decorator_list)
+    }
+
+
+@cache
+def imported(module: str) -> dict[str, tuple[str, str]]:
+    """Module and name of what a module imports from the package."""
+    return {
+        alias.asname or alias.name: (node.module.removeprefix("rodshell."), alias.name)
+        for node in ast.walk(tree_of(module))
+        if isinstance(node, ast.ImportFrom) and node.module is not None and node.module.startswith("rodshell.")
+        for alias in node.names
+    }
+
+
+def resolved(module: str, name: str) -> tuple[str, str] | None:
+    """The kernel that a name means in a module, the module's own or an imported one."""
+    home, own = imported(module).get(name, (module, name))
+    return (home, own) if home in sources() and own in kernels_of(home) else None
+
+
+def names_outside_kernels(module: str) -> Iterator[str]:
+    """Names that are read in a module's code, except in that of kernels."""
+    waiting: list[ast.AST] = [tree_of(module)]
+    while waiting:
+        node = waiting.pop()
+        if node in kernels_of(module).values():
+            continue
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+            yield node.id
+        waiting += ast.iter_child_nodes(node)
