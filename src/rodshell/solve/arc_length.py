@@ -87,6 +87,7 @@ class ArcLength:
         self._per_factor = PER_FACTOR * self.length
         self._scale = np.empty(0)
         self._least_force = 1e-6 * float(problem.stretch.stiffness.max(initial=0.0))
+        self._unstable: tuple[Floats, Tangent]  # the last one that was found, with its tangent
         self.factorizations = 0
 
     def begin(self) -> Point | None:
@@ -248,7 +249,9 @@ class ArcLength:
         ----------
         point : with negative modes.
         """
-        tangent, _ = self._tangent(point.elements, point.state, point.forces, point.factor)
+        state, tangent = self._unstable
+        if state is not point.state:
+            tangent, _ = self._tangent(point.elements, point.state, point.forces, point.factor)
         size, scale = tangent.freedom.size, self._scale
 
         def inverse(row: Floats) -> Floats:
@@ -295,6 +298,8 @@ class ArcLength:
         change = self._loaded.change(state, motion, factor, rate)
         arc, modes = (0.0, None) if last is None else (last.arc + step, last.modes)
         point = Point(factor, arc, state, forces, elements, tangent.negative_modes, motion, change, rate, modes=modes)
+        if tangent.negative_modes:
+            self._unstable = state, tangent
         return point if tangent.negative_modes or not ahead else self._looking_ahead(point, tangent, modes)
 
     def _looking_ahead(self, here: Point, tangent: Tangent, start: Floats | None) -> Point:
