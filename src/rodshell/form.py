@@ -195,6 +195,7 @@ class Form:
             curvature=sharpest(self.checks),
             final=shape,
             pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
+            prestrain=getattr(self.case.bracing, "prestrain", None),
         )
 
     @cached_property

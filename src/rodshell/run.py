@@ -163,7 +163,7 @@ class Run:
                 reused += ["fabrication"] if made is not None else []
                 loaded = earlier.known_loaded if "loads" in same else None
                 loaded = None if loaded is None or loaded.stopped else loaded
-                reused += ["loads"] if loaded is not None else []
+                reused += ["loads"] if "loads" in same and (loaded is not None or not case.loads) else []
                 form = replace(form, _known_checks=checks, _known_fabrication=made, _known_loaded=loaded)
         return replace(form, reused=tuple(reused))
 

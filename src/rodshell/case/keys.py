@@ -238,7 +238,7 @@ def _nearest(path: str, keys: Mapping[str, CaseKey]) -> str | None:
 
 def _inside(table: str, keys: Mapping[str, CaseKey]) -> list[str]:
     """Names of the keys and tables directly inside a table; of the outermost tables for ""."""
-    paths = [*keys, *case_tables()]
+    paths = [*keys, *case_tables()] if table else [*case_tables(), *keys]
     return [name for outer, _, name in (path.rpartition(".") for path in paths) if outer == table]
 
 

@@ -21,11 +21,13 @@ SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no m
 
 @dataclass(frozen=True)
 class Diagonal:
-    """One diagonal of a cell: the joints that it ties, and their distance flat and in the final shape [m]."""
+    """One diagonal of a cell: the joints that it ties, and their distance flat and in the final shape [m]; of a cable
+    also its length free of stress [m]."""
 
     joints: tuple[int, int]
     flat: float
     final: float
+    cut: float | None = None
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class Fabricated:
 
 def fabricate(
     mesh: GridMesh, rod: Rod, options: Fabrication, *, curvature: Floats | None = None, final: Floats | None = None,
-    pattern: Pattern = Pattern(),
+    pattern: Pattern = Pattern(), prestrain: float | None = None,
 ) -> Fabricated:  # fmt: skip
     """Cut list, layers, splices, stock and bracing of a grid.
 
@@ -92,6 +94,7 @@ def fabricate(
     curvature : (k,) the sharpest bend that each entry of `rod_nodes` sees [1/m], which splices avoid.
     final : (n, 3) the final shape, for the bracing [m].
     pattern : of the bracing; default: both diagonals of every cell.
+    prestrain : by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
     """
     rods, crossings = mesh.grid.rods, mesh.grid.crossings
     lengths = np.array([rod_line.length for rod_line in rods])
@@ -110,9 +113,15 @@ def fabricate(
     bracing: tuple[Diagonal, ...] = ()
     if final is not None:
         flat, there = mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1)
+        pairs = diagonals(mesh.grid, pattern)
+
+        def apart(places: Floats) -> list[float]:
+            distances: list[float] = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1).tolist()
+            return distances
+
         bracing = tuple(
-            Diagonal((a, b), float(np.linalg.norm(flat[a] - flat[b])), float(np.linalg.norm(there[a] - there[b])))
-            for a, b in diagonals(mesh.grid, pattern).tolist()
+            Diagonal((a, b), laid, spanned, None if prestrain is None else spanned / (1.0 + prestrain))
+            for (a, b), laid, spanned in zip(pairs.tolist(), apart(flat), apart(there), strict=True)
         )
     mass = rod.mass_per_length * (cut + _more(mesh, rod, options))
     return Fabricated(

@@ -54,6 +54,7 @@ class LoadedShell:
         None: not asked for.
     load_sum : (3,) sum of the loads, those on supports included [N].
     reactions : of the supports, without those of the unloaded shell.
+    support_forces : of the supports, with those of the unloaded shell: what foundations have to bear, reversed.
     displacements : (n, 3) of the mesh's nodes against the unloaded shell [m].
     positions : (n, 3) of the mesh's nodes [m].
     stress : (k,) largest stress of bending, axial force and torsion at each entry of `rod_nodes` [Pa]; None: unknown.
@@ -75,6 +76,7 @@ class LoadedShell:
     imperfect_kind: Limit | None
     load_sum: Floats
     reactions: Reactions
+    support_forces: Reactions
     displacements: Floats
     positions: Floats
     stress: Floats | None
@@ -307,6 +309,7 @@ def loaded_shell(
         imperfect_kind=imperfect_kind,
         load_sum=total,
         reactions=structure.reactions(found),
+        support_forces=structure.support_forces(found),
         displacements=positions - before,
         positions=positions,
         stress=bent.stress,

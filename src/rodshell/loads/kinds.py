@@ -170,7 +170,8 @@ class Wind:
         coefficient = np.full(len(nodes.positions), 0.0 if self._formula else float(self.coefficient))
         if self._formula is not None:
             x, y = nodes.along(self.direction).T
-            coefficient = np.broadcast_to(np.asarray(self._formula(x, y), dtype=float), x.shape)
+            with np.errstate(all="ignore"):  # what is not finite is refused
+                coefficient = np.broadcast_to(np.asarray(self._formula(x, y), dtype=float), x.shape)
             if not np.isfinite(coefficient).all():
                 k = int(np.argmin(np.isfinite(coefficient)))
                 raise InputError(

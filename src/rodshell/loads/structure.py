@@ -170,6 +170,15 @@ class Structure:
         """
         return self.shell.with_elements(found.elements[: len(self.shell.elements)])
 
+    def support_forces(self, found: Equilibrium) -> Reactions:
+        """What the supports exert in an equilibrium, with the springing of the bent rods.
+
+        Parameters
+        ----------
+        found : an equilibrium of this structure, loaded or not.
+        """
+        return reactions(self.shell, found)
+
     def reactions(self, found: Equilibrium) -> Reactions:
         """What the supports exert in an equilibrium in addition to what they exert without loads.
 
@@ -177,5 +186,5 @@ class Structure:
         ----------
         found : an equilibrium of this structure under loads.
         """
-        loaded, before = reactions(self.shell, found), reactions(self.shell, self.equilibrium)
+        loaded, before = self.support_forces(found), self.support_forces(self.equilibrium)
         return replace(loaded, forces=loaded.forces - before.forces, moments=loaded.moments - before.moments)

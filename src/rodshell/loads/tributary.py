@@ -12,13 +12,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.targets import Target
+from rodshell.targets import Freeform, Target
 from rodshell.validation import brief
 
 ACROSS = 240  # triangles' sides across the surface's larger width, at least
 A_SPACING = 24.0  # sides on the distance of two rods, at least
 MOST_ACROSS = 900
 BISECTIONS = 40
+ON_THE_EDGE = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
 STEEP, MOST_HALVINGS = 2.5, 8  # of the step: where the surface is steep longer sides are halved, so many times
 NEIGHBOURS, AS_NEAR = 4, 1e-6  # nodes that may share a corner, and by what share of the size their distances differ
 
@@ -56,7 +57,11 @@ def tributary_areas(
     rotate : angle of their sides [rad].
     spacing : smallest distance of two neighbouring rods [m].
     """
-    corners, faces = surface_triangles(target, anchor=anchor, rotate=rotate, step=_step(target, spacing))
+    step = _step(target, spacing)
+    if isinstance(target, Freeform):
+        corners, faces = mesh_triangles(target, step=step)
+    else:
+        corners, faces = surface_triangles(target, anchor=anchor, rotate=rotate, step=step)
     a, b, c = (corners[faces[:, k]] for k in range(3))
     vector = 0.5 * np.cross(b - a, c - a)
     shares = np.column_stack([np.linalg.norm(vector, axis=1), vector]) / 3.0
@@ -109,6 +114,29 @@ def surface_triangles(
     return _halved(target, *_cut(target, plan, z, inside, faces), longest=STEEP * step)
 
 
+def mesh_triangles(target: Freeform, *, step: float) -> tuple[Floats, Ints]:
+    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end.
+
+    Parameters
+    ----------
+    target : the surface.
+    step : longest side [m].
+    """
+    faces = target.surface.faces
+    points, faces = _halved(target, target.surface.vertices, faces, longest=step)
+    inside = target.margin(points) >= -ON_THE_EDGE * target.size
+    one, two, sides = _across(inside, faces)
+    low, high = points[sides[:, 0]], points[sides[:, 1]]
+    for _ in range(BISECTIONS):
+        middle = target.retract(0.5 * (low + high))
+        within = target.margin(middle)[:, None] >= 0
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    points, faces = _stitched(target, points, low, faces[inside[faces].all(axis=1)], one, two)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    upwards = np.cross(b - a, c - a)[:, 2].sum() >= 0
+    return points, faces if upwards else faces[:, ::-1]
+
+
 def _step(target: Target, spacing: float) -> float:
     finest = 2.0 * target.size / MOST_ACROSS
     return max(finest, min(2.0 * target.size / ACROSS, spacing / A_SPACING))
@@ -125,16 +153,28 @@ def _lifted(target: Target, plan: Floats) -> tuple[Floats, Bools]:
 
 def _cut(target: Target, plan: Floats, z: Floats, inside: Bools, faces: Ints) -> tuple[Floats, Ints]:
     """The faces inside the end, those across it cut; corners are counted anew."""
+    one, two, sides = _across(inside, faces)
+    ends, height = _ends_of(target, plan, z, sides[:, 0], sides[:, 1])
+    points, there = np.column_stack([plan, z]), np.column_stack([ends, height])
+    return _stitched(target, points, there, faces[inside[faces].all(axis=1)], one, two)
+
+
+def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
+    """Faces with one corner inside, which is put first; with two, the one outside put first; and the sides of these
+    that lead out, of the first kind along both sides, then of the second."""
     count = inside[faces].sum(axis=1)
-    whole, one, two = (faces[count == k] for k in (3, 1, 2))
+    one, two = (faces[count == k] for k in (1, 2))
     one = np.take_along_axis(one, (inside[one].argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     two = np.take_along_axis(two, ((~inside[two]).argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
-    # of `one` the first corner is inside, of `two` the first is outside
-    sides = np.concatenate([one[:, [0, 1]], one[:, [0, 2]], two[:, [1, 0]], two[:, [2, 0]]])
-    key, back = np.unique(sides[:, 0] * len(plan) + sides[:, 1], return_inverse=True)
-    ends, height = _ends_of(target, plan, z, key // len(plan), key % len(plan))
-    points = np.vstack([np.column_stack([plan, z]), np.column_stack([ends, height])])
-    a, b, c, d = np.split(len(plan) + back, np.cumsum([len(one), len(one), len(two)]))
+    return one, two, np.concatenate([one[:, [0, 1]], one[:, [0, 2]], two[:, [1, 0]], two[:, [2, 0]]])
+
+
+def _stitched(
+    target: Target, points: Floats, ends: Floats, whole: Ints, one: Ints, two: Ints
+) -> tuple[Floats, Ints]:
+    """Whole faces, and what is left of those that were cut at the `ends` of their sides."""
+    a, b, c, d = np.split(len(points) + np.arange(len(ends)), np.cumsum([len(one), len(one), len(two)]))
+    points = np.vstack([points, ends])
     around = [(two[:, 1], two[:, 2]), (two[:, 2], d), (d, c), (c, two[:, 1])]
     middle = len(points) + np.arange(len(two))
     points = np.vstack([points, target.retract(0.25 * (points[two[:, 1]] + points[two[:, 2]] + points[c] + points[d]))])

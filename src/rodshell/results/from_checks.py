@@ -328,7 +328,13 @@ def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fa
         kerf=fabricated.options.kerf,
         total_mass=float(fabricated.mass.sum()) + len(joints) * joint_mass,
         bracing=tuple(
-            Brace(start=joints[brace.joints[0]], end=joints[brace.joints[1]], flat=brace.flat, final=brace.final)
+            Brace(
+                start=joints[brace.joints[0]],
+                end=joints[brace.joints[1]],
+                flat=brace.flat,
+                final=brace.final,
+                **({} if brace.cut is None else {"cut": brace.cut}),
+            )
             for brace in fabricated.bracing
         ),
         **stock,

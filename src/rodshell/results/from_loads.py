@@ -87,9 +87,10 @@ def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ..
         utilisation=shell.utilisation,
         max_stress=None if shell.stress is None else float(shell.stress.max()),
         governs=governs,
-        uplift=float(max(0.0, -shell.reactions.forces[:, 2].min())),
+        uplift=float(max(0.0, -shell.support_forces.forces[:, 2].min())),
         reactions=shell.reactions.forces.tolist(),
-        moments=shell.reactions.moments.tolist(),
+        support_forces=shell.support_forces.forces.tolist(),
+        support_moments=shell.support_forces.moments.tolist(),
         bracing=bracing,
         bracing_utilisation=shell.bracing_utilisation,
     )

@@ -27,9 +27,10 @@ class LoadedShell(Record):
     utilisation: Number = key("largest stress over the strength; null: one of them is not known")
     max_stress: Number = key("largest stress of bending, axial force and torsion", "Pa")
     governs: Governs | None = key("place with the largest stress")
-    uplift: Number = key("largest force that pulls a support up; 0: none", "N")
+    uplift: Number = key("largest force by which the shell pulls at a support upwards; 0: at none", "N")
     reactions: Rows[Point] = rows("force of each support, in the order of boundary, without the unloaded shell's", "N")
-    moments: Rows[Point] = rows("moment of each support", "N m")
+    support_forces: Rows[Point] = rows("force of each support, with the unloaded shell's", "N")
+    support_moments: Rows[Point] = rows("moment of each support, with the unloaded shell's", "N m")
     bracing: Rows[Number] = rows(
         "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
     )

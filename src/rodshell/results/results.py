@@ -187,6 +187,7 @@ class Brace(Record):
     end: Text = required("id of the second joint", alias="to")
     flat: Number = key("length in the flat grid", "m")
     final: Number = key("length in the final shape", "m")
+    cut: Number = key("length of a cable free of stress; absent without bracing of cables", "m")
 
 
 class Piece(Record):
@@ -426,7 +427,8 @@ def contradictions(results: Results) -> Iterator[str]:
     for name, supported in results.loads.items():
         for support, loaded in supported.items():
             where = f"loads.{name}.{support}"
-            counts |= {f"{where}.reactions": loaded.reactions, f"{where}.moments": loaded.moments}
+            counts |= {f"{where}.reactions": loaded.reactions, f"{where}.support_forces": loaded.support_forces}
+            counts[f"{where}.support_moments"] = loaded.support_moments
             braces = len(results.fabrication.bracing) if results.fabrication else 0
             if len(loaded.bracing) not in (0, braces):
                 yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
