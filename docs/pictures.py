@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rodshell.job import Job
-from rodshell.output import picture_svg
+from rodshell.output.pictures import picture_svg
 
 FOLDER = Path(__file__).parent / "pictures"
 

@@ -100,9 +100,9 @@ HELD = {
         lambda: rs.Job(rs.Hemisphere(SIZE), LAYOUT, ROD, joint=rs.Linker(rod=ROD)),
         "joints with linkers of another rod",
     ),
-    "rods left out": (
-        lambda: rs.Job(rs.Hemisphere(SIZE), replace(LAYOUT, left_out=("U01",)), ROD),
-        "a layout with lines at unequal spacing or rods left out",
+    "unequal spacing": (
+        lambda: rs.Job(rs.Hemisphere(SIZE), replace(LAYOUT, lines=((-0.05, 0.0, 0.06), ())), ROD),
+        "a layout with lines at unequal spacing",
     ),
 }
 
@@ -118,6 +118,29 @@ def test_what_no_case_can_describe_is_kept_as_it_is(name: str) -> None:
     assert "\n" not in repr(job)
 
 
+def test_rods_are_left_out_by_name() -> None:
+    job = rs.Job(rs.Hemisphere(SIZE), replace(LAYOUT, left_out=("U02", "V03")), ROD, ends="pinned")
+    assert rs.Job.load(job.to_toml()) == job
+    assert job.changed(layout__left_out="").changed(layout__left_out="U02, V03, U02") == job
+    whole, rest = (each.run(until="drape") for each in (job.changed(layout__left_out=[]), job))
+    names = [rod.name for rod in whole.footprint.rods]
+    assert [rod.name for rod in rest.footprint.rods] == [name for name in names if name not in ("U02", "V03")]
+    with pytest.raises(InputError, match=r"layout.left_out: there is no rod U99: the rods are U01, U02, "):
+        job.changed(layout__left_out="U02, U99").run(until="drape")
+    with pytest.raises(InputError, match=r"layout.left_out = 3: give names"):
+        job.changed(layout__left_out=3)
+
+
+def test_a_form_without_pop_ups_saves_the_next_run_its_drape() -> None:
+    job = rs.Job(rs.Hemisphere(SIZE), LAYOUT, ROD)
+    grid = job.run(until="drape")
+    assert not grid.popped
+    assert grid.draped.report.converged
+    form = job.run(warm_start=grid, until="pop-up")
+    assert form.draped is grid.draped
+    assert form == job.run(until="pop-up")  # bit for bit
+
+
 def test_equality_of_targets_from_python_is_by_the_object() -> None:
     target = mesh()
     assert rs.Job(target, LAYOUT, ROD) == rs.Job(target, LAYOUT, ROD)
@@ -129,7 +152,7 @@ def test_equality_of_targets_from_python_is_by_the_object() -> None:
 
 @pytest.mark.parametrize("rotate", [0.1, "auto"])
 def test_a_heading_in_place_of_that_of_a_layout_that_no_key_describes_counts(rotate: float | str) -> None:
-    layout = replace(LAYOUT, left_out=("U01",), rotate=0.3)
+    layout = replace(LAYOUT, lines=((-0.05, 0.0, 0.06), ()), rotate=0.3)
     form = rs.Job(rs.Ellipsoid(0.2, 0.15, 0.12), layout, ROD, rotate=rotate, ends="pinned").run(until="pop-up")
     decided = form.case.layout.rotate
     assert decided == (rotate if form.search is None else form.search.best.heading)

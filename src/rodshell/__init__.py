@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from rodshell.solve.problem import Damping, ExplicitForce, GravityForce, ImplicitForce, PointLoads
     from rodshell.solve.rod_statics import RodLoads, RodShape, RodSupports, solve_rod
     from rodshell.solve.simulate import Sample, TimeSeries, simulate
-    from rodshell.sweeps import read_sweep, sweep
+    from rodshell.sweeps import optimise, read_sweep, sweep
     from rodshell.targets import (
         Cap,
         Disc,
@@ -126,7 +126,7 @@ _HOMES = {
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
     "rodshell.solve.rod_statics": ("RodLoads", "RodShape", "RodSupports", "solve_rod"),
     "rodshell.solve.simulate": ("Sample", "TimeSeries", "simulate"),
-    "rodshell.sweeps": ("read_sweep", "sweep"),
+    "rodshell.sweeps": ("optimise", "read_sweep", "sweep"),
     "rodshell.targets": (
         "Cap", "Disc", "Ellipsoid", "Freeform", "HeightField", "Hemisphere", "Paraboloid", "Placement", "Rectangle",
         "Target", "heights_from", "surface_from",
@@ -145,9 +145,9 @@ __all__ = [
     "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight",
     "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Target", "Temperature",
     "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads",
-    "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "pop_up",
-    "pop_up_table", "read", "read_sweep", "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from",
-    "sweep", "trim",
+    "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise",
+    "pop_up", "pop_up_table", "read", "read_sweep", "save", "search", "simulate", "solve_rod", "straight_rods",
+    "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

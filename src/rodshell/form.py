@@ -31,7 +31,6 @@ from rodshell.loads.combinations import Loads
 from rodshell.loads.structure import Strength
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
-from rodshell.output.pictures import picture_svg
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_seam_forces
@@ -257,6 +256,10 @@ class Form:
         """The typed content of result.json before anything was checked."""
         return results_of(self.stages)
 
+    def unchecked(self) -> Archive:
+        """What is kept of it before anything was checked, without a verdict."""
+        return Archive(self.results(), states_of(self.stages), self.case.text(), self.inputs)
+
     def archive(self, *, options: OutputOptions | None = None) -> Archive:
         """Everything that is kept, checked and made ready to be built.
 
@@ -318,6 +321,7 @@ class Form:
 
     def _repr_html_(self) -> str:
         """The 3D viewer with all shapes, and what they are worth, as notebooks show it."""
+        from rodshell.output.pictures import picture_svg
         from rodshell.output.viewer import frame_html, scene_of
 
         scene = scene_of(self._archive)

@@ -216,7 +216,7 @@ class Job:
         progress: Progress = silent,
         time_limit: float | None = None,
         announce: Announce | None = None,
-        until: Literal["pop-up", "fabrication"] = "fabrication",
+        until: Literal["drape", "pop-up", "fabrication"] = "fabrication",
         frames_in: str | PathLike[str] = "",
     ) -> Form:
         """Find the form: target, drape, trim, pop-up, checks, fabrication.
@@ -233,7 +233,9 @@ class Job:
         progress : called as progress(stage, detail, residual) at every iteration.
         time_limit : [s] after which the job ends, at its next iteration, with what was found until then.
         announce : called with a sentence for each value that the job chose itself, before the form is computed.
-        until : the last stage that is run now. With "pop-up", checks and fabrication are made when first asked for.
+        until : the last stage that is run now. With "drape" the form has the flat grid, but no popped-up shells; as
+            `warm_start` of the next run it saves the drape. With "pop-up", checks and fabrication are made when first
+            asked for.
         frames_in : folder in which a fall's folder of frames (drape.frames) is made; default: the current one.
 
         Returns
@@ -248,15 +250,24 @@ class Job:
         """
         if warm_start is not None:
             instance("warm_start", warm_start, Form, FOUND)
-        choice("until", until, ("pop-up", "fabrication"))
+        choice("until", until, ("drape", "pop-up", "fabrication"))
         if time_limit is not None:
             instance("time_limit", time_limit, Real, "a number in s")
         limit = limited(progress, time_limit)
-        run = Run(self._case, self._target, self._inputs, warm_start, limit, announce, Path(frames_in))
+        run = Run(
+            self._case,
+            self._target,
+            self._inputs,
+            warm_start,
+            limit,
+            announce,
+            Path(frames_in),
+            pops_up=until != "drape",
+        )
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
         with entered:
             form = run.table_form() if self._case.of_table else run.form()
-            return form if until == "pop-up" else form.finished(run.progress)
+            return form.finished(run.progress) if until == "fabrication" else form
 
     def __repr__(self) -> str:
         case = self._case

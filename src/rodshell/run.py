@@ -42,7 +42,12 @@ DECIDED_BY = ("target", "layout", "rod", "joint", "drape", "seams", "checks")
 
 class Run:
     """One run of a case; parameters as of `Job.run`, with the target where it was built before, and what its files held
-    then."""
+    then.
+
+    Parameters
+    ----------
+    pops_up : False ends it with the drape, trimmed and mapped back.
+    """
 
     def __init__(
         self,
@@ -53,7 +58,10 @@ class Run:
         progress: Progress,
         announce: Announce | None,
         frames_in: Path,
+        *,
+        pops_up: bool = True,
     ) -> None:
+        self.pops_up = pops_up
         self.asked, self.target, self.progress = case, target, progress
         self.announce, self.frames_in = announce, frames_in
         self.inputs = read_inputs(case.text()) if inputs is None else dict(inputs)
@@ -103,7 +111,8 @@ class Run:
         streams = isinstance(method, Fall) and method.stream is not None
         return find_stages(
             found.target, found.layout, found.rod,
-            method=method, anchor=found.anchor, joint=found.joint, ends=found.ends,
+            method=method, anchor=found.anchor, joint=found.joint,
+            ends=found.ends if self.pops_up else (),
             warm_start=earlier if isinstance(earlier, PatchForm) else None,
             same_drape="trim" in same and not streams, progress=self.progress,
         )  # fmt: skip
@@ -112,7 +121,8 @@ class Run:
         earlier = self.earlier.stages if self.earlier is not None else None
         return find_patched_stages(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
-            patch_layouts=case.seams.patch_layouts(), joint=found.joint, ends=found.ends,
+            patch_layouts=case.seams.patch_layouts(), joint=found.joint,
+            ends=found.ends if self.pops_up else (),
             warm_start=earlier if isinstance(earlier, PatchedForm) else None,
             same_drape="trim" in same, progress=self.progress,
         )  # fmt: skip

@@ -37,7 +37,7 @@ def sensitivity(number: int) -> tuple[rs.PopUp, Sensitivity]:
     mesh = popped.shell.mesh
     of_rod = [rod.stretch_stiffness, *rod.bend_stiffnesses, rod.twist_stiffness]
     table = np.column_stack([np.tile(of_rod, (len(mesh.edges), 1)), mesh.edge_lengths])
-    return popped, Sensitivity(popped.equilibrium, EdgeProperties.of(popped.shell, table))
+    return popped, Sensitivity(popped.equilibrium, EdgeProperties.of(popped.shell, joint or rs.Ball(), table))
 
 
 @cache
@@ -104,8 +104,10 @@ def test_derivatives_are_those_of_solving_again(number: int, k: int) -> None:
     nodes = popped.shell.first_angle
     assert np.abs(response.motions[k, :nodes] - positions).max() < 1e-6 * np.abs(positions).max()
     assert np.abs(response.forces[k] - forces).max() < 1e-6 * np.abs(forces).max()
-    found = here.mode_slopes(here.lowest_modes(3, mass=mass), changed)[:, k]
-    assert np.abs(found - values).max() < 1e-6 * np.abs(values).max()
+    modes = here.lowest_modes(3, mass=mass)
+    found = here.mode_slopes(modes, changed)[:, k]
+    # eigenvalues are known to 1e-12, and so their differences over 8e-3 to 1e-9 of them
+    assert np.abs(found - values).max() < 1e-6 * np.abs(values).max() + 1e-8 * modes.values.max()
 
 
 @pytest.mark.parametrize("number", range(4), ids=NAMES)

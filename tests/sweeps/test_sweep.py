@@ -1,6 +1,7 @@
 """Whole sweeps of small shells: the table against single runs, going on after kills, limits, and both engines."""
 
 import csv
+import json
 import os
 import signal
 import subprocess
@@ -75,6 +76,7 @@ def test_a_changed_sweep_computes_only_what_is_new(whole: Path):
     assert [row["rods"] for row in rows] == ["10", "10", "10"]
 
 
+@pytest.mark.slow
 def test_the_best_form_is_kept_and_follows_the_sweep(tmp_path: Path):
     axes = {"layout.spacing": ["80 mm", "75 mm"]}
     rs.sweep(plan(axes=axes, run={"keep": "best"}), tmp_path)
@@ -93,7 +95,13 @@ def test_all_forms_are_kept_by_their_job(tmp_path: Path):
     for row in rows_of(tmp_path)[:4]:
         kept = rs.read(tmp_path / "archives" / row["job"])
         assert kept.results.layout.spacing[0] == float(row["layout.spacing"])
-    assert rs.sweep(plan(columns=["job"], run={"keep": "all"}), tmp_path).computed == 0
+    assert rs.sweep(plan(columns=["job"], run={"keep": "all"}), tmp_path, report=True).computed == 0
+    page = (tmp_path / "report.html").read_text()
+    data = json.loads(page.partition("const designs = ")[2].partition(";\n")[0])
+    assert data["rows"]["rms_pinned"] == [*(float(row["rms_pinned"]) for row in rows_of(tmp_path)[:4]), None, None]
+    assert [link is not None for link in data["links"]] == [True] * 4 + [False] * 2
+    assert page.count("<figure>") == 4
+    assert "http" not in page.partition("</style>")[2].partition("<script>")[0]
 
 
 def test_nothing_is_computed_where_a_design_is_not_valid(tmp_path: Path):

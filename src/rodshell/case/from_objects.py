@@ -121,10 +121,11 @@ def _target_table(target: Target) -> Table:
 
 def _layout_table(layout: GridLayout, rotate: float | Auto) -> LayoutTable:
     heading = "auto" if rotate == "auto" else _within_a_turn(rotate)
-    table = LayoutTable.model_validate({**layout.parameters(), "rotate": heading})
-    if any(layout.lines) or layout.left_out:
+    given = {**layout.parameters(), "rotate": heading, "left_out": layout.left_out}
+    table = LayoutTable.model_validate(given)
+    if any(layout.lines):
         turned = layout if rotate == "auto" else replace(layout, rotate=rotate)
-        return table.holding(Held(turned, "a layout with lines at unequal spacing or rods left out"))
+        return table.holding(Held(turned, "a layout with lines at unequal spacing"))
     return table
 
 

@@ -18,6 +18,7 @@ from rodshell.case.values import (
     LengthOrAuto,
     Lengths,
     LengthsOrAuto,
+    Names,
     NodeStiffness,
     Point,
     PointOrAuto,
@@ -53,6 +54,7 @@ class LayoutTable(Table):
     offset: Point = Field(
         default=(0.0, 0.0), description="shift x,y of the grid lines from the axes through the anchor"
     )
+    left_out: Names = Field(default=(), description="names of rods that are not built, such as U01, V03")
 
     def build(self, target: "Target | None" = None) -> "GridLayout":
         """The layout; a spacing "auto" stands for some 17 rods each way over the target."""

@@ -226,6 +226,14 @@ def iso_date(value: object) -> str:
         raise ValueError('must be a day; write it as "2026-11-22"') from None
 
 
+def names(value: object) -> tuple[str, ...]:
+    """Names: ["U01", "V03"] or "U01, V03"."""
+    items = value.split(",") if isinstance(value, str) and value.strip() else value or []
+    if not isinstance(items, list | tuple) or not all(isinstance(item, str) and item.strip() for item in items):
+        raise ValueError('give names such as ["U01", "V03"], or "U01, V03"')
+    return tuple(dict.fromkeys(item.strip() for item in items))
+
+
 IsoDate = Annotated[str, BeforeValidator(iso_date)]
 Length = Annotated[float, BeforeValidator(positive("length"))]
 LengthOrAuto = Annotated[float | Auto, BeforeValidator(or_auto(positive("length")))]
@@ -237,6 +245,7 @@ LengthsOrAuto = Annotated[
 Size = Annotated[tuple[float, float], BeforeValidator(pair(positive("length")))]
 Point = Annotated[tuple[float, float], BeforeValidator(pair(quantity("length")))]
 Whole = Annotated[int, BeforeValidator(whole)]
+Names = Annotated[tuple[str, ...], BeforeValidator(names)]
 Counts = Annotated[tuple[int, int] | Auto, BeforeValidator(counts)]
 Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], BeforeValidator(polylines)]
 Point3 = Annotated[tuple[float, float, float], BeforeValidator(triple("length"))]

@@ -1,7 +1,7 @@
 """Contact: rods that touch or run into each other where they should not, and how near the others come.
 
 Each edge of a rod is a prism of the rod's section; edges much shorter than the rod is thick are taken together. Pairs
-of edges that can be near are found by a tree over their middles. Two prisms are apart by the widest gap between them,
+of edges that can be near are found by cells about their middles. Two prisms are apart by the widest gap between them,
 seen along any of a few directions: from one axis to the other where these are nearest, along both axes and across both,
 and along the sides of both sections. A gap along any direction keeps them apart, so that no contact is missed; it is
 the distance of round rods that run side by side, and otherwise a lower bound of it.
@@ -20,11 +20,11 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import edge_directors, rod_frames, shell_normals
 from rodshell.geometry.frames import adapted, cross, dot, unit
+from rodshell.geometry.near_pairs import near_pairs
 from rodshell.layout import FlatGrid, GridMesh
 from rodshell.layout.flatgrid import Crossings, FlatRod
 from rodshell.model import Shell
@@ -85,7 +85,7 @@ def contact_of_patches(mesh: GridMesh, patches: Sequence[tuple[Shell, Floats]], 
     parts = [_crossing_lines(mesh.grid.rods[a:b], outline) for a, b in pairwise(sizes)]
     positions = np.concatenate([state[shell.node_blocks] for shell, state in patches])
     ends = positions[np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()]
-    together = cKDTree(ends).query_pairs(outline.near, output_type="ndarray")
+    together = near_pairs(ends, outline.near)
     patch = np.repeat(np.arange(len(patches)), 2 * np.diff(sizes))
     together = together[patch[together[:, 0]] != patch[together[:, 1]]]
     stations = np.array([(rod.start, rod.end) for rod in mesh.grid.rods]).ravel()
@@ -239,7 +239,7 @@ class _Edges:
         they count as near [m]; crossing rods, and parts of one rod, only when they touch away from there."""
         reach = self.outline.reach
         radius = np.linalg.norm(self.stop - self.start, axis=1).max() + 2 * reach + self.outline.near
-        found = cKDTree(0.5 * (self.start + self.stop)).query_pairs(radius, output_type="ndarray")
+        found = near_pairs(0.5 * (self.start + self.stop), float(radius))
         first, second = found[:, 0], found[:, 1]  # the first comes first in the order of the rods
         rods = self.rods[first], self.rods[second]
         same_rod = rods[0] == rods[1]

@@ -15,7 +15,9 @@ COMMANDS = {
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
     "check": "Check a case, or an earlier result, under loads.",
     "export": "Write drawings, schedules, models or the report of an earlier result again.",
+    "studio": "Design a gridshell on a live page in the browser.",
     "sweep": "Compute many designs: combinations or samples of the values of some keys.",
+    "optimise": "Search for the values of some keys for which objectives are smallest.",
     "warmup": "Compile all kernels in advance, once.",
     "paper": "Compute a figure of the paper again, with the errors.",
 }

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 @click.argument("file", metavar="SWEEP.toml")
 @click.option("--out", "-o", metavar="DIR", help="Folder of the sweep; default out/NAME. A sweep continues there.")
 @click.option("--dry-run", is_flag=True, help="Check all designs and print how many there are; compute nothing.")
+@click.option("--report", is_flag=True, help="Also write report.html: charts of all designs, shapes of the best.")
 @click.option("--retry", is_flag=True, help="Run jobs again that a limit stopped, or whose process died.")
 @QUIET
-def command(file: str, out: str | None, dry_run: bool, retry: bool, quiet: bool) -> int:
+def command(file: str, out: str | None, dry_run: bool, report: bool, retry: bool, quiet: bool) -> int:
     """Compute many designs: all combinations of the values of some keys, or samples of them.
 
     What is finished stays, whatever is interrupted: the same command continues, and a changed sweep computes only what
@@ -33,7 +34,7 @@ def command(file: str, out: str | None, dry_run: bool, retry: bool, quiet: bool)
         return _dry_run(plan, folder)
     announce_compilation(quiet=quiet)
     with Progress(quiet=quiet) as progress:
-        found = sweep(file, folder, retry=retry, progress=progress)
+        found = sweep(file, folder, retry=retry, report=report, progress=progress)
     if not quiet:
         click.echo(found.summary())
         click.echo(f"written to {folder.absolute()}")

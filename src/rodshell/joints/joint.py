@@ -264,6 +264,11 @@ FIRM = 1e8  # times the half edges next to it: the stiffness of a rigid directio
 UP = np.array([0.0, 0.0, 1.0])
 
 
+def resists(joint: Elastic) -> bool:
+    """Whether a `joint` resists some rotation."""
+    return joint.shear + joint.out_of_plane + joint.twist > 0
+
+
 def elastic_joints(
     rod_nodes: RodNodes, crossings: Ints, joints: Sequence[Elastic], rod_stiffness: Floats, size: int
 ) -> tuple[RelativeRotation, ...]:
@@ -277,7 +282,7 @@ def elastic_joints(
     rod_stiffness : (k, 3) EI1, EI2 and GJ at each rod node [N m2].
     size : number of blocks of the state.
     """
-    stiff = np.array([joint.shear + joint.out_of_plane + joint.twist > 0 for joint in joints], dtype=bool)
+    stiff = np.array([resists(joint) for joint in joints], dtype=bool)
     crossings, joints = crossings[stiff], [joint for joint, kept in zip(joints, stiff, strict=True) if kept]
     if not joints:
         return ()

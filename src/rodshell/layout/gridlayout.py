@@ -93,6 +93,7 @@ class GridLayout:
         edge: float | Auto = "auto",
         rotate: float = 0.0,
         offset: tuple[float, float] = (0.0, 0.0),
+        left_out: tuple[str, ...] = (),
     ) -> "GridLayout":
         """Make a layout of equally spaced rods along x and along y.
 
@@ -104,6 +105,7 @@ class GridLayout:
         edge : longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing.
         rotate : angle of family u against the target's x axis [rad].
         offset : shift (x, y) of the lattice against the axes through the anchor [m].
+        left_out : names of rods that are not built.
 
         Raises
         ------
@@ -114,7 +116,7 @@ class GridLayout:
         _require_two("spacing", pair)
         pair = (positive("layout spacing", pair[0], "m"), positive("layout spacing", pair[1], "m"))
         longest = auto_edge(pair) if isinstance(edge, str) and edge == "auto" else edge
-        return GridLayout(rods, pair, length, longest, rotate, offset)
+        return GridLayout(rods, pair, length, longest, rotate, offset, left_out=left_out)
 
     def phase(self, family: Family) -> float:
         """Offset of one line of the lattice of a family [m]; the others are whole spacings away."""
@@ -176,8 +178,8 @@ class GridLayout:
             offsets = whole.offsets(family)
             assert offsets is not None
             rods += [
-                make(rod_name(family, k, len(offsets)), float(c), middle - length / 2, middle + length / 2)
-                for k, c in enumerate(offsets)
+                make(name, c, middle - length / 2, middle + length / 2)
+                for name, c in zip(rod_names(family, len(offsets)), offsets.tolist(), strict=True)
             ]
         return FlatGrid.of(rods)
 
@@ -213,13 +215,13 @@ def _counts(rods: object) -> tuple[int, int]:
     return int(first), int(second)
 
 
-def rod_name(family: Family, index: int, count: int) -> str:
-    """Name of a rod: U01, U02, ... in ascending offset.
+def rod_names(family: Family, count: int) -> list[str]:
+    """Names of the rods of a family: U01, U02, ... in ascending offset.
 
     Parameters
     ----------
-    family : the rod's family.
-    index : the rod's position in its family, from 0.
+    family : of the rods.
     count : number of rods of the family, which determines the number of digits.
     """
-    return f"{family.upper()}{index + 1:0{max(2, len(str(count)))}d}"
+    letter, digits = family.upper(), max(2, len(str(count)))
+    return [f"{letter}{k + 1:0{digits}d}" for k in range(count)]

@@ -6,16 +6,22 @@ whose half edges act in series; a clamp has the half of the last edge alone:
     1/K = sum l / (2 S),   so   d log K / d log S = K l / (2 S) = -d log K / d log l   of either edge.
 
 An energy is linear in its stiffness, so the derivative of its gradient by log K is that gradient, element by element.
-The axial force of an edge changes by its rest length as -EA |e| / l^2.
+The axial force of an edge changes by its rest length as -EA |e| / l^2. A joint acts in series with the half edges next
+to it: its derivatives by the stiffnesses of the two sections that meet are central differences, at all joints at once.
+Joints keep the lengths of these half edges.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats, Ints
+from rodshell.joints import Joint, Linker
+from rodshell.joints.crossings import RodNodes, stencils
+from rodshell.joints.joint import elastic_joints, resists
+from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.model.shell import Shell
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.rods.elements import Elements, each_curvature, each_gradient
@@ -23,6 +29,7 @@ from rodshell.rods.isotropic import IsotropicBend, IsotropicBendTwist
 
 EA, EI1, EI2, GJ, LENGTH = range(5)
 PROPERTIES = 5
+PROBE = 1e-4  # of a stiffness next to a joint: its forces' change is then exact to 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,22 +39,25 @@ class EdgeProperties:
     Parameters
     ----------
     shell : the shell; its blocks and source frames stay as they are.
+    joint : one for all crossings, or one for each.
     before, after : (b,) edge before and after each bend; of a clamp the last edge, twice.
     table : (e, 5) its own properties, in the order EA, EI1, EI2, GJ, length.
     """
 
     shell: Shell
+    joint: Joint | Sequence[Joint]
     before: Ints
     after: Ints
     table: Floats
 
     @staticmethod
-    def of(shell: Shell, table: Floats) -> "EdgeProperties":
-        """Of a shell.
+    def of(shell: Shell, joint: Joint | Sequence[Joint], table: Floats) -> "EdgeProperties":
+        """Of a shell whose rods share their nodes or lie in layers.
 
         Parameters
         ----------
         shell : to be varied.
+        joint : one for all its crossings, or one for each.
         table : (e, 5) its edges' EA [N], EI1, EI2, GJ [N m2] and rest length [m].
         """
         rods = shell.mesh.edge_rods
@@ -55,7 +65,7 @@ class EdgeProperties:
         first = np.flatnonzero(np.append(True, rods[1:] != rods[:-1]))
         last = np.append(first[1:], len(rods)) - 1
         ends = np.column_stack([first, last]).ravel()[: len(shell.ghosts)]
-        return EdgeProperties(shell, np.append(inner, ends), np.append(inner + 1, ends), table)
+        return EdgeProperties(shell, joint, np.append(inner, ends), np.append(inner + 1, ends), table)
 
     def varied(self, table: Floats) -> "EdgeProperties":
         """The shell whose edges have other properties.
@@ -64,7 +74,8 @@ class EdgeProperties:
         ----------
         table : (e, 5) the properties of the edges.
         """
-        elements = tuple(self._with_stiffness(element, table) for element in self.shell.elements)
+        joints = iter(self._joints(self._at_nodes(table)))
+        elements = tuple(self._with_stiffness(element, table, joints) for element in self.shell.elements)
         edges = self.shell.stretch
         stretch = replace(edges, stiffness=table[:, EA].copy(), rest_lengths=table[:, LENGTH].copy())
         return replace(self, shell=replace(self.shell.with_elements(elements), stretch=stretch), table=table)
@@ -89,6 +100,8 @@ class EdgeProperties:
         total = csr_array((state.size, self.table.size))
         for part, by_edge in self._parts():
             total += _spread(each_gradient(part, state), part.blocks, state.size) @ by_edge
+        for change, blocks, by_edge in self._of_joints(lambda joint: each_gradient(joint, state)):
+            total += _spread(change, blocks, state.size) @ by_edge
         pulls, by_log_length = stretch.pulls(state), stretch.rest_lengths * stretch.by_rest_lengths(state)
         for kind, force in ((EA, stretch.stiffness * stretch.strains(state)), (LENGTH, by_log_length)):
             spread = _spread(force[:, None, None] * pulls, stretch.blocks, state.size)
@@ -106,12 +119,14 @@ class EdgeProperties:
         stretch, result = self.shell.stretch, np.zeros(self.table.shape)
         for part, by_edge in self._parts():
             result += (each_curvature(part, state, motion) @ by_edge).reshape(self.table.shape)
+        for change, _, by_edge in self._of_joints(lambda joint: each_curvature(joint, state, motion)):
+            result += (change @ by_edge).reshape(self.table.shape)
         apart = motion[stretch.blocks[:, 1]] - motion[stretch.blocks[:, 0]]
         result[:, EA] += each_curvature(stretch, state, motion)
         result[:, LENGTH] -= stretch.stiffness / stretch.rest_lengths * np.einsum("ei,ei->e", apart, apart)
         return result.ravel()
 
-    def _with_stiffness(self, element: Elements, table: Floats) -> Elements:
+    def _with_stiffness(self, element: Elements, table: Floats, joints: Iterator[RelativeRotation]) -> Elements:
         if isinstance(element, IsotropicBend):
             return replace(element, stiffness=self._in_series(table, EI1, len(element.blocks)))
         if isinstance(element, BendTwist):
@@ -120,6 +135,9 @@ class EdgeProperties:
             if not element.bend_stiffness.any():  # its bending is another's, see `Shell`
                 bend[:] = 0.0
             return replace(element, bend_stiffness=bend, twist_stiffness=self._in_series(table, GJ, count))
+        if isinstance(element, RelativeRotation):
+            now = next(joints)
+            return replace(element, stiffness=now.stiffness, deviators=now.deviators)
         return element
 
     def _in_series(self, table: Floats, kind: int, count: int) -> Floats:
@@ -151,6 +169,84 @@ class EdgeProperties:
             share = there * half[edge] * whole
             entries += [(edge, kind, share), (edge, LENGTH, -share)]
         return self._columns(entries)
+
+    @property
+    def _rod_nodes(self) -> RodNodes:
+        return RodNodes(self.shell.mesh, self.shell.node_blocks, self.shell.first_angle)
+
+    def _shares(self, table: Floats) -> list[tuple[Ints, Ints, Floats]]:
+        """Rod nodes, the edge before or after each, and how much its compliances, of EI1, EI2 and GJ, add to theirs."""
+        nodes, lengths = self._rod_nodes, self.shell.mesh.edge_lengths
+        every = np.arange(len(self.shell.mesh.rod_nodes))
+        sides = []
+        for side in range(2):
+            there = every[nodes.has_edge(every, side)]
+            edge = nodes.edge(there, side)
+            sides.append((there, edge, lengths[edge, None] / table[edge, EI1:LENGTH]))
+        return sides
+
+    def _at_nodes(self, table: Floats) -> Floats:
+        """(k, 3) EI1, EI2 and GJ at each rod node: those of the half edges next to it, in series [N m2]."""
+        length, compliance = (
+            np.zeros((len(self.shell.mesh.rod_nodes), 1)),
+            np.zeros((len(self.shell.mesh.rod_nodes), 3)),
+        )
+        for there, edge, compliances in self._shares(table):
+            length[there] += self.shell.mesh.edge_lengths[edge, None]
+            compliance[there] += compliances
+        return np.asarray(length / compliance)
+
+    @property
+    def _of_crossings(self) -> tuple[Ints, list[Joint]]:
+        """The crossings whose joints are not linkers, and these joints."""
+        count = len(self.shell.mesh.grid.crossings)
+        each = self.joint if isinstance(self.joint, Sequence) else (self.joint,) * count
+        kept = [k for k, joint in enumerate(each) if not isinstance(joint, Linker)]
+        return np.array(kept, dtype=np.intp), [each[k] for k in kept]
+
+    def _joints(self, at_nodes: Floats) -> tuple[RelativeRotation, ...]:
+        """The elastic joints of rods with these stiffnesses (k, 3) at their nodes."""
+        if not any(isinstance(element, RelativeRotation) for element in self.shell.elements):
+            return ()
+        crossings, joints = self._of_crossings
+        return elastic_joints(self._rod_nodes, crossings, joints, at_nodes, len(self.shell.like))  # type: ignore[arg-type]
+
+    def _of_joints(self, evaluate: Callable[[RelativeRotation], Floats]) -> Iterator[tuple[Floats, Ints, csr_array]]:
+        """Derivatives (m, ..) of what is evaluated of each joint by the logarithm of one stiffness of one of its
+        sections; the joints' blocks; and the derivatives (m, 5e) of that logarithm by those of the properties."""
+        present = [element for element in self.shell.elements if isinstance(element, RelativeRotation)]
+        if not present:
+            return
+        nodes, at_nodes = self._rod_nodes, self._at_nodes(self.table)
+        crossings, joints = self._of_crossings
+        pairs = nodes.at_crossings[[k for k, joint in zip(crossings, joints, strict=True) if resists(joint)]]  # type: ignore[arg-type]
+        rows = [pairs[stencil.members] for stencil in stencils(nodes, pairs)]
+        for side in range(2):
+            for kind in range(3):
+                probed = []
+                for sign in (1.0, -1.0):
+                    changed = at_nodes.copy()
+                    changed[pairs[:, side], kind] *= np.exp(sign * PROBE)
+                    probed.append(self._joints(changed))
+                by_edge = self._of_nodes(kind, at_nodes)
+                for element, at, ahead, behind in zip(present, rows, *probed, strict=True):
+                    values = [
+                        evaluate(replace(element, stiffness=there.stiffness, deviators=there.deviators))
+                        for there in (ahead, behind)
+                    ]
+                    yield (values[0] - values[1]) / (2.0 * PROBE), element.blocks, by_edge[at[:, side]]
+
+    def _of_nodes(self, kind: int, at_nodes: Floats) -> csr_array:
+        """(k, 5e) derivatives of the logarithm of a stiffness at the rod nodes by those of the edges' properties."""
+        length = np.zeros(len(at_nodes))
+        sides = self._shares(self.table)
+        for there, edge, _ in sides:
+            length[there] += self.shell.mesh.edge_lengths[edge]
+        rows = np.concatenate([there for there, _, _ in sides])
+        columns = np.concatenate([PROPERTIES * edge + EI1 + kind for _, edge, _ in sides])
+        parts = np.concatenate([compliances[:, kind] for _, _, compliances in sides])
+        values = parts * at_nodes[rows, kind] / length[rows]
+        return csr_array((values, (rows, columns)), shape=(len(at_nodes), self.table.size))
 
     def _columns(self, entries: Sequence[tuple[Ints, int, Floats]]) -> csr_array:
         """(b, 5e) with `value` (b,) in the columns of a property of the edges (b,)."""

@@ -12,7 +12,6 @@ from math import inf
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from time import process_time
-from typing import Any
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from rodshell.layout.flatgrid import Family
 from rodshell.layout.mesh import CROWDED
 from rodshell.paper.figure import ROD
 from rodshell.paper.genetic_records import GAIN, Evaluate, Generation, Judged, StoredValues, gain
+from rodshell.sweeps.asktell import AskTell
 from rodshell.targets import Target
 
 PATIENCE = 100  # Newton iterations of a pop-up from flat; smooth footprints mostly need 25 to 60
@@ -222,8 +222,7 @@ def search(
     """Search from the random footprints of a seed, or continue, until the best gains less than `GAIN` in `WINDOW`
     generations.
 
-    Differential evolution, DE/best/1/bin of pymoo. Each individual has one child: the best of all, moved by the
-    difference of two others and crossed with the parent, which it replaces if it is better.
+    By differential evolution, see `AskTell.differential_evolution`.
 
     Parameters
     ----------
@@ -249,10 +248,8 @@ def search(
     try:
         with _evaluators(design, jobs) as evaluate:
             while len(generations) < most and gain([generation.best for generation in generations]) >= GAIN:
-                children = algorithm.ask()
-                values = stored.complete(len(generations), children.get("X"), evaluate, report)
-                children.set("F", values[:, None])
-                algorithm.tell(children)
+                values = stored.complete(len(generations), algorithm.ask(), evaluate, report)
+                algorithm.tell(values[:, None])
                 generations.append(
                     _generation(generations, algorithm, values, stored.seconds[len(generations)], design.target.size)
                 )
@@ -260,31 +257,28 @@ def search(
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{file} has the values found so far; the same command continues from there") from None
     progress(stage, "done", 0.0)
-    return Found(tuple(generations), algorithm.pop.get("X")[int(np.argmin(algorithm.pop.get("F")[:, 0]))])
+    points, errors = algorithm.survivors
+    return Found(tuple(generations), points[int(np.argmin(errors[:, 0]))])
 
 
 def _generation(
-    generations: list[Generation], algorithm: Any, values: Floats, seconds: float, fallen: float
+    generations: list[Generation], algorithm: AskTell, values: Floats, seconds: float, fallen: float
 ) -> Generation:
-    living = algorithm.pop.get("F")[:, 0]
+    living = algorithm.survivors[1][:, 0]
     runs, down = (generations[-1].runs, generations[-1].fallen) if generations else (0, 0)
     down += int(np.count_nonzero(values >= fallen))
     return Generation(float(living.min()), float(living.mean()), runs + len(values), down, seconds)
 
 
-def _algorithm(design: Design, seed: int, population: int) -> Any:
-    """pymoo's, ready to be asked."""
+def _algorithm(design: Design, seed: int, population: int) -> AskTell:
+    """Ready to be asked."""
+    first = design.random(np.random.default_rng(seed), population, ROUGHNESS)
     try:
-        from pymoo.algorithms.soo.nonconvex.de import DE
-        from pymoo.core.problem import Problem
+        return AskTell.differential_evolution(
+            design.lower, design.upper, first, seed=seed, difference=DIFFERENCE, crossed=CROSSED
+        )
     except ImportError as error:
         raise InputError('the genetic algorithm needs the package pymoo: pip install "rodshell[paper]"') from error
-
-    problem = Problem(n_var=len(design.lower), n_obj=1, xl=design.lower, xu=design.upper)
-    first = design.random(np.random.default_rng(seed), population, ROUGHNESS)
-    algorithm = DE(pop_size=population, sampling=first, variant="DE/best/1/bin", F=DIFFERENCE, CR=CROSSED, prob_mut=0.0)
-    algorithm.setup(problem, seed=seed, termination=("n_gen", np.inf))
-    return algorithm
 
 
 @contextmanager

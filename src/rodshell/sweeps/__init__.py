@@ -4,6 +4,7 @@ A sweep only loads jobs, runs them and reads their results; it knows no stage of
 """
 
 from rodshell.sweeps.run import Swept, sweep
+from rodshell.sweeps.search import Optimised, optimise
 from rodshell.sweeps.table import read_sweep
 
-__all__ = ["Swept", "read_sweep", "sweep"]
+__all__ = ["Optimised", "Swept", "optimise", "read_sweep", "sweep"]

@@ -105,7 +105,7 @@ def read_axes(given: Mapping[str, Any], sample: Mapping[str, Any] | None, base: 
                 axes.append(None)  # the place of the sample
             spans.append(span)
         else:
-            axes.append(_listed(name, values, base, folder))
+            axes.append(read_listed(name, values, base, folder))
     if spans and sample is None:
         raise InputError(
             f"axes {shown(spans[0].key)}: give its count, or say in [sample] how values between from and to are drawn"
@@ -215,8 +215,18 @@ def drawn_shares(method: str, dimensions: int, count: int, seed: int) -> Floats:
     return np.asarray(qmc.LatinHypercube(dimensions, seed=seed).random(count))
 
 
-def _listed(name: str, values: object, base: Job, folder: Path) -> Axis:
-    """An axis of listed values; of several keys, "a, b", a row each."""
+def read_listed(name: str, values: object, base: Job, folder: Path) -> Axis:
+    """An axis of listed values.
+
+    Parameters
+    ----------
+    name : of its key; of several keys, "a, b", whose values are rows.
+    values : the list; base, folder : as of `read_axes`.
+
+    Raises
+    ------
+    InputError : it is not such a list.
+    """
     keys = tuple(key.strip() for key in name.split(","))
     if not isinstance(values, list | tuple) or not values:
         raise InputError(

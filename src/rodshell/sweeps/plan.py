@@ -1,5 +1,6 @@
 """The plan of a sweep: base, axes, columns and how it is run, read from a TOML file or a mapping."""
 
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from rodshell.case import BUILT_IN
+from rodshell.case.load import flattened
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.sweeps.axes import BASE, Axis, read_axes
@@ -75,6 +77,7 @@ class Plan:
     ----------
     name : of the file, for the default folder.
     text : the file as it was given; "" for a mapping.
+    folder : in which its files lie.
     bases : jobs by the name that the column "base" shows.
     axes : the first one changes slowest.
     columns : in addition to those of every sweep.
@@ -83,6 +86,7 @@ class Plan:
 
     name: str
     text: str
+    folder: Path
     bases: Mapping[str, Job]
     axes: tuple[Axis, ...]
     columns: tuple[Column, ...]
@@ -112,6 +116,30 @@ class Plan:
             base = self.bases[changes.pop(BASE)] if BASE in changes else first
             yield Design(position, values, base.changed(changes) if changes else base)
 
+    def command(self, values: Sequence[Any]) -> str | None:
+        """The command that forms a design alone; None for a base that no command can name.
+
+        values : of the axes' keys.
+        """
+        changes = dict(zip(self.keys, values, strict=True))
+        return form_command(changes.pop(BASE, next(iter(self.bases))), self.folder, changes)
+
+
+def form_command(source: str, folder: Path, changes: Mapping[str, Any]) -> str | None:
+    """The command that forms a design alone; None for a base that no command can name.
+
+    Parameters
+    ----------
+    source : of the base; folder : in which its file lies; changes : values of the case's keys.
+    """
+    place = folder / source
+    if source not in BUILT_IN and not place.is_file():
+        return None
+    words = ["rodshell", "form", source if source in BUILT_IN else str(place)]
+    for key, value in flattened(changes).items():
+        words += [f"--{key}", ",".join(map(str, value)) if isinstance(value, list | tuple) else str(value)]
+    return shlex.join(words)
+
 
 def read_plan(source: Source) -> Plan:
     """The plan of a sweep.
@@ -135,7 +163,7 @@ def read_plan(source: Source) -> Plan:
         raise InputError('[axes] is missing: give at least one key, such as "layout.spacing" = ["25 mm", "30 mm"]')
     columns = read_columns(given.get("columns", ()), [key for axis in axes for key in axis.keys])
     settings = read_settings(table(given, "run"), [column.name for column in columns], folder)
-    return Plan(name, text, bases, axes, columns, settings)
+    return Plan(name, text, folder, bases, axes, columns, settings)
 
 
 def opened(source: Source) -> tuple[str, str, Path, Mapping[str, Any]]:

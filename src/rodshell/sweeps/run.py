@@ -1,7 +1,7 @@
 """A sweep: all designs of a plan, each computed once, into one folder."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -13,13 +13,13 @@ from rodshell.sweeps.computing import ARCHIVES, Computation, Wanted
 from rodshell.sweeps.engines import opened_engine
 from rodshell.sweeps.identity import job_identity
 from rodshell.sweeps.plan import Plan, Source, read_plan
+from rodshell.sweeps.report import REPORT, SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.store import FOUND, STORE, Store
 from rodshell.sweeps.table import CSV, PARQUET, Table, header_of, note_header, table_rows, write_parquet
 from rodshell.validation import instance
 
 BEST = "best"
 COPY = "sweep.toml"
-REPORT = "report.html"
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ def sweep(
     out: str | PathLike[str],
     *,
     retry: bool = False,
+    report: bool = False,
     progress: Progress = silent,
 ) -> Swept:
     """Compute all designs of a sweep that are not finished yet, and write their table.
@@ -76,6 +77,7 @@ def sweep(
         ["25 mm", "30 mm"]}}. A base may also be a `Job`.
     out : folder of the sweep. What an earlier run has finished there is not computed again.
     retry : run jobs again that were stopped by a limit, or whose process died.
+    report : also write report.html, and keep the results of the best designs, whose shapes it shows.
     progress : called as progress(stage, detail, 0.0).
 
     Returns
@@ -91,6 +93,8 @@ def sweep(
     plan = read_plan(source)
     instance("out", out, str | PathLike, "the path of a folder")
     folder = Path(out).expanduser()
+    if report:
+        require_plotly()
     check_designs(plan)
     require_own(folder)
     with Store(folder, writing=True) as store:
@@ -103,8 +107,11 @@ def sweep(
             with opened_engine(plan.settings) as engine:
                 computation = Computation(store, table, engine, plan.settings, progress, retry=retry)
                 computation.compute(_wanted(plan, folder), "sweep", plan.count)
+                computed = computation.computed
                 if plan.settings.keep == "best":
                     _keep_best(plan, store, computation, folder)
+                shapes = best_jobs(store, plan.settings.best)[:SHAPES] if report else []
+                computation.compute(_archived(plan, folder, shapes), "shapes of the report", len(shapes))
         except KeyboardInterrupt:
             table.write()
             done = sum(store.outcomes().values())
@@ -113,7 +120,10 @@ def sweep(
             ) from None
         table.write()
         write_parquet(store)
-        return swept(store, computation.computed)
+        found = swept(store, computed)
+        if report:
+            write_report(store, _page(plan, found, shapes))
+        return found
 
 
 def check_designs(plan: Plan) -> None:
@@ -173,7 +183,7 @@ def _wanted(plan: Plan, folder: Path) -> Iterator[Wanted]:
 
 def _keep_best(plan: Plan, store: Store, computation: Computation, folder: Path) -> None:
     """The result folder of the best design, in best/."""
-    best = best_job(store, plan.settings.best)
+    best = next(iter(best_jobs(store, plan.settings.best)), None)
     if best is None or (store.note(BEST) == best and (folder / BEST / "result.json").is_file()):
         return
     job = next(each.job for each in _wanted(plan, folder) if each.id == best)
@@ -181,19 +191,50 @@ def _keep_best(plan: Plan, store: Store, computation: Computation, folder: Path)
     store.take_note(BEST, best)
 
 
-def best_job(store: Store, measure: str) -> str | None:
-    """The job with the smallest value of a column, of those that converged and can be built; None: there is none.
+def best_jobs(store: Store, measure: str) -> list[str]:
+    """The jobs that converged and can be built, from the smallest value of a column on.
 
     Parameters
     ----------
     store : of the sweep; measure : a column of its table.
     """
     keys, columns = header_of(store)
-    names = [*keys, *STANDARD, *(column.name for column in columns)]
-    best: tuple[float, str] | None = None
+    place = [*keys, *STANDARD, *(column.name for column in columns)].index(measure)
+    found = dict[str, float]()
     for design, row in zip(store.finished(), table_rows(store, columns), strict=True):
-        value = row[names.index(measure)]
         usable = design.row.get("status") == CONVERGED and design.row.get("verdict") != "unbuildable"
-        if usable and isinstance(value, int | float) and (best is None or value < best[0]):
-            best = (float(value), design.job)
-    return best[1] if best else None
+        if usable and isinstance(row[place], int | float):
+            found[design.job] = float(row[place])
+    return sorted(found, key=lambda job: found[job])
+
+
+def _archived(plan: Plan, folder: Path, jobs: Sequence[str]) -> Iterator[Wanted]:
+    """Some jobs, their results kept."""
+    wanted = {each.id: each.job for each in _wanted(plan, folder) if each.id in jobs}
+    return (Wanted(job, wanted[job], folder / ARCHIVES / job) for job in jobs)
+
+
+def _page(plan: Plan, found: Swept, shapes: Sequence[str]) -> Page:
+    """What the report says."""
+    measure = plan.settings.best
+    numbers = (key for axis in plan.axes for k, key in enumerate(axis.keys) if _varies(row[k] for row in axis.rows))
+    return Page(
+        kind="rodshell sweep",
+        title=plan.name,
+        summary=found.summary().splitlines(),
+        first=(next(numbers, "total_length"), measure),
+        objectives=False,
+        shapes=shapes,
+        caption=f"The designs with the smallest {measure} that converged and can be built. Click one for its report.",
+        command=plan.command,
+    )
+
+
+def _varies(values: Iterable[object]) -> bool:
+    """Whether they are different numbers."""
+    found = set[object]()
+    for value in values:
+        if not isinstance(value, int | float):
+            return False
+        found.add(value)
+    return len(found) > 1

@@ -49,10 +49,14 @@ class Scene:
         return len(text).to_bytes(4, "little") + text + self.data
 
 
-def scene_of(archive: Archive) -> Scene | None:
+def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     """All shapes of an archive; None where it has no shape in space.
 
     The draped shape is shown too; the flat one is placed where the deployment begins, if that is known.
+
+    Parameters
+    ----------
+    schedules : whether rods and joints have the rows of the schedules with them, which takes most of the time.
     """
     rods = [rod for rod in rods_of(archive) if len(rod.nodes)]
     names = [name for name in _in_order(shape_names(archive)) if rods]
@@ -76,6 +80,7 @@ def scene_of(archive: Archive) -> Scene | None:
         "version": VERSION,
         "name": archive.name,
         "size": size,
+        "low": low.tolist(),
         "box": ((cloud.max(axis=0) - low) / size).tolist(),
         "rods": [_rod(rod, count) for rod, count in zip(rods, counts, strict=True)],
         "joints": {"ids": [joint.id for joint, _ in joints], "entries": data.add(meeting)},
@@ -87,8 +92,11 @@ def scene_of(archive: Archive) -> Scene | None:
                    normals=_normals(shape.positions[nodes], counts, meeting) if laths else None)
             for shape, coloured in zip(shapes, scales, strict=True)
         ],
-        "rows": {"rod": _rows(rods_table(archive, brief=True)), "joint": _rows(joints_table(archive, brief=True))},
+        "rows": {},
     }  # fmt: skip
+    if schedules:
+        tables = {"rod": rods_table(archive, brief=True), "joint": joints_table(archive, brief=True)}
+        header["rows"] = {kind: _rows(table) for kind, table in tables.items()}
     if target is not None:
         faces = archive.states["target_faces"]
         points = np.rint((target - low) / size * STEPS).astype("<u2")

@@ -9,6 +9,8 @@ const HOLD = 260;       // ms of each stage of the animation
 const REACH = 0.16;     // of the size: length of the largest reaction's arrow
 const TYPES = { u1: Uint8Array, i1: Int8Array, u2: Uint16Array, u4: Uint32Array, f4: Float32Array };
 
+export { THREE };
+
 export function readScene(bytes) {
   const buffer = bytes instanceof ArrayBuffer ? bytes : bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
   const length = new DataView(buffer).getUint32(0, true);
@@ -66,6 +68,7 @@ export function createViewer(root, { controls = true } = {}) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
 
   let scene = null, geometry = null, waiting = false, shown = null, playing = 0, chosen = null;
+  const touched = { stage: false, colour: false };  // what a person chose is kept when another scene is shown
   const group = new THREE.Group();
   world.add(group);
 
@@ -91,9 +94,10 @@ export function createViewer(root, { controls = true } = {}) {
     }, 0);
     scene.pairs = scene.array(scene.joints.entries);
     slider.max = scene.stages.length - 1;
-    const same = scene.stages.findIndex(({ name }) => keepView && name === before);
-    slider.value = same < 0 ? slider.max : same;
-    const colour = choice.value;
+    const names = scene.stages.map(({ name }) => name), same = keepView && touched.stage ? names.indexOf(before) : -1;
+    const final = names.findLastIndex(name => name.startsWith("popped"));
+    slider.value = same >= 0 ? same : final >= 0 ? final : Math.max(names.indexOf("draped"), 0);
+    const colour = touched.colour ? choice.value : "";
     choice.replaceChildren(...Object.entries(scene.kinds).map(([value, text]) => make("option", { value, textContent: text })), make("option", { value: "none", textContent: "family" }));
     if ([...choice.options].some(({ value }) => value === colour)) choice.value = colour;
     play.hidden = !scene.stages.some(({ name }) => name.startsWith("stage_"));
@@ -400,9 +404,15 @@ export function createViewer(root, { controls = true } = {}) {
     if (down && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < 4) pick(under(event));
     down = null;
   });
+  let looking = false;
+  canvas.addEventListener("pointermove", event => {  // at most once a frame
+    if (!listeners.hover || event.buttons || looking || !scene) return;
+    looking = true;
+    requestAnimationFrame(() => { looking = false; emit("hover", under(event)); });
+  });
   orbit.addEventListener("change", later);
-  slider.addEventListener("input", () => { stop(); later(); });
-  choice.addEventListener("change", later);
+  slider.addEventListener("input", () => { stop(); touched.stage = true; later(); });
+  choice.addEventListener("change", () => { touched.colour = true; later(); });
   play.addEventListener("click", animate);
   reset.addEventListener("click", home);
   for (const box of Object.values(boxes)) box.addEventListener("change", later);
@@ -415,6 +425,7 @@ export function createViewer(root, { controls = true } = {}) {
     show, select, home, redraw: later, camera, orbit, world, renderer, canvas,
     on(event, heard) { (listeners[event] ||= []).push(heard); },
     get scene() { return scene; },
+    target: () => geometry?.target || null,
     dispose() { stop(); resized.disconnect(); dark.removeEventListener("change", restyle); clear(); renderer.dispose(); },
   };
 }

@@ -1,0 +1,33 @@
+"""`rodshell optimise`: the values of some keys for which objectives are smallest."""
+
+from pathlib import Path
+
+import click
+
+from rodshell.cli.options import QUIET
+from rodshell.cli.reporting import FOUND, NOT_CONVERGED, Progress, announce_compilation
+
+
+@click.command(epilog="A search file is described in docs/sweeps.md; examples/optimise.toml is one.")
+@click.argument("file", metavar="SEARCH.toml")
+@click.option("--out", "-o", metavar="DIR", help="Folder of the search; default out/NAME. A search continues there.")
+@click.option("--report", is_flag=True, help="Also write report.html: charts of all designs, shapes of the front.")
+@click.option("--retry", is_flag=True, help="Run jobs again that a limit stopped, or whose process died.")
+@QUIET
+def command(file: str, out: str | None, report: bool, retry: bool, quiet: bool) -> int:
+    """Search for the values of some keys for which objectives are smallest and constraints hold.
+
+    All designs are in DIR/table.csv, the best ones in DIR/front.csv. What is finished stays, whatever is interrupted:
+    the same command continues.
+    """
+    from rodshell.sweeps.plan import opened
+    from rodshell.sweeps.search import optimise
+
+    folder = Path(out) if out else Path("out") / opened(file)[0]
+    announce_compilation(quiet=quiet)
+    with Progress(quiet=quiet) as progress:
+        found = optimise(file, folder, retry=retry, report=report, progress=progress)
+    if not quiet:
+        click.echo(found.summary())
+        click.echo(f"written to {folder.absolute()}")
+    return FOUND if found.front else NOT_CONVERGED

@@ -1,0 +1,142 @@
+"""Gauss and Newton's method on a sum of squares within bounds, with a trust radius.
+
+Each step solves the linear least-squares problem in the box of the bounds and the radius, where bounds that are reached
+are kept until the problem leaves them (an active set) [Nocedal and Wright 2006, 10.3]. A design without a stable
+equilibrium next to the predicted one shrinks the radius, and so does one that a limit refuses.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from rodshell.arrays import Floats
+from rodshell.refining.objectives import Objective, residuals, slopes
+from rodshell.refining.structure import Point
+from rodshell.refining.variables import Variables
+
+ENOUGH = 0.01  # relative decrease of the root of the sum of squares below which a foreseen step is not worth taking
+POOR, GOOD = 0.25, 0.75  # actual over foreseen decrease
+FIRM, LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says that there is no more to gain; the least
+
+
+@dataclass(frozen=True)
+class Step:
+    """One evaluation: for progress and records.
+
+    Parameters
+    ----------
+    number : of the evaluation.
+    rms : relative gap, or None where no equilibrium was found.
+    lowest : lowest eigenvalue over that before, or None.
+    radius : of the trust region.
+    accepted : whether the design became the new one.
+    """
+
+    number: int
+    rms: float | None
+    lowest: float | None
+    radius: float
+    accepted: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where the search ended.
+
+    Parameters
+    ----------
+    accepted : the designs that were accepted, the best last.
+    converged : whether no step is foreseen to gain more.
+    factorizations : made in all.
+    steps : every evaluation.
+    """
+
+    accepted: tuple[Point, ...]
+    converged: bool
+    factorizations: int
+    steps: tuple[Step, ...]
+
+
+def gauss_newton(
+    variables: Variables,
+    first: Point,
+    objectives: Sequence[Objective],
+    *,
+    allows: Callable[[Point], bool] = lambda point: True,
+    lowest_before: float | None = None,
+    radius: float = 1.0,
+    most: int = 30,
+    progress: Callable[[Step], None] = lambda step: None,
+) -> Found:
+    """Make a sum of squares small.
+
+    Parameters
+    ----------
+    variables : what is chosen.
+    first : the design to start from.
+    objectives : what is made small.
+    allows : limits that a design must keep to be accepted.
+    lowest_before : eigenvalue to which those of the steps are related; None: they are not computed.
+    radius : first trust radius, in scales of the variables.
+    most : evaluations.
+    progress : called after each evaluation.
+    """
+    box = variables.box
+    here, accepted, steps, factorizations = first, [first], list[Step](), 1
+    converged, fresh = False, True
+    while len(steps) < most and radius >= LEAST_RADIUS:
+        if fresh:
+            r, jacobian = residuals(objectives, here), slopes(objectives, here) * box.scale
+            reduced, right = _reduced(jacobian, r)
+            cost, fresh = float(r @ r), False
+        low = np.maximum((box.lower - here.values) / box.scale, -radius)
+        high = np.minimum((box.upper - here.values) / box.scale, radius)
+        step = _least_squares(reduced, right, low, high)
+        foreseen = float(np.sum((r + jacobian @ step) ** 2))
+        reached = float(np.abs(step).max()) > 0.99 * radius
+        if np.sqrt(foreseen) > (1.0 - ENOUGH) * np.sqrt(cost) and not (reached and radius < FIRM):
+            converged = True
+            break
+        values = np.clip(here.values + box.scale * step, box.lower, box.upper)
+        there, made = here.tried(values, variables.change(values))
+        factorizations += made
+        gain, lowest = -np.inf, None
+        if there is not None:
+            now = residuals(objectives, there)
+            gain = (cost - float(now @ now)) / (cost - foreseen)
+        good = there is not None and gain > 1e-2
+        if there is not None and good:
+            factorizations += 1
+            if lowest_before is not None:
+                lowest = float(there.modes.values[0]) / lowest_before
+            good = allows(there)
+        steps.append(Step(len(steps) + 1, None if there is None else there.rms, lowest, radius, good))
+        progress(steps[-1])
+        if not good or gain < POOR:
+            radius *= 0.3 if there is None else 0.5
+        elif gain > GOOD and reached:
+            radius *= 2.0
+        if good and there is not None:
+            here, fresh = there, True
+            accepted.append(here)
+    return Found(tuple(accepted), converged, factorizations, tuple(steps))
+
+
+def _reduced(jacobian: Floats, r: Floats) -> tuple[Floats, Floats]:
+    """A square problem with the same minima."""
+    q, upper = np.linalg.qr(jacobian)
+    return upper, -q.T @ r
+
+
+def _least_squares(matrix: Floats, right: Floats, low: Floats, high: Floats) -> Floats:
+    """(n,) least squares in a box; of directions without effect none is taken."""
+    n, size = matrix.shape[1], float(np.linalg.norm(right))  # of the order of one: the method's tolerances are absolute
+    matrix, right = matrix / size, right / size
+    tiny = 1e-6 * float(np.linalg.norm(matrix)) * np.eye(n)
+    tight = high - low < 1e-12
+    low, high = np.where(tight, low - 1e-12, low), np.where(tight, high + 1e-12, high)
+    return np.asarray(
+        lsq_linear(np.vstack([matrix, tiny]), np.append(right, np.zeros(n)), (low, high), method="bvls").x
+    )

@@ -1,0 +1,234 @@
+"""Families of variables that change lengths along rods: cut lengths, positions of joints, offsets of straight rods.
+
+Each moves points of rods, joints and ends, along them. Nodes between two such points keep their share of the span.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array
+
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
+from rodshell.joints.crossings import RodNodes
+from rodshell.layout import FlatGrid, FlatRod, GridMesh
+from rodshell.layout.flatgrid import Crossings
+from rodshell.refining.change import Change
+from rodshell.refining.structure import Structure
+from rodshell.refining.symmetry import Image, Operation
+from rodshell.refining.variables import Box, Grid
+
+MOST = 0.35  # of the usual span: how far a point may move along its rod
+FIRST = 0.05  # of the usual span: the change that counts as one
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Variables that move points along rods.
+
+    Parameters
+    ----------
+    structure : the shell.
+    shifts : (k, n) displacement of every rod node along its rod by each variable [-].
+    box : of the variables [m].
+    image : where an operation maps the variables.
+    across : (m, n) growth of the rods' offsets by each variable [-].
+    """
+
+    structure: Structure
+    shifts: csr_array
+    box: Box
+    image: Callable[[Operation], Image]
+    across: csr_array
+
+    def change(self, values: Floats) -> Change:
+        """What a design does.
+
+        Parameters
+        ----------
+        values : (n,) the design [m].
+        """
+        mesh, held = self.structure.mesh, len(self.structure.held)
+        before, after = edge_entries(mesh)
+        slopes = csc_array(self.shifts[after] - self.shifts[before])
+        none = Change.none(len(mesh.edges), held, len(values))
+        return replace(none, lengths=slopes @ values, length_slopes=slopes)
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        """The grid with these points moved.
+
+        Parameters
+        ----------
+        grid : before.
+        values : (n,) the design [m].
+        """
+        return replace(grid, mesh=restationed(grid.mesh, self.shifts @ values, self.across @ values))
+
+
+@dataclass(frozen=True)
+class Tails:
+    """Cut lengths: how far rods run past their last joints."""
+
+    name = "tails"
+
+    def on(self, structure: Structure) -> Stations:
+        """The change of the tail at the start and the end of each rod.
+
+        Parameters
+        ----------
+        structure : the shell.
+        """
+        mesh = structure.mesh
+        ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
+        points = np.unique(np.append(ends, joint_entries(mesh)))
+        inner = points[np.searchsorted(points, ends) + np.tile([1, -1], len(mesh.rod_start))]
+        tails = np.abs(mesh.stations[ends] - mesh.stations[inner])
+        span, outward = usual_span(mesh), np.tile([-1.0, 1.0], len(mesh.rod_start))
+        moved = csr_array((outward, (ends, np.arange(len(ends)))), shape=(len(mesh.stations), len(ends)))
+        box = Box(0 * tails, -np.minimum(MOST * span, 0.5 * tails), 0 * tails + MOST * span, 0 * tails + FIRST * span)
+        none = csr_array((len(mesh.rod_start), len(ends)))
+        return Stations(
+            structure, between(mesh, points) @ moved, box, lambda by: Image(by.ends, np.ones(len(ends))), none
+        )
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """Offsets of the rods' lines, which stay straight and parallel: the joints on the rods that they cross follow."""
+
+    name = "offsets"
+
+    def on(self, structure: Structure) -> Stations:
+        """The growth of each rod's offset.
+
+        Parameters
+        ----------
+        structure : the shell.
+
+        Raises
+        ------
+        InputError : rods are not of two orthogonal families.
+        """
+        mesh, rods = structure.mesh, structure.mesh.grid.rods
+        if any(rod.family == "free" for rod in rods):
+            raise InputError("offsets can only vary in a grid of two families of parallel rods: vary something else")
+        crossing = joint_entries(mesh).reshape(-1, 2)
+        count, pairs = len(rods), mesh.grid.crossings.rods
+        rows, columns = crossing[:, ::-1].ravel(), pairs.ravel()  # a rod moves the joints on those that it crosses
+        moved = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(mesh.stations), count))
+        moved.data = np.minimum(moved.data, 1.0)
+        span, zero = usual_span(mesh), np.zeros(count)
+        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        across = np.array([(0.0, 1.0) if rod.family == "u" else (1.0, 0.0) for rod in rods])
+
+        def image(by: Operation) -> Image:
+            return Image(by.rods, np.round(np.einsum("mi,mi->m", across @ by.turn.T, across[by.rods])))
+
+        points = np.unique(np.append(crossing, np.column_stack([mesh.rod_start, mesh.rod_stop - 1])))
+        return Stations(structure, between(mesh, points) @ moved, box, image, csr_array(np.eye(count)))
+
+
+@dataclass(frozen=True)
+class Holes:
+    """Positions of the joints along each of their two rods, chosen separately."""
+
+    name = "holes"
+
+    def on(self, structure: Structure) -> Stations:
+        """The displacement of each joint along its first and along its second rod.
+
+        Parameters
+        ----------
+        structure : the shell.
+        """
+        mesh = structure.mesh
+        holes = np.unique(joint_entries(mesh))
+        rod = rods_of(mesh)
+        points = np.unique(np.append(holes, np.column_stack([mesh.rod_start, mesh.rod_stop - 1])))
+        columns = np.arange(len(holes))
+        moved = csr_array((np.ones(len(holes)), (holes, columns)), shape=(len(mesh.stations), len(holes)))
+        span, zero = usual_span(mesh), np.zeros(len(holes))
+        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        key = rod[holes] * mesh.node_count + mesh.rod_nodes[holes]
+        order = np.argsort(key)
+
+        def image(by: Operation) -> Image:
+            wanted = by.rods[rod[holes]] * mesh.node_count + by.nodes[mesh.rod_nodes[holes]]
+            index = order[np.searchsorted(key[order], wanted)]
+            return Image(index, np.where(by.reversed[rod[holes]], -1.0, 1.0))
+
+        none = csr_array((len(mesh.rod_start), len(holes)))
+        return Stations(structure, between(mesh, points) @ moved, box, image, none)
+
+
+def edge_entries(mesh: GridMesh) -> tuple[Ints, Ints]:
+    """(e,) entries of `rod_nodes` at which each edge begins and ends."""
+    begins = np.setdiff1d(np.arange(len(mesh.rod_nodes)), mesh.rod_stop - 1)
+    return begins, begins + 1
+
+
+def rods_of(mesh: GridMesh) -> Ints:
+    """(k,) rod of each entry of `rod_nodes`."""
+    return np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+
+
+def joint_entries(mesh: GridMesh) -> Ints:
+    """(2c,) entries of `rod_nodes` at each crossing, on its first and its second rod in turn."""
+    return RodNodes(mesh, mesh.rod_nodes, 0).at_crossings.ravel()
+
+
+def usual_span(mesh: GridMesh) -> float:
+    """Median distance of neighbouring joints along rods [m]."""
+    entries = np.unique(joint_entries(mesh))
+    same = np.diff(rods_of(mesh)[entries]) == 0
+    return float(np.median(np.diff(mesh.stations[entries])[same]))
+
+
+def between(mesh: GridMesh, points: Ints) -> csr_array:
+    """(k, k) displacements of all rod nodes by those of some, linear between these.
+
+    Parameters
+    ----------
+    mesh : the rods.
+    points : entries of `rod_nodes`, ascending, with the ends of all rods among them.
+    """
+    every, s = np.arange(len(mesh.rod_nodes)), mesh.stations
+    after = np.searchsorted(points, every)
+    low, high = points[np.where(points[after] == every, after, after - 1)], points[after]
+    span = s[high] - s[low]
+    share = np.where(span > 0, (s - s[low]) / np.where(span > 0, span, 1.0), 0.0)
+    rows, columns = np.append(every, every), np.append(low, high)
+    return csr_array((np.append(1.0 - share, share), (rows, columns)), shape=(len(every), len(every)))
+
+
+def restationed(mesh: GridMesh, along: Floats, across: Floats) -> GridMesh:
+    """A mesh whose nodes are moved along their rods, and whose rods are moved across themselves.
+
+    Parameters
+    ----------
+    mesh : before.
+    along : (k,) displacement of every rod node along its rod [m].
+    across : (m,) growth of the rods' offsets [m].
+    """
+    stations = mesh.stations + along
+    ends = stations[np.column_stack([mesh.rod_start, mesh.rod_stop - 1])]
+    rods = tuple(
+        _moved(rod, float(start), float(end), float(by))
+        for rod, (start, end), by in zip(mesh.grid.rods, ends, across, strict=True)
+    )
+    crossings = Crossings(mesh.grid.crossings.rods, stations[joint_entries(mesh).reshape(-1, 2)])
+    flat, visits, rod_of = np.zeros((mesh.node_count, 2)), np.zeros(mesh.node_count), rods_of(mesh)
+    origins = np.array([rod.origin for rod in rods])[rod_of]
+    directions = np.array([rod.direction for rod in rods])[rod_of]
+    np.add.at(flat, mesh.rod_nodes, origins + stations[:, None] * directions)
+    np.add.at(visits, mesh.rod_nodes, 1.0)
+    placed = np.column_stack([flat / visits[:, None], mesh.heights])
+    return replace(mesh, grid=FlatGrid(rods, crossings), flat=placed, stations=stations)
+
+
+def _moved(rod: FlatRod, start: float, end: float, across: float) -> FlatRod:
+    """A rod with other ends, its line moved across itself."""
+    x, y = rod.origin
+    origin = (x, y + across) if rod.family == "u" else (x + across, y)
+    return replace(rod, start=start, end=end, offset=rod.offset + across, origin=origin if across else rod.origin)

@@ -1,0 +1,243 @@
+"""Refinement: a shell that pops up next to its target becomes one that pops up on it.
+
+The variables are chosen by families, Gauss and Newton's method finds their values with exact derivatives, and the grid
+that they describe is popped up again.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+from rodshell.errors import InputError
+from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
+from rodshell.formfinding.popup import Ends, PopUp
+from rodshell.formfinding.trim import Footprint
+from rodshell.model import Shell
+from rodshell.refining.end_families import Clamps
+from rodshell.refining.gauss_newton import Step, gauss_newton
+from rodshell.refining.length_families import Holes, Offsets, Tails
+from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
+from rodshell.refining.stiffness_families import DoubleLaths, Taper
+from rodshell.refining.structure import Point, Structure
+from rodshell.refining.variables import Design, Family, Grid, design_of
+from rodshell.rods.elements import Elements
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.problem import Problem
+from rodshell.validation import choice
+
+FAMILIES: dict[str, Family] = {
+    family.name: family for family in (Taper(), DoubleLaths(), Tails(), Clamps(), Holes(), Offsets())
+}
+"""The families of variables by the names that users write."""
+
+LENGTHS = ("tails", "holes", "offsets")  # work by compressing rods
+LEAST_EIGENVALUE = 0.5  # of the lowest one before
+Progress = Callable[[Step], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One design on the way.
+
+    Parameters
+    ----------
+    point : its equilibrium on the mesh of the search.
+    grid : what is built.
+    """
+
+    point: Point
+    grid: Grid
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """A shell before and after.
+
+    Parameters
+    ----------
+    vary : names of the families.
+    ends : how the rods' ends are held.
+    before, after : the stages, with the popped-up shell of these ends alone.
+    designs : those that were accepted on the way, the last best; the first is the shell before.
+    converged : whether no further step would gain much.
+    factorizations : of the search.
+    steps : its evaluations.
+    """
+
+    vary: tuple[str, ...]
+    ends: Ends
+    before: PatchForm
+    after: PatchForm
+    designs: tuple[Candidate, ...]
+    converged: bool
+    factorizations: int
+    steps: tuple[Step, ...]
+
+    @property
+    def gap_before(self) -> Agreement:
+        """Distance to the target before."""
+        return self.before.agreement[self.ends]
+
+    @property
+    def gap_after(self) -> Agreement:
+        """Distance to the target after."""
+        return self.after.agreement[self.ends]
+
+
+def refine(
+    stages: PatchForm,
+    vary: str | Family | Sequence[str | Family] = ("taper",),
+    *,
+    ends: Ends | None = None,
+    objectives: Sequence[Objective] | None = None,
+    least_eigenvalue: float = LEAST_EIGENVALUE,
+    most_evaluations: int = 30,
+    progress: Progress = lambda step: None,
+) -> Refinement:
+    """Bring a popped-up shell nearer to its target.
+
+    Parameters
+    ----------
+    stages : of one shell, with a stable pop-up.
+    vary : what is varied: names of `FAMILIES`, or families with settings of their own.
+    ends : how the rods' ends are held; None: as first asked for.
+    objectives : what is made small; None: the mean square of the gap and, where lengths vary, compression.
+    least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
+    most_evaluations : designs that are tried.
+    progress : called after each; what it raises ends the search.
+
+    Raises
+    ------
+    InputError : no such family; the shell has no target, no pop-up with these ends, or is not stable.
+    """
+    families = chosen_families(vary)
+    ends = stages.ends[0] if ends is None else ends
+    structure = structure_of(stages, ends)
+    variables = design_of(structure, families)
+    here, spent = first_point(structure, variables)
+    before = float(here.modes.values[0])
+    floor = LowestEigenvalue(least=least_eigenvalue, before=before)
+    stressed = [Prestress()] if any(family.name in LENGTHS for family in families) else []
+    goals = [Gap(), *stressed] if objectives is None else list(objectives)
+    found = gauss_newton(
+        variables, here, [*goals, floor],
+        allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
+    )  # fmt: skip
+    grid = Grid(structure.mesh, stages.boundary)
+    designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in found.accepted)
+    after, made = popped_up(stages, designs[-1], ends)
+    held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
+    names = tuple(family.name for family in families)
+    return Refinement(
+        names, ends, held, after, designs, found.converged, spent + found.factorizations + made, found.steps
+    )
+
+
+def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:
+    """The families that are meant.
+
+    Parameters
+    ----------
+    vary : names, or families.
+
+    Raises
+    ------
+    InputError : an unknown name, none, or one twice.
+    """
+    given = vary if isinstance(vary, Sequence) and not isinstance(vary, str) else (vary,)
+    families = tuple(
+        FAMILIES[choice("vary", item, tuple(FAMILIES))] if isinstance(item, str) else item for item in given
+    )
+    names = [family.name for family in families]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"vary must name one family or several, each once, not {names}")
+    return families
+
+
+def structure_of(stages: PatchForm, ends: Ends) -> Structure:
+    """The shell that is refined.
+
+    Parameters
+    ----------
+    stages : of one shell.
+    ends : how the rods' ends are held.
+
+    Raises
+    ------
+    InputError : it has no target, no pop-up with these ends, or is not stable.
+    """
+    if stages.from_table:
+        raise InputError("a table of rods has no target to come nearer to: refine the form of a target")
+    if ends not in stages.popped:
+        raise InputError(f"the form was not popped up with {ends} ends: form it with ends = {ends} first")
+    popped = stages.popped[ends]
+    if not popped.report.stable:
+        how = "is not stable" if popped.report.converged else popped.report.sentence
+        raise InputError(f"the pop-up with {ends} ends {how}: there is no equilibrium to refine")
+    if any(rod.profile is not None for rod in stages.footprint.rods):
+        raise InputError("this form was refined before: refine the form that it came from, with all families at once")
+    return Structure(popped, stages.rod, stages.joint, stages.target)
+
+
+def first_point(structure: Structure, variables: Design) -> tuple[Point, int]:
+    """The design to start from, and the factorisations that it took.
+
+    Parameters
+    ----------
+    structure : the shell.
+    variables : what is varied.
+
+    Raises
+    ------
+    InputError : it has no stable equilibrium near the shell's own.
+    """
+    values = variables.box.start
+    change = variables.change(values)
+    popped = structure.popped.equilibrium
+    if not (change.stiffness.any() or change.lengths.any() or change.held.any()):
+        return Point(structure, values, change, structure.edges, popped), 0
+    edges = structure.edges.varied(change.table(structure.edges.table))
+    problem = replace(popped.problem, elements=edges.shell.elements, stretch=edges.shell.stretch)
+    found = find_equilibrium(problem, popped.state, popped.forces)
+    if not found.report.stable:
+        raise InputError("the first design has no stable equilibrium near the shell's own: vary something else")
+    return Point(structure, values, change, edges.at(found.elements), found), found.report.factorizations
+
+
+def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchForm, int]:
+    """The stages of a grid built to a design, and the factorisations that its pop-up took.
+
+    Parameters
+    ----------
+    stages : before.
+    design : what is built, and the equilibrium that was found for it.
+    ends : how the rods' ends are held.
+
+    Raises
+    ------
+    InputError : it has no stable equilibrium there after all.
+    """
+    grid, here = design.grid, design.point.equilibrium
+    shell = Shell.of(grid.mesh, stages.rod, clamped=ends == "clamped", joint=stages.joint)
+    shell = shell.with_elements(tuple(map(_with_frames, shell.elements, here.elements)))
+    problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
+    found = find_equilibrium(problem, here.state, here.forces)
+    shell = shell.with_elements(found.elements)
+    footprint = Footprint(grid.mesh)
+    popped = PopUp(ends, "draped", footprint, grid.boundary, shell, found)
+    result = replace(
+        stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
+        popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
+    )  # fmt: skip
+    return result, found.report.factorizations
+
+
+def _with_frames(element: Elements, like: Elements) -> Elements:
+    """An energy with the source frames of another one of its kind."""
+    assert is_dataclass(element)
+    sources: dict[str, Any] = {
+        field.name: getattr(like, field.name) for field in fields(element) if field.name.startswith("source_")
+    }
+    if hasattr(element, "bends"):
+        sources["bends"] = _with_frames(element.bends, like.bends)
+    return replace(element, **sources)

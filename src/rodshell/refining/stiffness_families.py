@@ -1,0 +1,187 @@
+"""Families of variables that change the stiffness along rods: a taper, and double laths over a share of each rod.
+
+Every rod has a profile of a few numbers, each of which is one of the variables; rods whose numbers are the same
+variables have the same profile. The stiffness of the edges by these numbers is an explicit formula
+(`model.rod_sections`), whose derivatives are central differences for all rods at once.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
+from rodshell.layout import Profile
+from rodshell.layout.profile import Varies
+from rodshell.refining.change import STIFFNESSES, Change
+from rodshell.refining.structure import Structure
+from rodshell.refining.symmetry import Image, Operation
+from rodshell.refining.variables import Box, Grid
+from rodshell.validation import choice
+
+Per = Literal["shell", "family", "rod"]
+PROBE = 1e-4  # of a number of a profile: differences are then exact to 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Variables that are numbers of profiles.
+
+    Parameters
+    ----------
+    structure : the shell.
+    variable_of : (m, r) variable that is number r of each rod's profile.
+    profile : of r numbers.
+    box : of the variables.
+    """
+
+    structure: Structure
+    variable_of: Ints
+    profile: Callable[[Floats], Profile]
+    box: Box
+
+    def image(self, by: Operation) -> Image:
+        """Where an operation maps the variables.
+
+        Parameters
+        ----------
+        by : a symmetry.
+        """
+        index = np.empty(len(self.box.start), dtype=np.intp)
+        index[self.variable_of] = self.variable_of[by.rods]
+        return Image(index, np.ones(len(index)))
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        """The grid whose rods have these profiles.
+
+        Parameters
+        ----------
+        grid : before.
+        values : (n,) the design.
+        """
+        return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
+
+    def of_rods(self, values: Floats) -> tuple[Profile, ...]:
+        """The profile of each rod.
+
+        Parameters
+        ----------
+        values : (n,) the design.
+        """
+        return self._profiles(values[self.variable_of])
+
+    def change(self, values: Floats) -> Change:
+        """What a design does.
+
+        Parameters
+        ----------
+        values : (n,) the design.
+        """
+        structure, numbers = self.structure, values[self.variable_of]
+        none = Change.none(len(structure.mesh.edges), len(structure.held), len(values))
+        rods, rows, columns, entries = structure.mesh.edge_rods, list[Ints](), list[Ints](), list[Floats]()
+        every = np.arange(STIFFNESSES * len(rods))
+        for r in range(numbers.shape[1]):
+            ahead, behind = numbers.copy(), numbers.copy()
+            ahead[:, r] += PROBE
+            behind[:, r] -= PROBE
+            entries.append(((self._logarithms(ahead) - self._logarithms(behind)) / (2 * PROBE)).ravel())
+            rows.append(every)
+            columns.append(np.repeat(self.variable_of[rods, r], STIFFNESSES))
+        slopes = csc_array(
+            (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))),
+            shape=(len(every), len(values)),
+        )
+        before = np.log(structure.edges.table[:, :STIFFNESSES])
+        return replace(none, stiffness=self._logarithms(numbers) - before, stiffness_slopes=slopes)
+
+    def _profiles(self, numbers: Floats) -> tuple[Profile, ...]:
+        made: dict[bytes, Profile] = {}
+        return tuple(made.setdefault(row.tobytes(), self.profile(row)) for row in numbers)
+
+    def _logarithms(self, numbers: Floats) -> Floats:
+        """(e, 4) of the edges' stiffnesses."""
+        mesh = self.structure.mesh
+        return np.asarray(np.log(self.structure.stiffness(mesh.with_profiles(self._profiles(numbers)))))
+
+
+@dataclass(frozen=True)
+class Taper:
+    """The bending stiffness changes along rods, between that of their section and a part of it.
+
+    Parameters
+    ----------
+    ratio : of the largest to the smallest EI that is allowed [-].
+    per : a profile for the whole shell, for each family, or for each rod.
+    stations : at which EI is chosen, from an end of a rod to its middle.
+    varies : what of the section is changed, see `Profile`.
+
+    Raises
+    ------
+    InputError : the ratio is not larger than 1, or there are fewer than two stations.
+    """
+
+    ratio: float = 8.0
+    per: Per = "shell"
+    stations: int = 5
+    varies: Varies = "size"
+
+    def __post_init__(self) -> None:
+        choice("per", self.per, get_args(Per))
+        if not self.ratio > 1.0:
+            raise InputError(f"the ratio of a taper must be larger than 1, not {self.ratio}")
+        if not self.stations >= 2:
+            raise InputError(f"a taper needs 2 stations or more from end to middle, not {self.stations}")
+
+    name = "taper"
+
+    def on(self, structure: Structure) -> Profiles:
+        """The logarithms of the factors on EI; between them the profile is linear.
+
+        Parameters
+        ----------
+        structure : the shell.
+        """
+        rods = structure.mesh.grid.rods
+        if self.per == "shell":
+            group = np.zeros(len(rods), dtype=np.intp)
+        elif self.per == "family":
+            group = np.unique([rod.family for rod in rods], return_inverse=True)[1].astype(np.intp)
+        else:
+            group = np.arange(len(rods))
+        variable_of = self.stations * group[:, None] + np.arange(self.stations)
+        count, half = int(variable_of.max()) + 1, 0.5 * np.log(self.ratio)
+        zero = np.zeros(count)
+        box = Box(zero, zero - half, zero + half, zero + 1.0)
+        return Profiles(
+            structure, variable_of, lambda logs: Profile.symmetric(np.exp(logs).tolist(), varies=self.varies), box
+        )
+
+
+@dataclass(frozen=True)
+class DoubleLaths:
+    """Two equal laths on each other over the middle of every rod; they slip.
+
+    Parameters
+    ----------
+    least, most : share of each rod's length that is double [-].
+    """
+
+    least: float = 0.05
+    most: float = 0.95
+
+    name = "double"
+
+    def on(self, structure: Structure) -> Profiles:
+        """The share, one for all rods.
+
+        Parameters
+        ----------
+        structure : the shell.
+        """
+        zero = np.zeros((len(structure.mesh.grid.rods), 1), dtype=np.intp)
+        box = Box(*np.array([[0.5], [self.least], [self.most], [0.3]]))
+        return Profiles(structure, zero, lambda share: Profile.double(float(share[0])), box)

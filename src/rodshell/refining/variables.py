@@ -1,0 +1,188 @@
+"""Variables of a design: values within bounds, what they do to a shell, and how they are built."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from rodshell.arrays import Floats
+from rodshell.formfinding.trim import Boundary
+from rodshell.layout import GridMesh
+from rodshell.refining.change import Change
+from rodshell.refining.structure import Structure
+from rodshell.refining.symmetry import Image, Operation, symmetries, ties
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A flat grid and where its rods end: what is built.
+
+    Parameters
+    ----------
+    mesh : the flat grid, its rods with their profiles.
+    boundary : where the rods end, and in which directions.
+    """
+
+    mesh: GridMesh
+    boundary: Boundary
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Values of n variables.
+
+    Parameters
+    ----------
+    start : (n,) first values.
+    lower, upper : (n,) bounds.
+    scale : (n,) change that counts as one: the first step is not longer.
+    """
+
+    start: Floats
+    lower: Floats
+    upper: Floats
+    scale: Floats
+
+
+class Variables(Protocol):
+    """A set of variables on one shell."""
+
+    @property
+    def box(self) -> Box: ...
+
+    def change(self, values: Floats) -> Change:
+        """What a design does, with its derivatives.
+
+        Parameters
+        ----------
+        values : (n,) of the variables.
+        """
+        ...
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        """The grid built to a design.
+
+        Parameters
+        ----------
+        grid : before, or with what other variables have changed.
+        values : (n,) of the variables.
+        """
+        ...
+
+
+class Untied(Variables, Protocol):
+    """The variables of a family, which know their symmetric images."""
+
+    def image(self, by: Operation) -> Image:
+        """Where a symmetry maps the variables.
+
+        Parameters
+        ----------
+        by : the symmetry.
+        """
+        ...
+
+
+class Family(Protocol):
+    """A kind of variables that a user chooses.
+
+    Attributes
+    ----------
+    name : as users write it.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    def on(self, structure: Structure) -> Untied:
+        """The variables on a shell.
+
+        Parameters
+        ----------
+        structure : the shell.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Tied:
+    """Variables that are equal, or opposite, to others: those of a symmetric design.
+
+    Parameters
+    ----------
+    whole : the n variables.
+    ties : (n, q) with one entry, 1 or -1, in each row: which of the q common values each variable has.
+    """
+
+    whole: Untied
+    ties: csc_array
+
+    @property
+    def box(self) -> Box:
+        box, counts = self.whole.box, np.asarray(abs(self.ties).sum(axis=0)).ravel()
+
+        def mean(values: Floats) -> Floats:
+            return np.asarray((self.ties.T @ values) / counts)
+
+        first = np.array([self.ties.indices[self.ties.indptr[k]] for k in range(self.ties.shape[1])])
+        return Box(mean(box.start), box.lower[first], box.upper[first], box.scale[first])
+
+    def change(self, values: Floats) -> Change:
+        whole = self.whole.change(self.ties @ values)
+        return replace(
+            whole,
+            stiffness_slopes=csc_array(whole.stiffness_slopes @ self.ties),
+            length_slopes=csc_array(whole.length_slopes @ self.ties),
+            held_slopes=np.einsum("pkx,pq->qkx", whole.held_slopes, self.ties.toarray()),
+        )
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        return self.whole.applied(grid, self.ties @ values)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Several sets of variables, one after the other.
+
+    Parameters
+    ----------
+    parts : the sets.
+    """
+
+    parts: Sequence[Tied]
+
+    @property
+    def box(self) -> Box:
+        boxes = [part.box for part in self.parts]
+        return Box(
+            *(np.concatenate([getattr(box, name) for box in boxes]) for name in ("start", "lower", "upper", "scale"))
+        )
+
+    def change(self, values: Floats) -> Change:
+        return Change.together([part.change(some) for part, some in self._split(values)])
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        for part, some in self._split(values):
+            grid = part.applied(grid, some)
+        return grid
+
+    def _split(self, values: Floats) -> list[tuple[Tied, Floats]]:
+        begins = np.cumsum([len(part.box.start) for part in self.parts])[:-1]
+        return list(zip(self.parts, np.split(values, begins), strict=True))
+
+
+def design_of(structure: Structure, families: Sequence[Family]) -> Design:
+    """The variables of several families on a shell; where it is symmetric, so is every design.
+
+    Parameters
+    ----------
+    structure : the shell.
+    families : what is varied.
+    """
+    mesh, draped = structure.mesh, structure.popped.boundary.draped
+    shapes = [structure.popped.positions, *([] if draped is None else [draped])]
+    operations = symmetries(mesh, np.column_stack(shapes))
+    parts = [family.on(structure) for family in families]
+    return Design([Tied(part, ties(len(part.box.start), [part.image(by) for by in operations])) for part in parts])

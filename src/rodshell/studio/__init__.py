@@ -1,0 +1,1 @@
+"""The studio: a live page on which a gridshell is designed. Needs `pip install "rodshell[studio]"`."""

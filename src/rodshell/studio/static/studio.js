@@ -1,0 +1,541 @@
+// The studio's page. It holds a case (tables as in a case file), sends each change to the server, and shows what comes
+// back. While a slider or a handle is dragged, changes are "live"; when it is let go, the case is found from nothing.
+import { createViewer, THREE } from "/static/viewer.js";
+import GUI from "/static/lil-gui.js";
+
+const byId = name => document.getElementById(name);
+const make = (name, attributes = {}, ...children) => {
+  const element = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) key in element ? (element[key] = value) : element.setAttribute(key, value);
+  element.append(...children);
+  return element;
+};
+const clone = value => JSON.parse(JSON.stringify(value));
+const get = (tables, path) => path.split(".").reduce((inner, name) => inner?.[name], tables);
+const set = (tables, path, value) => {
+  const names = path.split("."), last = names.pop();
+  const table = names.reduce((inner, name) => (inner[name] = typeof inner[name] === "object" && inner[name] ? inner[name] : {}), tables);
+  value === undefined || value === "" ? delete table[last] : (table[last] = value);
+};
+
+const SLIDERS = [  // key, name, and how its range follows from its value
+  ["layout.spacing", "Spacing", "length"], ["layout.rotate", "Heading", "angle"],
+  ["target.radius", "Radius", "length"], ["target.height", "Height", "length"], ["target.a", "Half-axis x", "length"],
+  ["target.b", "Half-axis y", "length"], ["target.c", "Half-axis z", "length"], ["target.base", "Base plane", "place"],
+  ["target.scale", "Scale", "factor"],
+];
+const FIRST = ["pop_up.ends", "joint.kind", "drape.method", "rod.material.preset", "checks.stages"];
+const IDLE = ["drape.frames", "target.file", "target.boundary", "seams.file"];  // not from a page
+const TIMEOUT = 1500;  // ms after which a lost connection is tried again
+
+let start, session, socket, viewer, gui, drawn;
+let base = {}, resolved = null, serial = 0, sent = 0, waiting = null, shown = 0, facts = null, stage = "", history = { at: -1, cases: [], variants: [] };
+
+// The case, and what is sent
+
+function change(edit, live = false) {
+  const next = clone(base);
+  edit(next);
+  submit(next, live);
+}
+
+function submit(next, live) {
+  base = next;
+  const message = { kind: "case", serial: ++serial, case: base, live };
+  if (sent || socket?.readyState !== WebSocket.OPEN) waiting = message;  // at most one waits: the newest
+  else post(message);
+  if (!live) remember();
+}
+
+function post(message) {
+  sent = message.serial;
+  socket.send(JSON.stringify(message));
+}
+
+function order(message) {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+function connect() {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  socket = new WebSocket(`${scheme}://${location.host}/api/sessions/${session}/live`);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
+  socket.onopen = () => { sent = 0; };
+  socket.onclose = ({ code }) => {
+    if (code === 4404) { localStorage.removeItem("rodshell-session"); return open(); }
+    say("The server does not answer; trying again", true);
+    setTimeout(connect, TIMEOUT);
+  };
+}
+
+async function open() {
+  session = localStorage.getItem("rodshell-session");
+  if (!session) {
+    const answer = await fetch("/api/sessions", { method: "POST" });
+    if (!answer.ok) return say((await answer.json()).sentence, true);
+    session = (await answer.json()).id;
+    localStorage.setItem("rodshell-session", session);
+  }
+  connect();
+}
+
+// What the server says
+
+function hear(news) {
+  if (news.kind === "session") return restore(news);
+  if (news.kind === "taken" && news.serial >= sent) {
+    sent = 0;
+    if (waiting) { const next = waiting; waiting = null; post(next); }
+    return;
+  }
+  if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
+  if (news.kind === "stage" && news.serial >= shown) {
+    shown = news.serial;
+    drawn = news.serial;
+    facts = news;
+    stage = news.stage;
+    showFacts();
+  }
+  if (news.kind === "done" && news.serial === serial) say("");
+  if (news.kind === "failed" && (news.serial === serial || news.serial < 0 || !news.serial)) failed(news.sentence);
+  if (news.kind === "failed" && news.serial >= sent) sent = 0;
+}
+
+function see(bytes) {
+  if (drawn !== shown) return;
+  const first = !viewer.scene;
+  viewer.show(bytes, { keepView: !first });
+  if (pending) { viewer.home(); pending = false; }
+  placeHandles();
+}
+let pending = true;  // a new target: the view begins anew
+
+function restore(state) {
+  history = state;
+  const from = state.cases[state.at];
+  byId("undo").disabled = state.at <= 0;
+  byId("redo").disabled = state.at >= state.cases.length - 1;
+  showVariants();
+  if (restore.known && JSON.stringify(from) === JSON.stringify(base)) return;
+  const linked = restore.known ? null : restore.linked;
+  restore.known = true;
+  const next = linked || from || start.first;
+  pending = pending || JSON.stringify(next.target) !== JSON.stringify(base.target);
+  submit(clone(next), false);
+  buildControls();
+}
+
+function say(text, wrong = false) {
+  byId("state").textContent = text;
+  byId("state").classList.toggle("wrong", wrong);
+}
+
+function failed(sentence) {
+  say(sentence, true);
+  const box = byId("verdict");
+  box.className = "failed";
+  box.replaceChildren(make("strong", { textContent: sentence }));
+}
+
+function showFacts() {
+  byId("figures").tBodies[0].replaceChildren(...facts.figures.map(([name, value]) => make("tr", {}, make("th", { textContent: name, scope: "row" }), make("td", { textContent: value }))));
+  const box = byId("verdict");
+  if (facts.verdict) {
+    box.className = facts.verdict.level;
+    const reasons = [...facts.verdict.reasons.slice(1), ...facts.facts];
+    box.replaceChildren(make("strong", { textContent: facts.verdict.headline }), make("ul", {}, ...reasons.map(text => make("li", { textContent: text }))));
+    const before = JSON.stringify(resolved);
+    resolved = facts.resolved;
+    if (before !== JSON.stringify(resolved)) refreshControls();
+    byId("download").removeAttribute("aria-disabled");
+    byId("download").href = `/api/sessions/${session}/files.zip`;
+  } else {
+    box.classList.add("old");
+    byId("download").setAttribute("aria-disabled", "true");
+    if (facts.status !== "converged") box.replaceChildren(make("strong", { textContent: facts.status }));
+  }
+  document.title = `${facts.name} · rodshell studio`;
+  showPlan();
+}
+
+// Controls
+
+function buildControls() {
+  const open = gui ? gui.foldersRecursive().filter(folder => !folder._closed).map(folder => folder._title) : ["Design"];
+  gui?.destroy();
+  gui = new GUI({ container: byId("controls"), injectStyles: false, title: "Case" });
+  const kinds = { target: base.target?.kind || "hemisphere", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball" };
+  const known = start.keys.filter(key => !IDLE.includes(key.path) && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
+  const design = gui.addFolder("Design");
+  for (const [path, name, kind] of SLIDERS) {
+    if (!known.some(key => key.path === path)) continue;
+    addSlider(design, path, name, kind);
+  }
+  for (const path of FIRST) addKey(design, known.find(key => key.path === path));
+  const tables = [...new Set(known.map(key => key.path.split(".")[0]))];
+  for (const table of tables) {
+    const folder = gui.addFolder(`[${table}]`);
+    for (const key of known.filter(({ path }) => path.startsWith(`${table}.`))) addKey(folder, key);
+    folder.close();
+  }
+  for (const folder of gui.foldersRecursive()) if (open.includes(folder._title)) folder.open();
+}
+
+function value(path) {
+  const raw = get(base, path);
+  if (typeof raw === "number") return raw;
+  const known = get(resolved, path);
+  if (path === "layout.spacing" && Array.isArray(known)) return known[0];
+  return typeof known === "number" ? known : Array.isArray(raw) ? raw[0] : NaN;
+}
+
+function addSlider(folder, path, name, kind) {
+  const now = value(path);
+  if (!Number.isFinite(now)) return;
+  const small = kind !== "angle" && (facts?.handles?.size || resolved?.target?.radius || now) < 1;
+  const unit = kind === "angle" ? 180 / Math.PI : kind === "factor" ? 1 : small ? 1000 : 1;
+  const size = (facts?.handles?.size || 1) * unit;
+  const [low, high] = kind === "angle" ? [-90, 90] : kind === "place" ? [now * unit - 0.5 * size, now * unit + 0.5 * size] : [now * unit / 4, now * unit * 4];
+  const holder = { value: now * unit };
+  const symbol = kind === "angle" ? "\u00b0" : kind === "factor" ? "" : small ? "mm" : "m";
+  const step = kind === "angle" ? 0.5 : 10 ** Math.floor(Math.log10((high - low) / 400));
+  const put = (live) => change(next => {
+    set(next, path, kind === "angle" ? holder.value / unit : Number((holder.value / unit).toPrecision(8)));
+    if (path.startsWith("target.")) pending = !live;
+  }, live);
+  const controller = folder.add(holder, "value", low, high, step).name(symbol ? `${name} [${symbol}]` : name);
+  controller.onChange(() => put(true)).onFinishChange(() => put(false));
+  describe(controller, path, start.keys.find(key => key.path === path).help);
+  controller.read = () => { const fresh = value(path) * unit; if (Number.isFinite(fresh) && Math.abs(fresh - holder.value) > 1e-9 * Math.abs(fresh)) { holder.value = fresh; controller.updateDisplay(); } };
+}
+
+function addKey(folder, key) {
+  if (!key) return;
+  const raw = get(base, key.path);
+  const text = raw === undefined ? "" : typeof raw === "string" ? raw : JSON.stringify(raw);
+  const holder = { value: text };
+  const name = key.path.split(".").slice(1).join(".");
+  const given = get(resolved, key.path), shownAs = Array.isArray(given) ? given.join(", ") : String(given ?? "default");
+  const choices = { [`default: ${shownAs}`]: "", ...Object.fromEntries(key.choices.map(word => [word, String(word)])) };
+  const controller = key.choices.length && !key.any_value ? folder.add(holder, "value", choices) : folder.add(holder, "value");
+  controller.name(name);
+  const asGiven = () => { try { return JSON.parse(holder.value); } catch { return holder.value; } };
+  controller.onFinishChange(() => {
+    change(next => {
+      if (key.path.endsWith(".kind") || key.path === "rod.material.preset") forget(next, key.path);
+      set(next, key.path, holder.value === "" ? undefined : asGiven());
+      if (key.path.startsWith("target.")) pending = true;
+    });
+    if (key.path.endsWith("kind")) setTimeout(buildControls);
+  });
+  const input = controller.domElement.querySelector("input");
+  if (input && given !== undefined) input.placeholder = typeof given === "number" ? String(Number(given.toPrecision(6))) : String(given);
+  describe(controller, key.path, key.help);
+}
+
+// Another kind of a table has other keys: those of the old one go.
+function forget(next, path) {
+  const table = path.replace(/\.[^.]*$/, "");
+  set(next, table, {});
+}
+
+function describe(controller, path, help) {
+  controller.domElement.title = `${path}: ${help}`;
+  for (const input of controller.domElement.querySelectorAll("input, select")) input.setAttribute("aria-label", `${controller._name}: ${help}`);
+  for (const part of controller.domElement.querySelectorAll(".lil-slider")) part.setAttribute("aria-hidden", "true");
+}
+
+function refreshControls() {
+  if (!byId("controls").contains(document.activeElement)) return buildControls();
+  for (const controller of gui.controllersRecursive()) controller.read?.();
+}
+
+// The flat plan
+
+function showPlan() {
+  const svg = byId("plan").querySelector("svg"), rods = facts.plan;
+  if (!rods.length) return svg.replaceChildren();
+  const draw = (name, attributes) => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const [key, text] of Object.entries(attributes)) element.setAttribute(key, text);
+    return element;
+  };
+  const xs = rods.flatMap(({ ends }) => [ends[0], ends[2]]), ys = rods.flatMap(({ ends }) => [-ends[1], -ends[3]]);
+  const [left, top] = [Math.min(...xs), Math.min(...ys)], wide = Math.max(...xs) - left, tall = Math.max(...ys) - top;
+  svg.setAttribute("viewBox", `${left - 0.03 * wide} ${top - 0.03 * tall} ${1.06 * wide || 1} ${1.06 * tall || 1}`);
+  svg.replaceChildren(...rods.flatMap(({ id, family, ends }) => {
+    const at = { x1: ends[0], y1: -ends[1], x2: ends[2], y2: -ends[3] };
+    const hit = draw("line", { ...at, class: "hit", tabindex: -1, "data-rod": id, "vector-effect": "non-scaling-stroke" });
+    return [draw("line", { ...at, class: family === "v" ? "v" : "u", "data-line": id }), hit];
+  }));
+  const gone = leftOut();
+  byId("left-out").replaceChildren(...(gone.length ? ["Left out: ", ...gone.map(id => make("button", { type: "button", textContent: `${id} \u00d7`, ariaLabel: `Put rod ${id} back`, onclick: () => toggle(id) }))] : []));
+  byId("unseam").hidden = !(base.seams?.lines?.length);
+}
+
+function leftOut() {
+  const names = get(base, "layout.left_out") || [];
+  return Array.isArray(names) ? names : String(names).split(",").map(name => name.trim()).filter(Boolean);
+}
+
+function toggle(id) {
+  const names = leftOut(), rest = names.filter(name => name !== id);
+  change(next => set(next, "layout.left_out", rest.length < names.length ? (rest.length ? rest : undefined) : [...names, id]));
+}
+
+function markRod(id) {
+  for (const line of byId("plan").querySelectorAll("line[data-line]")) line.classList.toggle("marked", line.dataset.line === id);
+  const rod = facts?.plan.find(one => one.id === id);
+  const size = rod && (rod.length < 10 ? `${(1000 * rod.length).toFixed(1)} mm` : `${rod.length.toFixed(4)} m`);
+  byId("plan").querySelector("figcaption").textContent = rod ? `${id}: cut length ${size}. Click to leave it out.` : "Point at a rod; a click leaves it out.";
+}
+
+// Handles in the scene: a dot for the anchor, a ring with a knob for the heading
+
+const handles = { group: null, held: null };
+
+function toScene(point) {
+  const { low, size, box } = viewer.scene;
+  return new THREE.Vector3(...point.map((value, axis) => (value - low[axis]) / size - box[axis] / 2));
+}
+
+function toMetres(place) {
+  const { low, size, box } = viewer.scene;
+  return ["x", "y", "z"].map((axis, k) => (place[axis] + box[k] / 2) * size + low[k]);
+}
+
+function placeHandles() {
+  if (handles.group) viewer.world.remove(handles.group);
+  handles.group = null;
+  const known = facts?.handles;
+  if (!known || handles.held) { if (!known) return; }
+  const group = new THREE.Group(), radius = 0.32 * known.size / viewer.scene.size;
+  const paint = (colour, always = true) => new THREE.MeshBasicMaterial({ color: colour, depthTest: !always, transparent: true, opacity: 0.92 });
+  const dot = new THREE.Mesh(new THREE.SphereGeometry(0.013, 24, 16), paint(0xffffff));
+  const rim = new THREE.Mesh(new THREE.SphereGeometry(0.016, 24, 16), paint(0x1f5f8b));
+  rim.renderOrder = 8;
+  dot.renderOrder = 9;
+  const ring = new THREE.Mesh(new THREE.TorusGeometry(radius, 0.0022, 8, 96), paint(0x1f5f8b));
+  const knob = new THREE.Mesh(new THREE.SphereGeometry(0.014, 24, 16), paint(0x1f5f8b));
+  const turn = typeof known.heading === "number" ? known.heading : 0;
+  knob.position.set(radius * Math.cos(turn), radius * Math.sin(turn), 0);
+  for (const part of [ring, knob]) part.renderOrder = 7;
+  group.add(rim, dot, ring, knob);
+  group.position.copy(toScene(known.anchor));
+  Object.assign(handles, { group, dot, knob });
+  viewer.world.add(group);
+  viewer.redraw();
+}
+
+function screenDistance(object, event) {
+  const frame = viewer.canvas.getBoundingClientRect(), place = object.getWorldPosition(new THREE.Vector3()).project(viewer.camera);
+  return Math.hypot((0.5 + 0.5 * place.x) * frame.width + frame.left - event.clientX, (0.5 - 0.5 * place.y) * frame.height + frame.top - event.clientY);
+}
+
+function ray(event) {
+  const frame = viewer.canvas.getBoundingClientRect(), caster = new THREE.Raycaster();
+  caster.setFromCamera(new THREE.Vector2(2 * (event.clientX - frame.left) / frame.width - 1, 1 - 2 * (event.clientY - frame.top) / frame.height), viewer.camera);
+  return caster;
+}
+
+function onTarget(event) {
+  const surface = viewer.target();
+  return surface ? ray(event).intersectObject(surface)[0]?.point : null;
+}
+
+function wireHandles() {
+  const canvas = viewer.canvas;
+  canvas.addEventListener("pointerdown", event => {
+    if (!handles.group || drawing) return;
+    handles.held = screenDistance(handles.dot, event) < 16 ? "anchor" : screenDistance(handles.knob, event) < 16 ? "heading" : null;
+    if (!handles.held) return;
+    viewer.orbit.enabled = false;
+    canvas.setPointerCapture(event.pointerId);
+    event.stopImmediatePropagation();
+  }, true);
+  canvas.addEventListener("pointermove", event => { if (handles.held) dragged(event, true); });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, event => {
+    if (!handles.held) return;
+    dragged(event, false);
+    handles.held = null;
+    viewer.orbit.enabled = true;
+    event.stopImmediatePropagation();
+  }, true);
+}
+
+function dragged(event, live) {
+  const centre = handles.group.position;
+  if (handles.held === "anchor") {
+    const place = onTarget(event);
+    if (place) handles.last = toMetres(place).slice(0, 2).map(value => Number(value.toPrecision(6)));
+    if (handles.last) change(next => set(next, "drape.anchor", handles.last), live);
+  } else {
+    const level = new THREE.Plane(new THREE.Vector3(0, 0, 1), -centre.z), place = ray(event).ray.intersectPlane(level, new THREE.Vector3());
+    if (place) handles.turn = Number(Math.atan2(place.y - centre.y, place.x - centre.x).toFixed(4));
+    if (handles.turn !== undefined) change(next => set(next, "layout.rotate", handles.turn), live);
+  }
+}
+
+// Seams, drawn on the target
+
+let drawing = null;
+
+function startSeam() {
+  drawing = drawing ? null : [];
+  byId("seam").setAttribute("aria-pressed", String(Boolean(drawing)));
+  say(drawing ? "Click points of the seam on the target; Enter ends it, Escape forgets it" : "");
+}
+
+function endSeam() {
+  const points = drawing;
+  drawing = null;
+  byId("seam").setAttribute("aria-pressed", "false");
+  say("");
+  if (points.length < 2) return;
+  change(next => {
+    const lines = Array.isArray(next.seams?.lines) ? next.seams.lines : [];
+    set(next, "seams.lines", [...lines, points]);
+    set(next, "layout.rods", undefined);
+    set(next, "layout.length", undefined);
+    set(next, "drape.anchor", undefined);
+  });
+}
+
+// Variants
+
+function showVariants() {
+  byId("variants").querySelector("ul").replaceChildren(...history.variants.map(({ name, verdict, case: kept }) => make("li", {},
+    make("input", { type: "checkbox", name: "variant", value: name, ariaLabel: `Compare ${name}`, onchange: compared }),
+    make("span", { textContent: name, className: verdict.level, title: verdict.headline }),
+    make("button", { type: "button", textContent: "Open", ariaLabel: `Open ${name}`, onclick: () => { pending = true; submit(clone(kept), false); buildControls(); } }),
+    make("button", { type: "button", textContent: "\u00d7", ariaLabel: `Forget ${name}`, onclick: () => order({ kind: "drop", name }) }))));
+  compared();
+}
+
+function chosen() {
+  const names = [...byId("variants").querySelectorAll("input:checked")].map(({ value }) => value);
+  return history.variants.filter(({ name }) => names.includes(name));
+}
+
+function compared() { byId("compare").disabled = chosen().length !== 2; }
+
+async function compare() {
+  const pair = chosen(), dialog = byId("side"), both = dialog.querySelector(".both");
+  dialog.showModal();
+  both.replaceChildren();
+  const views = [];
+  for (const { name, scene } of pair) {
+    const host = make("div", {});
+    both.append(make("section", {}, make("h2", { textContent: name }), host));
+    const view = createViewer(host);
+    view.show(await (await fetch(`/api/sessions/${session}/scenes/${scene}`)).arrayBuffer());
+    views.push(view);
+  }
+  let leading = null;
+  views.forEach((view, k) => view.orbit.addEventListener("change", () => {  // one camera
+    if (leading) return;
+    leading = view;
+    const other = views[1 - k];
+    other.camera.position.copy(view.camera.position);
+    other.orbit.target.copy(view.orbit.target);
+    other.orbit.update();
+    other.redraw();
+    leading = null;
+  }));
+  const rows = [["verdict", ...pair.map(({ verdict }) => verdict.headline)]], names = [...new Set(pair.flatMap(({ figures }) => figures.map(([name]) => name)))];
+  for (const name of names) rows.push([name, ...pair.map(({ figures }) => figures.find(([one]) => one === name)?.[1] ?? "\u2013")]);
+  for (const { path } of start.keys) {
+    const [a, b] = pair.map(({ case: kept }) => JSON.stringify(get(kept, path)));
+    if (a !== b) rows.push([path, a ?? "default", b ?? "default"]);
+  }
+  dialog.querySelector("tbody").replaceChildren(...rows.map(([name, a, b]) => make("tr", {}, make("th", { textContent: name, scope: "row" }), ...[a, b].map(text => make("td", { textContent: text, className: a === b ? "" : "differs" })))));
+  dialog.addEventListener("close", () => views.forEach(view => view.dispose()), { once: true });
+}
+
+// Links: the whole case, compressed, behind the # of the address
+
+async function packed(text) {
+  const stream = new Blob([text]).stream().pipeThrough(new CompressionStream("deflate-raw"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+}
+
+async function unpacked(code) {
+  const bytes = Uint8Array.from(atob(code.replaceAll("-", "+").replaceAll("_", "/")), letter => letter.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"))).text();
+}
+
+async function remember() {
+  const code = await packed(JSON.stringify(base));
+  window.history.replaceState(null, "", `${location.pathname}#case=${code}`);
+}
+
+function script() {
+  const text = (facts?.case || "").replaceAll("\\", "\\\\").replaceAll('"""', '\\"""');
+  return `import rodshell as rs\n\njob = rs.Job.load("""\n${text}""")\nform = job.run(progress=rs.bar)\nprint(form.verdict.headline)\nform.save("out")\n`;
+}
+
+async function upload(file) {
+  say(`Sending ${file.name}`);
+  const answer = await fetch(`/api/sessions/${session}/uploads?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+  const said = await answer.json();
+  if (!answer.ok) return say(said.sentence, true);
+  const suffix = file.name.toLowerCase().replace(/^.*\./, ""), kind = start.kinds[`.${suffix}`];
+  pending = true;
+  submit({ target: { kind, file: said.file } }, false);
+  buildControls();
+}
+
+// The page
+
+function wire() {
+  byId("preset").replaceChildren(make("option", { value: "", textContent: "a built-in case" }), ...Object.keys(start.presets).map(name => make("option", { value: name, textContent: name })));
+  byId("preset").onchange = ({ target }) => {
+    if (!target.value) return;
+    pending = true;
+    submit(clone(start.presets[target.value]), false);
+    target.value = "";
+    buildControls();
+  };
+  byId("upload").onclick = () => byId("file").click();
+  byId("file").accept = Object.keys(start.kinds).join(",");
+  byId("file").onchange = ({ target }) => { if (target.files[0]) upload(target.files[0]); target.value = ""; };
+  addEventListener("dragover", event => event.preventDefault());
+  addEventListener("drop", event => { event.preventDefault(); if (event.dataTransfer.files[0]) upload(event.dataTransfer.files[0]); });
+  byId("undo").onclick = () => order({ kind: "step", by: -1 });
+  byId("redo").onclick = () => order({ kind: "step", by: 1 });
+  byId("link").onclick = async () => { await remember(); await navigator.clipboard?.writeText(location.href).catch(() => {}); say("The link is copied: it holds the whole case"); };
+  byId("python").onclick = () => { byId("script").querySelector("pre").textContent = script(); byId("script").showModal(); };
+  for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button").onclick = () => dialog.close();
+  byId("seam").onclick = startSeam;
+  byId("unseam").onclick = () => change(next => set(next, "seams.lines", undefined));
+  byId("keep").onsubmit = event => { event.preventDefault(); order({ kind: "keep", name: byId("name").value || facts?.name || "variant" }); byId("name").value = ""; };
+  byId("compare").onclick = compare;
+  addEventListener("keydown", event => {
+    if (drawing && event.key === "Enter") { event.preventDefault(); endSeam(); }
+    if (drawing && event.key === "Escape") { drawing = []; startSeam(); }
+    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && !event.target.closest("input")) {
+      event.preventDefault();
+      order({ kind: "step", by: event.shiftKey ? 1 : -1 });
+    }
+  });
+  const plan = byId("plan");
+  plan.addEventListener("pointerover", ({ target }) => { const id = target.dataset?.rod; if (id) { markRod(id); viewer.select("rod", id); } });
+  plan.addEventListener("click", ({ target }) => { if (target.dataset?.rod) toggle(target.dataset.rod); });
+  viewer.on("hover", found => { if (found) markRod(found.kind === "rod" ? found.id : found.id.split("/")[0]); });
+  viewer.on("pick", found => markRod(found?.kind === "rod" ? found.id : found?.id.split("/")[0]));
+  viewer.canvas.addEventListener("click", event => {
+    const place = drawing && onTarget(event);
+    if (place) { drawing.push(toMetres(place).slice(0, 2).map(value => Number(value.toPrecision(5)))); say(`${drawing.length} points; Enter ends the seam`); }
+  });
+  markRod("");
+}
+
+viewer = createViewer(byId("view"));
+start = await (await fetch("/api/start")).json();
+const code = new URLSearchParams(location.hash.slice(1)).get("case");
+if (code) restore.linked = await unpacked(code).then(JSON.parse).catch(() => null);
+wire();
+wireHandles();
+await open();

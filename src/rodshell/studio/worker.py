@@ -1,0 +1,175 @@
+"""The process that runs the jobs of one session, one after the other.
+
+It takes orders from a pipe and sends back what it finds as it is found: first the grid on its target, then the
+popped-up shells, then checks and verdict. While somebody drags, each order starts from the form before; the last one,
+after the release, is run as the command line runs it, from nothing.
+
+A newer order ends an older one: at any iteration, but while somebody drags only once the grid of the older one was
+shown, so that every order that is begun is seen.
+"""
+
+import resource
+import signal
+import tempfile
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from io import BytesIO
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import process_time
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile
+
+from rodshell.errors import InputError, RodshellError
+
+TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
+MEMORY = 3_000_000_000  # bytes of a worker's data at most
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a worker is to do.
+
+    Parameters
+    ----------
+    serial : numbers the orders of a session.
+    kind : "form": find the form of a case; "files": the last form's files as a ZIP archive; "job": find the form and
+        write its folder.
+    case : tables as in a case file.
+    live : somebody drags: start from the form before, and leave the checks out.
+    time_limit : of form finding [s].
+    folder : of the result of a "job".
+    """
+
+    serial: int
+    kind: str
+    case: Mapping[str, Any] = field(default_factory=dict)
+    live: bool = False
+    time_limit: float = 120.0
+    folder: str = ""
+
+
+@dataclass(frozen=True)
+class News:
+    """What a worker sends.
+
+    Parameters
+    ----------
+    serial : of the order; kind : "taken", "progress", "stage", "files", "done", or "failed".
+    facts : plain values for the page; content : a scene, or a file.
+    """
+
+    serial: int
+    kind: str
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    content: bytes = b""
+
+
+class _Superseded(Exception):
+    """A newer order waits."""
+
+
+def run_worker(connection: Connection, memory: int = MEMORY) -> None:
+    """Obey orders until the other end of the connection is closed.
+
+    Parameters
+    ----------
+    connection : receives `Order`, sends `News`.
+    memory : bytes of data that the process may have.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its workers
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    worker = _Worker(connection)
+    threading.Thread(target=_import_all, daemon=True).start()
+    while True:
+        try:
+            order = connection.recv()
+        except (EOFError, OSError):
+            return
+        worker.obey(order)
+
+
+def _import_all() -> None:
+    """What the first order needs, before it comes."""
+    import rodshell.job
+    import rodshell.output.viewer  # noqa: F401
+
+
+class _Worker:
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._form: Any = None  # the last form, from which the next drag starts
+
+    def obey(self, order: Order) -> None:
+        self._send(order, "taken")
+        start = process_time()
+        try:
+            {"form": self._find, "files": self._files, "job": self._job}[order.kind](order)
+        except _Superseded:
+            return
+        except RodshellError as error:
+            self._send(order, "failed", {"sentence": str(error)})
+        except MemoryError:
+            self._form = None
+            self._send(
+                order,
+                "failed",
+                {"sentence": "this job needs more memory than a session may have: use fewer rods, or longer edges"},
+            )
+        except Exception as error:
+            self._send(
+                order,
+                "failed",
+                {"sentence": f"the program failed ({type(error).__name__}: {error}): please report this case"},
+            )
+        else:
+            self._send(order, "done", {"cpu": process_time() - start})
+
+    def _find(self, order: Order) -> None:
+        from rodshell.job import Job
+        from rodshell.studio.showing import checked_facts, preview
+
+        job = Job.load(dict(order.case))
+        earlier = self._form if order.live else None
+
+        def progress(stage: str, detail: str, residual: float) -> None:
+            if not order.live and self._connection.poll():
+                raise _Superseded
+            self._send(order, "progress", {"stage": stage, "detail": detail})
+
+        grid = job.run(warm_start=earlier, progress=progress, time_limit=order.time_limit, until="drape")
+        self._show(order, "drape", *preview(grid, job))
+        form = job.run(warm_start=grid, progress=progress, time_limit=order.time_limit, until="pop-up")
+        self._form = form
+        self._show(order, "pop-up", *preview(form, job))
+        if not order.live:
+            self._form = form = form.finished(progress)
+            self._show(order, "checks", *checked_facts(form, job))
+
+    def _show(self, order: Order, stage: str, facts: dict[str, Any], scene: bytes) -> None:
+        self._send(order, "stage", {"stage": stage, **facts}, scene)
+        if self._connection.poll():
+            raise _Superseded
+
+    def _files(self, order: Order) -> None:
+        """The last form's folder, as `rodshell form` writes it."""
+        if self._form is None:
+            raise InputError("there is no form yet: wait for the verdict")
+        packed = BytesIO()
+        with tempfile.TemporaryDirectory() as folder:
+            written = self._form.save(Path(folder) / "result")
+            with ZipFile(packed, "w", ZIP_DEFLATED) as archive:
+                for path in sorted(written.rglob("*")):
+                    if path.is_file():
+                        archive.write(path, path.relative_to(written))
+        self._send(order, "files", content=packed.getvalue())
+
+    def _job(self, order: Order) -> None:
+        """Find a form and write its folder, as `rodshell form` does."""
+        from rodshell.job import Job
+
+        Job.load(dict(order.case)).run(time_limit=order.time_limit).save(order.folder, force=True)
+
+    def _send(self, order: Order, kind: str, facts: Mapping[str, Any] | None = None, content: bytes = b"") -> None:
+        self._connection.send(News(order.serial, kind, facts or {}, content))

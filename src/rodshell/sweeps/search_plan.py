@@ -1,0 +1,223 @@
+"""The plan of a search: base, variables, objectives and constraints, read from a TOML file or a mapping."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rodshell.arrays import Floats
+from rodshell.errors import InputError
+from rodshell.job import Job
+from rodshell.sweeps.axes import Axis, Span, flat_keys, read_listed, read_span
+from rodshell.sweeps.columns import STANDARD, Column, read_column, read_columns
+from rodshell.sweeps.plan import Settings, Source, form_command, known, opened, read_bases, read_settings, table
+from rodshell.units import shown
+
+TABLES = ("base", "columns", "variables", "objectives", "constraints", "search", "run")
+GENERATION = "generation"
+BELOW_ONE = 1 - 1e-12
+FAR = 1e3  # violation of a design without a form: larger than that of any constraint
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A column that is to be small (sign 1) or large (sign -1)."""
+
+    column: str
+    sign: Literal[1, -1]
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """What a column must be.
+
+    Parameters
+    ----------
+    column : of the table.
+    low, high : bounds of a number; None: there is none.
+    words : that it may be, in place of bounds.
+    """
+
+    column: str
+    low: float | None = None
+    high: float | None = None
+    words: tuple[str, ...] = ()
+
+    def violation(self, value: Any) -> float:
+        """How far it is from holding: 0 or less where it holds, relative to the bound."""
+        if self.words:
+            return 0.0 if value in self.words else 1.0
+        if not isinstance(value, int | float):
+            return FAR
+        below = 0.0 if self.low is None else (self.low - value) / (abs(self.low) or 1.0)
+        above = 0.0 if self.high is None else (value - self.high) / (abs(self.high) or 1.0)
+        return min(max(below, above, 0.0), FAR)
+
+
+def keys_of(variable: Span | Axis) -> tuple[str, ...]:
+    """The keys of a variable, several where they change together."""
+    return variable.keys if isinstance(variable, Axis) else (variable.key,)
+
+
+@dataclass(frozen=True)
+class SearchPlan:
+    """A whole search.
+
+    Parameters
+    ----------
+    name, text, folder : as of `Plan`; base : the job, called `source`.
+    variables : intervals, or lists of values.
+    objectives, constraints : on columns of the table.
+    columns : of the table, in addition to those of every sweep.
+    population, generations, seed : of the algorithm.
+    settings : how jobs are run.
+    """
+
+    name: str
+    text: str
+    folder: Path
+    source: str
+    base: Job
+    variables: tuple[Span | Axis, ...]
+    objectives: tuple[Objective, ...]
+    constraints: tuple[Constraint, ...]
+    columns: tuple[Column, ...]
+    population: int
+    generations: int
+    seed: int
+    settings: Settings
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The variables' keys."""
+        return tuple(key for variable in self.variables for key in keys_of(variable))
+
+    def values(self, point: Floats) -> tuple[Any, ...]:
+        """Values of the keys at a point (n,) of the unit cube."""
+        found = list[Any]()
+        for variable, share in zip(self.variables, point.tolist(), strict=True):
+            if isinstance(variable, Axis):
+                found += variable.rows[min(int(share * len(variable.rows)), len(variable.rows) - 1)]
+            else:
+                found.append(variable.drawn(min(share, BELOW_ONE) if variable.whole else share))
+        return tuple(found)
+
+    def job(self, values: Sequence[Any]) -> Job:
+        """The job with these values of the keys.
+
+        Raises
+        ------
+        InputError : no case can have them together.
+        """
+        return self.base.changed(dict(zip(self.keys, values, strict=True)))
+
+    def command(self, values: Sequence[Any]) -> str | None:
+        """The command that forms a design alone; `values` of generation and keys."""
+        return form_command(self.source, self.folder, dict(zip(self.keys, values[1:], strict=True)))
+
+
+def read_search(source: Source) -> SearchPlan:
+    """The plan of a search.
+
+    Parameters
+    ----------
+    source : path of a TOML file, or its content as a mapping.
+
+    Raises
+    ------
+    InputError : it cannot be read or used; in one sentence.
+    """
+    name, text, folder, given = opened(source)
+    known("", given, TABLES)
+    bases = read_bases(given, folder)
+    if len(bases) > 1:
+        raise InputError("base: a search has one: choose among targets by a variable such as target.kind")
+    (base_name, base), *_ = bases.items()
+    variables = tuple(_variable(key, value, base, folder) for key, value in flat_keys(table(given, "variables")))
+    if not variables:
+        raise InputError(
+            '[variables] is missing: give at least one key, such as "layout.spacing" = { from = "25 mm", to = "35 mm" }'
+        )
+    objectives = _objectives(table(given, "objectives"))
+    constraints = tuple(_constraint(key, value) for key, value in _flat_constraints(table(given, "constraints")))
+    asked = [
+        *given.get("columns", ()),
+        *(objective.column for objective in objectives),
+        *(constraint.column for constraint in constraints),
+    ]
+    keys = [GENERATION, *(key for variable in variables for key in keys_of(variable))]
+    columns = read_columns([name for name in dict.fromkeys(asked) if name not in (*STANDARD, *keys)], keys)
+    run = table(given, "run")
+    if "best" in run:
+        raise InputError("run.best: a search has objectives, which say what is best: leave it out")
+    settings = read_settings(run, [column.name for column in columns], folder)
+    search = table(given, "search")
+    known("search", search, ("population", "generations", "seed"))
+    population = _whole(search, "population", 24, 4)
+    plan = SearchPlan(
+        name, text, folder, base_name, base, variables, objectives, constraints, columns, population,
+        _whole(search, "generations", 20, 1), _whole(search, "seed", 0, 0), settings,
+    )  # fmt: skip
+    for corner in (0.0, 0.5, 1.0):
+        plan.job(plan.values(np.full(len(variables), corner)))
+    return plan
+
+
+def _variable(key: str, value: Any, base: Job, folder: Path) -> Span | Axis:
+    if isinstance(value, Mapping):
+        return read_span(key, value, base, ("from", "to", "scale"))
+    return read_listed(key, value, base, folder)
+
+
+def _objectives(given: Mapping[str, Any]) -> tuple[Objective, ...]:
+    known("objectives", given, ("minimise", "maximise"))
+    found = list[Objective]()
+    for name, sign in (("minimise", 1), ("maximise", -1)):
+        columns = given.get(name, [])
+        if not isinstance(columns, list | tuple):
+            raise InputError(f'objectives.{name} = {shown(columns)}: give a list of columns, such as ["rms_pinned"]')
+        for column in columns:
+            if column not in STANDARD[2:]:
+                read_column(column)
+            found.append(Objective(column, 1 if sign > 0 else -1))
+    if not found:
+        raise InputError('[objectives] is missing: give columns of the table, such as minimise = ["rms_pinned"]')
+    names = [objective.column for objective in found]
+    if len(set(names)) < len(names):
+        raise InputError("[objectives]: a column occurs twice: leave one out")
+    return tuple(found)
+
+
+def _flat_constraints(given: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in given.items():
+        if isinstance(value, Mapping) and name not in STANDARD and not {"min", "max"} & value.keys():
+            yield from _flat_constraints(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, value
+
+
+def _constraint(column: str, given: Any) -> Constraint:
+    if column not in STANDARD:
+        read_column(column)
+    if isinstance(given, str):
+        given = [given]
+    if isinstance(given, list | tuple) and given and all(isinstance(word, str) for word in given):
+        return Constraint(column, words=tuple(given))
+    if not isinstance(given, Mapping):
+        raise InputError(
+            f"constraints {shown(column)} = {shown(given)}: give {{ min = 30 }}, {{ max = 1.0 }} or a list of words"
+        )
+    known(f"constraints.{column}", given, ("min", "max"))
+    for name, bound in given.items():
+        if not isinstance(bound, int | float) or isinstance(bound, bool):
+            raise InputError(f"constraints {shown(column)}: {name} = {shown(bound)}: give a number in SI")
+    return Constraint(column, low=given.get("min"), high=given.get("max"))
+
+
+def _whole(given: Mapping[str, Any], name: str, default: int, least: int) -> int:
+    value = given.get(name, default)
+    if type(value) is not int or value < least:
+        raise InputError(f"search.{name} = {shown(value)}: give a whole number of at least {least}")
+    return value

@@ -1,0 +1,102 @@
+"""Refinement as a whole: what it reaches, that its shell is the one that is built, and what it refuses."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.errors import InputError
+from rodshell.formfinding.pipeline import agreement
+from rodshell.formfinding.popup import pop_up
+from rodshell.formfinding.trim import Footprint
+from rodshell.refining.objectives import Gap, Small
+from rodshell.refining.refine import Refinement, refine
+from rodshell.refining.stiffness_families import Taper
+
+ROD = rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
+
+
+@cache
+def form(height: float = 0.12) -> rs.Form:
+    """A paraboloid of 9 rods each way, and flatter or steeper ones."""
+    layout = rs.GridLayout.orthogonal(rods=(9, 9), spacing=0.04, edge=0.02)
+    return rs.find_form(rs.Paraboloid(0.2, height), layout, ROD, ends="pinned")
+
+
+@cache
+def tapered() -> Refinement:
+    return refine(form().stages, "taper")  # type: ignore[arg-type]
+
+
+def test_one_taper_for_all_rods_brings_the_shell_eight_times_nearer() -> None:
+    found = tapered()
+    assert found.gap_after.rms < found.gap_before.rms / 8
+    assert found.converged
+    assert found.factorizations <= 25
+    factors = [rod.profile.factors for rod in found.after.footprint.rods if rod.profile is not None]
+    assert len(factors) == 18
+    assert len(set(factors)) == 1
+    profile = np.array(factors[0])
+    np.testing.assert_allclose(profile, profile[::-1])
+    assert profile.max() / profile.min() <= 8.0 * (1 + 1e-12)
+    assert profile.min() < 0.5 < 1.2 < profile.max()
+
+
+def test_the_refined_grid_pops_up_from_its_draped_state_to_the_same_shape() -> None:
+    after = tapered().after
+    popped = pop_up(Footprint(after.footprint.mesh), after.boundary, ROD, ends="pinned")
+    assert popped.report.stable
+    assert np.abs(popped.positions - after.popped["pinned"].positions).max() < 1e-7 * after.target.size
+    assert agreement(popped, after.target).rms == pytest.approx(tapered().gap_after.rms, rel=1e-4)
+
+
+def test_the_search_ends_where_no_neighbour_is_better() -> None:
+    """Around the design the gap grows along every variable that is not at a bound, to the search's own precision."""
+    first, last = (design.point for design in (tapered().designs[0], tapered().designs[-1]))
+    gradient = Gap().slopes(last).T @ Gap().residuals(last) / last.rms
+    half = 0.5 * np.log(8.0)
+    inside = np.abs(last.values) < half - 1e-9
+    assert np.abs(gradient[inside]).max() < 0.2 * last.rms
+    before = Gap().slopes(first).T @ Gap().residuals(first)
+    assert abs(before.sum()) < 5e-3 * np.abs(before).max()  # EI of all rods alike changes nothing but their stretch
+
+
+def test_objectives_compose_and_regularisation_keeps_variables_small() -> None:
+    stages = form().stages
+    soft = refine(stages, "taper", objectives=[Gap(), Small(np.ones(5), weight=0.003)])  # type: ignore[arg-type]
+    assert np.abs(soft.designs[-1].point.values).max() < 0.8 * np.abs(tapered().designs[-1].point.values).max()
+    assert tapered().gap_after.rms < soft.gap_after.rms < tapered().gap_before.rms
+
+
+def test_the_largest_gap_is_smaller_in_a_higher_norm() -> None:
+    coarse = Taper(stations=3)
+    powers = [refine(form().stages, coarse, objectives=[Gap(power=power)]) for power in (2.0, 6.0)]  # type: ignore[arg-type]
+    assert powers[1].gap_after.max < 0.95 * powers[0].gap_after.max
+    assert powers[1].gap_after.rms > powers[0].gap_after.rms
+
+
+def test_progress_sees_every_evaluation_and_may_stop_the_search() -> None:
+    steps = []
+    found = refine(form().stages, "taper", progress=steps.append)  # type: ignore[arg-type]
+    assert tuple(steps) == found.steps
+    assert [step.number for step in steps] == list(range(1, len(steps) + 1))
+    one = refine(form().stages, "taper", most_evaluations=1)  # type: ignore[arg-type]
+    assert len(one.steps) == 1
+    assert not one.converged
+
+
+def test_what_cannot_be_refined_is_refused_in_a_sentence() -> None:
+    stages = form().stages
+    with pytest.raises(InputError, match=r'vary must be .* not "tapr": did you mean "taper"'):
+        refine(stages, "tapr")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="each once"):
+        refine(stages, ("taper", "taper"))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="not popped up with clamped ends"):
+        refine(stages, "taper", ends="clamped")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="refined before"):
+        refine(tapered().after, "taper")
+    with pytest.raises(InputError, match="larger than 1"):
+        Taper(ratio=0.5)
+    with pytest.raises(InputError, match='ends = "clamped"'):
+        refine(stages, "clamps")  # type: ignore[arg-type]

@@ -1,0 +1,200 @@
+"""The studio: who is let in, what it reads and keeps, and that what it finds is what the command line finds."""
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.errors import InputError
+from rodshell.studio.session import upload_name, with_uploads
+
+pytest.importorskip("starlette")
+pytest.importorskip("httpx2")
+
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from rodshell.studio.server import Settings, studio_app
+
+DOME: dict[str, Any] = {
+    "target": {"kind": "hemisphere"},
+    "layout": {"spacing": "50 mm", "edge": "25 mm"},
+    "rod": {"section": {"radius": "1 mm"}, "material": {"youngs_modulus": "1 MPa"}},
+    "checks": {"stages": 0},
+}
+
+
+def settings(folder: Path, **more: Any) -> Settings:
+    return Settings(folder, **{"hosts": ("testserver",), "first": DOME, **more})
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[TestClient]:
+    with TestClient(studio_app(settings(tmp_path))) as made:
+        yield made
+
+
+def new_session(client: TestClient) -> str:
+    return str(client.post("/api/sessions").json()["id"])
+
+
+def test_the_page_may_load_nothing_from_elsewhere(client: TestClient) -> None:
+    page = client.get("/")
+    assert page.status_code == 200
+    assert "default-src 'none'" in page.headers["content-security-policy"]
+    assert "unsafe" not in page.headers["content-security-policy"]
+    for name in ("studio.js", "studio.css", "viewer.js", "viewer.css", "lil-gui.js", "lil-gui.css"):
+        assert f"/static/{name}" in page.text or name in client.get("/static/studio.js").text
+        assert client.get(f"/static/{name}").status_code == 200
+    assert client.get("/static/server.py").status_code == 404
+    assert client.get("/static/..%2fserver.py").status_code == 404
+
+
+def test_another_site_s_page_is_refused(client: TestClient) -> None:
+    assert client.post("/api/jobs", json=DOME, headers={"origin": "https://evil.example"}).status_code == 403
+    assert client.get("/api/version", headers={"host": "evil.example"}).status_code == 403
+    session = new_session(client)
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect(f"/api/sessions/{session}/live", headers={"origin": "https://evil.example"}),
+    ):
+        pass
+    assert client.post("/api/sessions", headers={"origin": "http://testserver"}).status_code == 201
+
+
+def test_from_another_machine_a_token_is_needed(tmp_path: Path) -> None:
+    app = studio_app(settings(tmp_path, hosts=(), token="right"))
+    with TestClient(app) as client:
+        assert client.get("/api/version").status_code == 403
+        assert client.get("/api/version?token=wrong").status_code == 403
+        assert client.post("/api/jobs", json=DOME, headers={"authorization": "Bearer wrong"}).status_code == 403
+        assert client.get("/api/version", headers={"authorization": "Bearer right"}).status_code == 200
+        client.cookies.clear()
+        assert client.get("/?token=right").status_code == 200
+        assert client.get("/api/version").status_code == 200  # by the cookie
+
+
+def test_no_file_of_the_server_is_read(client: TestClient, tmp_path: Path) -> None:
+    (tmp_path / "secret.obj").write_text("v 0 0 0\n")
+    for name in (str(tmp_path / "secret.obj"), "upload:../../secret.obj", "upload:secret.obj", "../secret.obj"):
+        answer = client.post("/api/jobs", json={"target": {"kind": "mesh", "file": name}})
+        assert answer.status_code == 400
+        assert "reads only files that were uploaded" in answer.json()["sentence"]
+    for case in ({"drape": {"frames": "x"}}, {"target.file": "/etc/passwd"}):
+        assert client.post("/api/jobs", json=case).status_code == 400
+    assert client.get("/api/jobs/..%2f..%2fsecret.obj").status_code == 404
+    assert client.get(f"/api/sessions/{new_session(client)}/scenes/..%2fsession.json").status_code == 404
+
+
+def test_uploads_are_few_kinds_and_not_too_large(tmp_path: Path) -> None:
+    with TestClient(studio_app(settings(tmp_path, largest_upload=1000))) as client:
+        place = f"/api/sessions/{new_session(client)}/uploads"
+        large = client.post(f"{place}?name=a.obj", content=b"v" * 2000)
+        assert large.status_code == 400
+        assert "larger than 0.001 MB" in large.json()["sentence"]
+        assert client.post(f"{place}?name=a.exe", content=b"v").status_code == 400
+        assert client.post(f"{place}?name=..%2F..%2Fa.obj", content=b"v").json() == {"file": "upload:a.obj"}
+        assert [path.name for path in tmp_path.rglob("a.obj")] == ["a.obj"]
+        assert not list(tmp_path.rglob("uploads/.*"))
+
+
+def test_names_of_uploads_are_plain() -> None:
+    assert upload_name("C:\\roofs\\<b>roof</b>.OBJ") == "b_.OBJ"
+    assert upload_name("../../roof 2.obj") == "roof 2.obj"
+    for name in ("", ".obj", "a.py", "..", "a.obj/", "case.toml"):
+        with pytest.raises(InputError, match="the studio reads"):
+            upload_name(name)
+
+
+def test_a_case_gets_the_paths_of_its_uploads(tmp_path: Path) -> None:
+    case = {"target": {"kind": "mesh", "file": "upload:roof.obj"}}
+    assert with_uploads(case, {"roof.obj": tmp_path / "roof.obj"})["target"]["file"] == str(tmp_path / "roof.obj")
+    assert case["target"]["file"] == "upload:roof.obj"
+
+
+def until_done(socket: Any, serial: int) -> list[dict[str, Any]]:
+    """All messages up to the end of an order; a scene is put with its stage."""
+    messages: list[dict[str, Any]] = []
+    while True:
+        message = socket.receive()
+        if "bytes" in message and message["bytes"] is not None:
+            messages[-1]["content"] = message["bytes"]
+            continue
+        messages.append(json.loads(message["text"]))
+        if messages[-1]["kind"] in ("done", "failed") and messages[-1]["serial"] == serial:
+            return messages
+
+
+@pytest.mark.slow
+def test_a_session_shows_each_stage_and_ends_with_the_command_line_s_form(tmp_path: Path) -> None:
+    expected = rs.Job.load(DOME).run()
+    with TestClient(studio_app(settings(tmp_path))) as client:
+        session = new_session(client)
+        with client.websocket_connect(f"/api/sessions/{session}/live") as socket:
+            assert socket.receive_json()["cases"] == []
+            turned = {**DOME, "layout": {**DOME["layout"], "rotate": 0.1}}
+            for serial, (case, live) in enumerate([(turned, True), (DOME, False)], start=1):
+                socket.send_json({"kind": "case", "serial": serial, "case": case, "live": live})
+                stages = [message for message in until_done(socket, serial) if message["kind"] == "stage"]
+                assert [stage["stage"] for stage in stages] == ["drape", "pop-up"] + ["checks"] * (not live)
+                assert all(stage["content"] for stage in stages)
+            assert stages[-1]["verdict"]["headline"] == expected.verdict.headline
+            socket.send_json({"kind": "keep", "name": "first"})
+            assert [variant["name"] for variant in socket.receive_json()["variants"]] == ["first"]
+            socket.send_json({"kind": "case", "serial": 3, "case": {"target": {"radius": "no"}}})
+            assert "target.radius" in until_done(socket, 3)[-1]["sentence"]
+        packed = client.get(f"/api/sessions/{session}/files.zip")
+        assert packed.content[:2] == b"PK"
+        scene = client.get(f"/api/sessions/{session}/scenes/{last_state(tmp_path)['variants'][0]['scene']}")
+        assert scene.content == stages[-1]["content"]
+    # another server on the same folder goes on where this one was
+    with (
+        TestClient(studio_app(settings(tmp_path))) as client,
+        client.websocket_connect(f"/api/sessions/{session}/live") as socket,
+    ):
+        state = socket.receive_json()
+        assert state["cases"][0] == DOME
+        assert [variant["name"] for variant in state["variants"]] == ["first"]
+        socket.send_json({"kind": "step", "by": -1})
+        assert socket.receive_json()["at"] == state["at"] - 1
+
+
+def last_state(folder: Path) -> dict[str, Any]:
+    (path,) = folder.glob("sessions/*/session.json")
+    state: dict[str, Any] = json.loads(path.read_text())
+    return state
+
+
+@pytest.mark.slow
+def test_a_job_of_a_program_gives_its_result_and_files(client: TestClient) -> None:
+    expected = rs.Job.load(DOME).run(until="pop-up")
+    answer = client.post("/api/jobs", json=DOME)
+    assert answer.status_code == 202
+    bad = client.post("/api/jobs", json={"target": {"kind": "cube"}}).json()["id"]
+    done = wait(client, answer.json()["id"])
+    assert done["status"] == "done"
+    assert done["result"]["status"] == "converged"
+    assert {"result.json", "states.npz", "report.html"} <= set(done["files"])
+    content = client.get(f"/api/jobs/{answer.json()['id']}/files/states.npz").content
+    from io import BytesIO
+
+    np.testing.assert_array_equal(np.load(BytesIO(content))["popped_pinned"], expected.popped["pinned"].positions)
+    assert client.get(f"/api/jobs/{answer.json()['id']}/files/../status.json").status_code == 404
+    failed = wait(client, bad)
+    assert failed["status"] == "failed"
+    assert "target.kind" in failed["sentence"]
+    assert client.get("/api/jobs/nothing").status_code == 404
+
+
+def wait(client: TestClient, job: str) -> dict[str, Any]:
+    for _ in range(1200):
+        status: dict[str, Any] = client.get(f"/api/jobs/{job}").json()
+        if status["status"] in ("done", "failed"):
+            return status
+        time.sleep(0.1)
+    raise AssertionError("the job does not end")
