@@ -26,21 +26,20 @@ from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
 from rodshell.layout.cells import Pattern
-from rodshell.loads.check import LoadChecks, check_shells
-from rodshell.loads.combinations import Loads
-from rodshell.loads.structure import Strength
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
 from rodshell.results.from_form import results_of, states_of, with_seam_forces
-from rodshell.results.from_loads import loaded_results, loaded_states
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
+
+    from rodshell.loads.check import LoadChecks
+    from rodshell.loads.combinations import Loads
 
 Stages = PatchForm | PatchedForm
 
@@ -69,7 +68,7 @@ class Form:
     reused: tuple[str, ...] = ()
     _known_checks: Checks | None = field(default=None)
     _known_fabrication: Fabricated | None = field(default=None)
-    _known_loaded: LoadChecks | None = field(default=None)
+    _known_loaded: "LoadChecks | None" = field(default=None)
 
     # What was asked for
 
@@ -198,7 +197,7 @@ class Form:
         )
 
     @cached_property
-    def loaded(self) -> LoadChecks | None:
+    def loaded(self) -> "LoadChecks | None":
         """The checks under the loads of the case, None where it has none; made as `checks` are."""
         if self._known_loaded is not None:
             return self._known_loaded
@@ -206,7 +205,7 @@ class Form:
         return None if loads is None else check_loads(self, loads)
 
     @property
-    def known_loaded(self) -> LoadChecks | None:
+    def known_loaded(self) -> "LoadChecks | None":
         """The checks under loads, if they were made."""
         found: LoadChecks | None = self.__dict__.get("loaded", self._known_loaded)
         return found
@@ -377,14 +376,19 @@ class Form:
             strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
+            from rodshell.results.from_loads import loaded_results
+
             results = loaded_results(results, self.footprint.mesh, self.loaded)
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
         states = states_of(self.stages) | checked_states(checks, self.rod.stretch_stiffness)
-        states |= {} if self.loaded is None else loaded_states(self.loaded)
+        if self.loaded is not None:
+            from rodshell.results.from_loads import loaded_states
+
+            states |= loaded_states(self.loaded)
         return Archive(results, states, self.case.text(), self.inputs)
 
 
-def check_loads(form: Form, loads: Loads, *, progress: Progress = silent) -> LoadChecks:
+def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "LoadChecks":
     """Check a form under loads: deflections, reactions, stability and utilisation under each of their combinations.
 
     Parameters
@@ -397,8 +401,12 @@ def check_loads(form: Form, loads: Loads, *, progress: Progress = silent) -> Loa
     ------
     InputError : a load does not fit the form; the form is in patches, or comes from a table of rods.
     """
+    from rodshell.loads.check import check_shells  # most forms have no loads
+    from rodshell.loads.combinations import Loads
+    from rodshell.loads.structure import Strength
+
     instance("form", form, Form)
-    instance("loads", loads, Loads)
+    instance("loads", loads, Loads, "a rodshell.Loads(...)")
     if isinstance(form.stages, PatchedForm):
         raise InputError("a form in patches cannot be checked under loads: leave out the seams, or the loads")
     judged_by = form.options.judged_by(form.rod)

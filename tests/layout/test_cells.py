@@ -7,7 +7,7 @@ import pytest
 
 from rodshell.errors import InputError
 from rodshell.layout import FlatGrid, GridLayout, straight_rods
-from rodshell.layout.cells import Pattern, diagonals, flat_places, grid_cells, lines
+from rodshell.layout.cells import Pattern, diagonals, flat_joints, grid_cells, lines
 
 
 def lattice(u: int = 4, v: int = 5) -> FlatGrid:
@@ -21,7 +21,7 @@ def test_every_cell_has_two_diagonals(turned: bool) -> None:
     if turned:
         ends = [pair[::-1] if k % 2 else pair for k, pair in enumerate(ends)]
     grid = straight_rods(ends)
-    found, places = diagonals(grid), flat_places(grid)
+    found, places = diagonals(grid), flat_joints(grid)
     assert len(found) == 2 * 2 * 3
     assert len({frozenset(pair) for pair in found.tolist()}) == len(found)
     np.testing.assert_allclose(np.linalg.norm(places[found[:, 0]] - places[found[:, 1]], axis=1), np.hypot(2, 1))
@@ -36,7 +36,7 @@ def test_a_cell_with_a_missing_joint_has_none() -> None:
 
 def test_one_diagonal_a_cell_goes_the_same_way_in_all_cells() -> None:
     grid = lattice()
-    found, places = diagonals(grid, Pattern.of("one")), flat_places(grid)
+    found, places = diagonals(grid, Pattern.of("one")), flat_joints(grid)
     assert len(found) == len(grid_cells(grid)) == 12
     assert ((places[found[:, 1]] - places[found[:, 0]]).prod(axis=1) > 0).all()
 
@@ -44,7 +44,7 @@ def test_one_diagonal_a_cell_goes_the_same_way_in_all_cells() -> None:
 def test_every_second_pattern_has_continuous_lines_through_every_second_joint() -> None:
     """On a lattice with a joint at the middle: of the diagonals of every cell, the half on even lines."""
     grid = lattice(5, 5)
-    places = flat_places(grid)
+    places = flat_joints(grid)
     found = diagonals(grid, Pattern.of("every = 2"))
     assert 2 * len(found) == len(diagonals(grid))
     steps = np.rint(places[found] / 0.1).astype(int)
@@ -57,7 +57,7 @@ def test_every_second_pattern_has_continuous_lines_through_every_second_joint() 
 
 def test_lines_use_each_diagonal_once() -> None:
     grid = lattice()
-    found, places = diagonals(grid), flat_places(grid)
+    found, places = diagonals(grid), flat_joints(grid)
     rows = lines(found, places)
     used = [frozenset(pair) for row in rows for pair in pairwise(row)]
     assert sorted(map(sorted, used)) == sorted(map(sorted, found.tolist()))

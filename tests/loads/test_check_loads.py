@@ -180,7 +180,7 @@ def test_what_does_not_fit_the_form_is_refused_in_one_sentence(form: str, loads:
         (lambda: rs.Snow(1.0, "quarter"), "must be"),
         (lambda: rs.Loads(loads={}, combinations={"a": {"b": 1.0}}), "has no loads"),
         (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={}), "has no combinations"),
-        (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={"a": {"c": 1.0}}), '"c", which is no load'),
+        (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={"a": {"c": 1.0}}), '"c", which is not a load'),
         (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={"a": {"b": -1.0}}), "must be 0 or more"),
         (lambda: rs.Stability(imperfection="span/0"), "the imperfection must be"),
         (lambda: rs.Cables(rod=ROPE, pattern="all"), "a pattern of diagonals must be"),
@@ -212,11 +212,11 @@ def test_bracing_across_an_opening_is_refused_or_leaves_diagonals_out(tmp_path: 
     path = tmp_path / "vault.obj"
     path.write_text("\n".join(lines))
     job = rs.Job.load(
-        {"target": {"kind": "mesh", "file": str(path), "unit": "m"}, "layout": {"spacing": 1.0}, "pop_up": {"ends": "pinned"}},
+        {"target": {"kind": "mesh", "file": str(path), "unit": "m"}, "pop_up": {"ends": "pinned"}}, layout__spacing=1.0,
         rod__section={"kind": "tube", "radius": 0.02, "thickness": 0.003}, rod__material={"preset": "gfrp"},
     )  # fmt: skip
     form = job.run(until="pop-up")
-    with pytest.raises(InputError, match="2 of .* diagonals of the bracing cross an opening"):
+    with pytest.raises(InputError, match=r"2 of .* diagonals of the bracing cross an opening"):
         rs.check_loads(form, one(rs.Snow(10.0), bracing=rs.Cables(rod=ROPE, prestrain=1e-4)))
     left = rs.Cables(rod=ROPE, prestrain=1e-4, across_openings="leave out")
     found = rs.check_loads(form, one(rs.Snow(10.0), bracing=left))
@@ -228,9 +228,7 @@ def test_bracing_across_an_opening_is_refused_or_leaves_diagonals_out(tmp_path: 
 
 def test_a_table_of_rods_has_no_areas() -> None:
     form = shell("tubes")
-    flat = rs.straight_rods(
-        [[[0, y], [4, y]] for y in (1.0, 2.0, 3.0)] + [[[x, 0], [x, 4]] for x in (1.0, 2.0, 3.0)]
-    )
+    flat = rs.straight_rods([[[0, y], [4, y]] for y in (1.0, 2.0, 3.0)] + [[[x, 0], [x, 4]] for x in (1.0, 2.0, 3.0)])
     finals = np.array([[[*rod.point(rod.start + 0.02), 0.0], [*rod.point(rod.end - 0.02), 0.0]] for rod in flat.rods])
     table = rs.pop_up_table(flat, finals, LARCH)
     assert form is not table

@@ -115,8 +115,8 @@ def fabricate(
         flat, there = mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1)
         pairs = diagonals(mesh.grid, pattern)
 
-        def apart(places: Floats) -> list[float]:
-            distances: list[float] = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1).tolist()
+        def apart(points: Floats) -> list[float]:
+            distances: list[float] = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).tolist()
             return distances
 
         bracing = tuple(

@@ -31,7 +31,7 @@ class Pattern:
 
         Raises
         ------
-        InputError : it is none of these.
+        InputError : it is something else.
         """
         if words in ("both", "one"):
             return Pattern(2 if words == "both" else 1)
@@ -91,13 +91,13 @@ def diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     return np.asarray(pairs[line % pattern.every == 0])
 
 
-def lines(pairs: Ints, places: Floats) -> list[list[int]]:
+def lines(pairs: Ints, points: Floats) -> list[list[int]]:
     """Crossings along each continuous line of diagonals, from its first to its last.
 
     Parameters
     ----------
     pairs : (d, 2) crossings of each diagonal.
-    places : (c, 2) of the crossings in the flat grid [m]: a line continues where its direction changes least.
+    points : (c, 2) of the crossings in the flat grid [m]: a line continues where its direction changes least.
     """
     at: dict[int, list[tuple[int, int]]] = {}
     for k, (a, b) in enumerate(pairs.tolist()):
@@ -107,8 +107,8 @@ def lines(pairs: Ints, places: Floats) -> list[list[int]]:
 
     def onwards(before: int, here: int) -> int | None:
         """The crossing after `here` on the line that comes from `before`; its diagonal is then used."""
-        way = _direction(places, before, here)
-        options = [(float(way @ _direction(places, here, to)), k, to) for k, to in at[here] if k in left]
+        way = _direction(points, before, here)
+        options = [(float(way @ _direction(points, here, to)), k, to) for k, to in at[here] if k in left]
         straight = max(options, default=None)
         if straight is None or straight[0] < STRAIGHT:
             return None
@@ -131,12 +131,12 @@ def lines(pairs: Ints, places: Floats) -> list[list[int]]:
 STRAIGHT = 0.7  # cosine of the angle by which a line of diagonals may turn at a joint of the flat grid
 
 
-def _direction(places: Floats, a: int, b: int) -> Floats:
-    way = places[b] - places[a]
+def _direction(points: Floats, a: int, b: int) -> Floats:
+    way = points[b] - points[a]
     return np.asarray(way / np.linalg.norm(way))
 
 
-def flat_places(grid: FlatGrid) -> Floats:
+def flat_joints(grid: FlatGrid) -> Floats:
     """(c, 2) place of each crossing in the flat grid [m].
 
     Parameters
@@ -149,8 +149,8 @@ def flat_places(grid: FlatGrid) -> Floats:
 
 def _rising(grid: FlatGrid, pairs: Ints) -> Floats:
     """(k, 2) of both diagonals of each cell: rise times run in the flat grid, positive where it goes up rightwards."""
-    places = flat_places(grid)
-    way = places[pairs[..., 1]] - places[pairs[..., 0]]
+    points = flat_joints(grid)
+    way = points[pairs[..., 1]] - points[pairs[..., 0]]
     return np.asarray(way.prod(axis=-1))
 
 

@@ -59,7 +59,7 @@ class Cables:
 
         Raises
         ------
-        InputError : a cable crosses an opening; the shell does not bear the prestress.
+        InputError : a cable crosses an opening; the shell does not withstand the prestress.
         """
         mesh, before = structure.mesh, structure.equilibrium
         pairs = braced_diagonals(mesh, structure.positions(before), target, self.pattern, self.across_openings)

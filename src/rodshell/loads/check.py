@@ -54,7 +54,7 @@ class LoadedShell:
         None: not asked for.
     load_sum : (3,) sum of the loads, those on supports included [N].
     reactions : of the supports, without those of the unloaded shell.
-    support_forces : of the supports, with those of the unloaded shell: what foundations have to bear, reversed.
+    support_forces : of the supports, with those of the unloaded shell: what acts on foundations, reversed.
     displacements : (n, 3) of the mesh's nodes against the unloaded shell [m].
     positions : (n, 3) of the mesh's nodes [m].
     stress : (k,) largest stress of bending, axial force and torsion at each entry of `rod_nodes` [Pa]; None: unknown.
@@ -200,14 +200,14 @@ def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Struc
     """
     structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
     if bracing is not None:
-        own = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
-        structure = own.brace(structure, stages.target)
+        fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
+        structure = fitted.brace(structure, stages.target)
     try:
         _ = structure.equilibrium.tangent
     except SingularError:
         raise InputError(
             f"with {ends} ends the supports and joints leave the shell a motion without any stiffness (a mechanism), "
-            "so that it bears no load: hold its ends' directions (clamped), use stiffer joints, or more rods"
+            "so that it cannot carry a load: hold its ends' directions (clamped), use stiffer joints, or more rods"
         ) from None
     return structure
 

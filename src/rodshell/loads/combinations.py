@@ -89,7 +89,7 @@ class Loads:
                 if load_name not in self.loads:
                     known = ", ".join(self.loads)
                     raise InputError(
-                        f"the combination {shown(name)} has a factor for {shown(load_name)}, which is no load: the "
+                        f"the combination {shown(name)} has a factor for {shown(load_name)}, which is not a load: the "
                         f"loads are {known}"
                     )
                 not_negative(f"the factor of {shown(load_name)} in the combination {shown(name)}", factor)

@@ -1,8 +1,8 @@
 """Kinds of loads, each as fixed forces on the nodes: they keep their size and direction while the shell moves.
 
 Weight, snow and wind act on the areas that belong to each node (`tributary`), of the shell as it stands unloaded. Wind
-acts along the surface's normal there and does not turn with it: it is no follower load. Settlement and temperature are
-no forces: they move supports, or change the length at which rods are free of stress.
+acts along the surface's normal there and does not turn with it: it is not a follower load. Settlement and temperature
+are not forces: they move supports, or change the length at which rods are free of stress.
 """
 
 from collections.abc import Sequence

@@ -17,7 +17,7 @@ from rodshell.errors import InputError
 from rodshell.joints.crossings import RodNodes
 from rodshell.joints.standoff import Standoffs
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
-from rodshell.layout.cells import Pattern, flat_places, lines
+from rodshell.layout.cells import Pattern, flat_joints, lines
 from rodshell.layout.flatgrid import Crossings
 from rodshell.loads.bracing import AcrossOpenings, braced_diagonals, outer_nodes
 from rodshell.loads.structure import LathLayer, Structure
@@ -76,7 +76,7 @@ class Laths:
         if self.rod is None:
             raise InputError("these laths have no rod of their own: give one, such as that of the grid")
         pairs = braced_diagonals(mesh, structure.positions(before), target, self.pattern, self.across_openings)
-        rows = lines(pairs, flat_places(mesh.grid))
+        rows = lines(pairs, flat_joints(mesh.grid))
         normals = _normals(mesh, structure.positions(before))
         over = before.state[outer_nodes(mesh)] + self.eccentricity * normals
         laid = _Laid.over(rows, over, normals, float(np.median(mesh.edge_lengths)))
@@ -107,12 +107,12 @@ class _Laid:
     crossings: Ints
 
     @staticmethod
-    def over(rows: list[list[int]], places: Floats, normals: Floats, edge: float) -> "_Laid":
-        """Over the crossings `rows` at `places` (c, 3) [m] with `normals` (c, 3), of edges about as long as `edge`."""
+    def over(rows: list[list[int]], joints: Floats, normals: Floats, edge: float) -> "_Laid":
+        """Over the crossings `rows` at `joints` (c, 3) [m] with `normals` (c, 3), of edges about as long as `edge`."""
         rods, marks, curves = list[FlatRod](), list[Floats](), []
         digits = len(str(len(rows)))
         for k, row in enumerate(rows):
-            points = places[row]
+            points = joints[row]
             chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
             curve = CubicSpline(chord, points, bc_type="natural")  # its ends are free
             fine = np.interp(np.arange(SAMPLES * (len(row) - 1) + 1) / SAMPLES, np.arange(len(row)), chord)
@@ -143,12 +143,12 @@ def _joined(structure: Structure, layer: LathLayer, laid: _Laid, ties: tuple[Ele
     """Grid and laths as one structure, in equilibrium."""
     before, shell, blocks = structure.equilibrium, layer.shell, layer.blocks
     problem, count = before.problem, int(blocks.max()) + 1
-    own = shell.state(laid.positions, normals=laid.normals)
+    placed = shell.state(laid.positions, normals=laid.normals)
     state = np.zeros((count, 3))
-    state[blocks] = own
+    state[blocks] = placed
     state[: structure.size] = before.state
     edges, free = laid.mesh.edges, shell.freedom()
-    rest = np.linalg.norm(own[edges[:, 1]] - own[edges[:, 0]], axis=1)  # laid without axial force
+    rest = np.linalg.norm(placed[edges[:, 1]] - placed[edges[:, 0]], axis=1)  # laid without axial force
     laths = replace(shell.stretch, blocks=blocks[shell.stretch.blocks], rest_lengths=rest)
     stretch = _both(problem.stretch, laths)
     freedom = Freedom.free(count)
@@ -201,12 +201,12 @@ def _held_angles(shell: Shell) -> Ints:
 
 def _flat(structure: Structure, laid: _Laid, shell: Shell) -> Floats:
     """(N, 2) where the laths' blocks lie in the flat grid [m], by the joints on either side."""
-    places, mesh = flat_places(structure.mesh.grid), laid.mesh
+    joints, mesh = flat_joints(structure.mesh.grid), laid.mesh
     nodes = np.empty((mesh.node_count, 2))
     rods = np.searchsorted(mesh.rod_start, laid.entries, side="right") - 1
     for k in range(len(mesh.grid.rods)):
         here, on = mesh.rod_slice(k), rods == k
-        at, flat = mesh.stations[laid.entries[on]], places[laid.crossings[on]]
+        at, flat = mesh.stations[laid.entries[on]], joints[laid.crossings[on]]
         nodes[mesh.rod_nodes[here]] = np.column_stack([np.interp(mesh.stations[here], at, flat[:, a]) for a in (0, 1)])
     middles = nodes[mesh.edges].mean(axis=1)[: shell.angles]
     return np.vstack([nodes, middles])

@@ -151,9 +151,9 @@ class Structure:
         if self.laths is None:
             return None
         layer, count = self.laths, len(self.shell.elements)
-        own = found.elements[count : count + len(layer.shell.elements)]
+        of_laths = found.elements[count : count + len(layer.shell.elements)]
         blocks = [element.blocks for element in layer.shell.elements]
-        alone = tuple(replace(element, blocks=at) for element, at in zip(own, blocks, strict=True))  # type: ignore[type-var]
+        alone = tuple(replace(element, blocks=at) for element, at in zip(of_laths, blocks, strict=True))  # type: ignore[type-var]
         bent = bending_of(
             layer.shell.with_elements(alone), found.state[layer.blocks], layer.rod, shear_weight=strength.shear_weight
         )

@@ -7,13 +7,17 @@ triangles' size, and those of a symmetric shell are symmetric: the triangles are
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.targets import Freeform, Target
+from rodshell.targets import Target
 from rodshell.validation import brief
+
+if TYPE_CHECKING:
+    from rodshell.targets.freeform import Freeform
 
 ACROSS = 240  # triangles' sides across the surface's larger width, at least
 A_SPACING = 24.0  # sides on the distance of two rods, at least
@@ -57,6 +61,8 @@ def tributary_areas(
     rotate : angle of their sides [rad].
     spacing : smallest distance of two neighbouring rods [m].
     """
+    from rodshell.targets.freeform import Freeform  # few jobs need it
+
     step = _step(target, spacing)
     if isinstance(target, Freeform):
         corners, faces = mesh_triangles(target, step=step)
@@ -114,7 +120,7 @@ def surface_triangles(
     return _halved(target, *_cut(target, plan, z, inside, faces), longest=STEEP * step)
 
 
-def mesh_triangles(target: Freeform, *, step: float) -> tuple[Floats, Ints]:
+def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
     """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end.
 
     Parameters
@@ -125,13 +131,13 @@ def mesh_triangles(target: Freeform, *, step: float) -> tuple[Floats, Ints]:
     faces = target.surface.faces
     points, faces = _halved(target, target.surface.vertices, faces, longest=step)
     inside = target.margin(points) >= -ON_THE_EDGE * target.size
-    one, two, sides = _across(inside, faces)
+    single, double, sides = _across(inside, faces)
     low, high = points[sides[:, 0]], points[sides[:, 1]]
     for _ in range(BISECTIONS):
         middle = target.retract(0.5 * (low + high))
         within = target.margin(middle)[:, None] >= 0
         low, high = np.where(within, middle, low), np.where(within, high, middle)
-    points, faces = _stitched(target, points, low, faces[inside[faces].all(axis=1)], one, two)
+    points, faces = _stitched(target, points, low, faces[inside[faces].all(axis=1)], single, double)
     a, b, c = (points[faces[:, k]] for k in range(3))
     upwards = np.cross(b - a, c - a)[:, 2].sum() >= 0
     return points, faces if upwards else faces[:, ::-1]
@@ -152,34 +158,36 @@ def _lifted(target: Target, plan: Floats) -> tuple[Floats, Bools]:
 
 
 def _cut(target: Target, plan: Floats, z: Floats, inside: Bools, faces: Ints) -> tuple[Floats, Ints]:
-    """The faces inside the end, those across it cut; corners are counted anew."""
-    one, two, sides = _across(inside, faces)
+    """The faces inside the end, those across it cut; corners are counted again."""
+    single, double, sides = _across(inside, faces)
     ends, height = _ends_of(target, plan, z, sides[:, 0], sides[:, 1])
     points, there = np.column_stack([plan, z]), np.column_stack([ends, height])
-    return _stitched(target, points, there, faces[inside[faces].all(axis=1)], one, two)
+    return _stitched(target, points, there, faces[inside[faces].all(axis=1)], single, double)
 
 
 def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
     """Faces with one corner inside, which is put first; with two, the one outside put first; and the sides of these
     that lead out, of the first kind along both sides, then of the second."""
     count = inside[faces].sum(axis=1)
-    one, two = (faces[count == k] for k in (1, 2))
-    one = np.take_along_axis(one, (inside[one].argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
-    two = np.take_along_axis(two, ((~inside[two]).argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
-    return one, two, np.concatenate([one[:, [0, 1]], one[:, [0, 2]], two[:, [1, 0]], two[:, [2, 0]]])
+    single, double = (faces[count == k] for k in (1, 2))
+    single = np.take_along_axis(single, (inside[single].argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    double = np.take_along_axis(double, ((~inside[double]).argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    return single, double, np.concatenate([single[:, [0, 1]], single[:, [0, 2]], double[:, [1, 0]], double[:, [2, 0]]])
 
 
 def _stitched(
-    target: Target, points: Floats, ends: Floats, whole: Ints, one: Ints, two: Ints
+    target: Target, points: Floats, ends: Floats, whole: Ints, single: Ints, double: Ints
 ) -> tuple[Floats, Ints]:
     """Whole faces, and what is left of those that were cut at the `ends` of their sides."""
-    a, b, c, d = np.split(len(points) + np.arange(len(ends)), np.cumsum([len(one), len(one), len(two)]))
+    a, b, c, d = np.split(len(points) + np.arange(len(ends)), np.cumsum([len(single), len(single), len(double)]))
     points = np.vstack([points, ends])
-    around = [(two[:, 1], two[:, 2]), (two[:, 2], d), (d, c), (c, two[:, 1])]
-    middle = len(points) + np.arange(len(two))
-    points = np.vstack([points, target.retract(0.25 * (points[two[:, 1]] + points[two[:, 2]] + points[c] + points[d]))])
+    around = [(double[:, 1], double[:, 2]), (double[:, 2], d), (d, c), (c, double[:, 1])]
+    middle = len(points) + np.arange(len(double))
+    points = np.vstack(
+        [points, target.retract(0.25 * (points[double[:, 1]] + points[double[:, 2]] + points[c] + points[d]))]
+    )
     faces = np.concatenate(
-        [whole, np.column_stack([one[:, 0], a, b]), *(np.column_stack([p, q, middle]) for p, q in around)]
+        [whole, np.column_stack([single[:, 0], a, b]), *(np.column_stack([p, q, middle]) for p, q in around)]
     )
     used, again = np.unique(faces, return_inverse=True)
     return points[used], again.reshape(-1, 3)

@@ -267,7 +267,7 @@ def bracing_table(archive: Archive, *, brief: bool = False) -> Table:
 
 def foundations_table(archive: Archive) -> Table:
     """One row a rod end: its place, and what its support exerts on the shell under each combination of loads, with what
-    it exerts on the unloaded shell; the foundation bears the opposite.
+    it exerts on the unloaded shell; the foundation carries the opposite.
     """
     results, mm = archive.results, rounding_of(archive.results).mm
     columns = ["id", *(f"{axis}_mm" for axis in "xyz")]

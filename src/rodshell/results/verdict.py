@@ -312,7 +312,8 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
-        yield f"under {name} it is stable up to {'over 100' if least is None else rounded(least)} times these loads"
+        most = "over 100" if least is None else rounded(least)
+        yield f"under {name} it is stable up to {most} times these loads"
 
 
 def _mm(results: Results, metres: float | None) -> str:
