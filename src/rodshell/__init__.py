@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.patches import PatchLayout
     from rodshell.formfinding.progress import bar
     from rodshell.formfinding.search import search
-    from rodshell.job import Job, find_form, pop_up_table
+    from rodshell.job import Job, find_form, pop_up_table, refine
     from rodshell.joints import (
         Ball,
         ExplicitPenalty,
@@ -107,7 +107,7 @@ _HOMES = {
     "rodshell.formfinding.patches": ("PatchLayout",),
     "rodshell.formfinding.progress": ("bar",),
     "rodshell.formfinding.search": ("search",),
-    "rodshell.job": ("Job", "find_form", "pop_up_table"),
+    "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
     "rodshell.loads.bracing": ("Cables",),
@@ -146,8 +146,8 @@ __all__ = [
     "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Target", "Temperature",
     "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads",
     "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise",
-    "pop_up", "pop_up_table", "read", "read_sweep", "save", "search", "simulate", "solve_rod", "straight_rods",
-    "surface_from", "sweep", "trim",
+    "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "simulate", "solve_rod",
+    "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

@@ -30,7 +30,7 @@ from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
 from rodshell.results import Archive, Results, Verdict
 from rodshell.results.from_checks import checked_results, checked_states, final_ends, judged, sharpest
-from rodshell.results.from_form import results_of, states_of, with_seam_forces
+from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from rodshell.loads.check import LoadChecks
     from rodshell.loads.combinations import Loads
+    from rodshell.refining.acceptance import Refined
 
 Stages = PatchForm | PatchedForm
 
@@ -52,10 +53,11 @@ class Form:
     ----------
     case : everything that decided it, in SI, with what was left open ("auto") as it was decided.
     asked : the same as it was asked for.
-    stages : what form finding returned, of the whole or of its patches.
+    stages : what form finding returned, of the whole or of its patches; where it was refined, the refined ones.
     options : of checks, fabrication and drawings.
     inputs : contents of the files that the case names, by their path in it.
     search : the search for anchor and heading, where the case asked for one.
+    refined : the form before and after its refinement, where the case asked for one.
     reused : the stages that were taken over from an earlier form, see `Job.run`.
     """
 
@@ -65,12 +67,18 @@ class Form:
     options: OutputOptions
     inputs: Mapping[str, bytes]
     search: Search | None = None
+    refined: "Refined | None" = None
     reused: tuple[str, ...] = ()
     _known_checks: Checks | None = field(default=None)
     _known_fabrication: Fabricated | None = field(default=None)
     _known_loaded: "LoadChecks | None" = field(default=None)
 
     # What was asked for
+
+    @property
+    def unrefined(self) -> Stages:
+        """The stages before they were refined."""
+        return self.stages if self.refined is None else self.refined.before
 
     @property
     def target(self) -> Target:
@@ -253,7 +261,8 @@ class Form:
 
     def results(self) -> Results:
         """The typed content of result.json before anything was checked."""
-        return results_of(self.stages)
+        found = results_of(self.stages)
+        return found if self.refined is None else with_refinement(found, self.refined)
 
     def unchecked(self) -> Archive:
         """What is kept of it before anything was checked, without a verdict."""

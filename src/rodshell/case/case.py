@@ -23,6 +23,7 @@ from rodshell.case.stage_tables import (
     FabricationTable,
     LayoutTable,
     PopUpTable,
+    RefineTable,
     SeamsTable,
 )
 from rodshell.case.target_tables import HemisphereTable, TargetTable
@@ -71,6 +72,7 @@ class Case(Table):
     joint: JointKinds = Field(default_factory=BallTable, discriminator="kind")
     drape: DrapeTable = Field(default_factory=DrapeTable)
     pop_up: PopUpTable = Field(default_factory=PopUpTable)
+    refine: RefineTable = Field(default_factory=RefineTable)
     seams: SeamsTable = Field(default_factory=SeamsTable)
     checks: ChecksTable = Field(default_factory=ChecksTable)
     fabrication: FabricationTable = Field(default_factory=FabricationTable)

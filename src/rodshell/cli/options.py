@@ -27,6 +27,7 @@ ALIASES = {
     "drape.anchor": "--anchor",
     "drape.method": "--method",
     "drape.objective": "--objective",
+    "refine.vary": "--vary",
 }
 
 

@@ -270,6 +270,7 @@ class _Stages:
             self.upright(shell, arched(self.footprint, flat, first, boundary)),
             np.zeros(len(mesh.edges)),
             first_step=FIRST_RISE,
+            snap=True,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
         )
         return shell, found

@@ -235,8 +235,11 @@ def _unique_rows(start, rows):  # type: ignore[no-untyped-def]
 @njit()
 def _columns(start, rows, first, count):  # type: ignore[no-untyped-def]
     """The pattern by unknowns; rows above each diagonal block; and where each stored block begins in the values."""
-    n, unknowns = len(start) - 1, int(count.sum())
-    indptr, above, slot = np.zeros(unknowns + 1, dtype=np.int64), np.zeros(n, dtype=np.int64), np.empty_like(rows)
+    n, unknowns = len(start) - 1, 0
+    for j in range(n):
+        unknowns += count[j]
+    indptr, above = np.zeros(unknowns + 1, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    slot = np.empty(len(rows), dtype=np.int64)
     begin = 0
     for j in range(n):
         height = 0
@@ -264,10 +267,11 @@ def _columns(start, rows, first, count):  # type: ignore[no-untyped-def]
 def _find_slots(blocks, count, start, rows, slot):  # type: ignore[no-untyped-def]
     """(m, k, k) where each pair of an element's blocks begins in the values, -1 if it is not stored."""
     k = blocks.shape[1]
-    slots = np.full((blocks.shape[0], k, k), -1, dtype=np.int64)
+    slots = np.empty((blocks.shape[0], k, k), dtype=np.int64)
     for m in range(blocks.shape[0]):
         for b in range(k):
             for a in range(k):
+                slots[m, a, b] = -1
                 i, j = blocks[m, a], blocks[m, b]
                 if (i < j or a == b) and count[i] > 0 and count[j] > 0:
                     e = start[j]

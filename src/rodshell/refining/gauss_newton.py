@@ -17,6 +17,7 @@ from rodshell.refining.structure import Point
 from rodshell.refining.variables import Variables
 
 ENOUGH = 0.01  # relative decrease of the root of the sum of squares below which a foreseen step is not worth taking
+NEAR_ENOUGH = 1e-5  # relative gap, of which the mesh knows no more
 POOR, GOOD = 0.25, 0.75  # actual over foreseen decrease
 FIRM, LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says that there is no more to gain; the least
 
@@ -87,6 +88,9 @@ def gauss_newton(
     here, accepted, steps, factorizations = first, [first], list[Step](), 1
     converged, fresh = False, True
     while len(steps) < most and radius >= LEAST_RADIUS:
+        if here.rms < NEAR_ENOUGH:
+            converged = True
+            break
         if fresh:
             r, jacobian = residuals(objectives, here), slopes(objectives, here) * box.scale
             reduced, right = _reduced(jacobian, r)

@@ -30,6 +30,7 @@ from rodshell.results.records import (
     PopUp,
     Real,
     Record,
+    Refinement,
     Rod,
     RodType,
     Rows,
@@ -284,6 +285,7 @@ class Results(Record):
     agreement: ByEnds[Agreement] = by_ends("gap to the target")
     drape: Drape | None = key("the rods laid on the target")
     pop_up: ByEnds[PopUp] = by_ends("the shell popped up from flat")
+    refinement: Refinement | None = key("how the form was refined; absent where that was not asked for")
     bending: Bending | None = key("bending and stress")
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")

@@ -38,6 +38,7 @@ def summary_text(results: Results) -> str:
         lines += _rod(results.rod, results.bending)
     lines += _patches(results, length)
     lines += _net_and_drape(results, length)
+    lines += _refinement(results)
     lines += _pop_up(results, length)
     lines += _bending(results, length)
     lines += _weight_and_reactions(results, length)
@@ -105,6 +106,23 @@ def _reached(bending: Bending | None) -> str:
     known = [used for used in final if used is not None]
     reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
     return f", aiming at half of the bending strength at most by an estimate of the bends; {reached}"
+
+
+def _refinement(results: Results) -> Iterator[str]:
+    """What the refinement gained, or why it was refused."""
+    found = results.refinement
+    if found is None or found.before is None or found.after is None:
+        return
+    gain = f"gap rms {percent(found.before.rms_relative)} -> {percent(found.after.rms_relative)}"
+    if found.before == found.after:
+        gain = f"gap rms {percent(found.before.rms_relative)} as before"
+    yield (
+        f"  refined   {found.ends}  {', '.join(found.vary)}: {gain}; "
+        f"{found.factorizations} factorisations and {found.gate_factorizations} for its gates"
+    )
+    if found.refused:
+        what = "the design" if found.before == found.after else "a nearer design"
+        yield f"            {what} was refused, {found.refused}"
 
 
 def _patches(results: Results, length: Length) -> Iterator[str]:

@@ -242,7 +242,8 @@ def _transported(x, stencils, sources, source_directors, source_twist, tangents,
         for s in range(2):
             t, d = tangents[b, s], directors[b, s]
             if s == 0 and _shares_edge(stencils, b):
-                t[:], d[:] = tangents[b - 1, 1], directors[b - 1, 1]
+                for k in range(3):
+                    t[k], d[k] = tangents[b - 1, 1, k], directors[b - 1, 1, k]
                 continue
             i0, i1 = stencils[b, 2 * s], stencils[b, 2 * s + 2]
             square, along, both = 0.0, 0.0, 1.0

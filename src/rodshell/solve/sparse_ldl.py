@@ -294,7 +294,9 @@ def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyp
 @njit(error_model="numpy")
 def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     """right - A x of a matrix stored by its upper triangle, and the largest entry of |A| |x|."""
-    residual, size = right.copy(), np.zeros(len(x))
+    residual, size, largest = np.empty(len(x)), np.zeros(len(x)), 0.0
+    for j in range(len(x)):
+        residual[j] = right[j]
     for j in range(len(x)):
         for e in range(indptr[j], indptr[j + 1]):
             i = indices[e]
@@ -305,7 +307,9 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
                 product = data[e] * x[i]
                 residual[j] -= product
                 size[j] += abs(product)
-    return residual, size.max() if len(x) else 0.0
+    for j in range(len(x)):
+        largest = max(largest, size[j])
+    return residual, largest
 
 
 @njit(error_model="numpy")
@@ -316,9 +320,11 @@ def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside)
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
-        values[:width], values[width:] = x[first[s] : first[s + 1]], 0.0
+        for i in range(len(values)):
+            values[i] = x[first[s] + i] if i < width else 0.0
         forward(panel, values, aside)
-        x[first[s] : first[s + 1]] = values[:width]
+        for i in range(width):
+            x[first[s] + i] = values[i]
         for i in range(width, size):
             x[rows[row_start[s] + i]] += values[i]
     for s in range(supers - 1, -1, -1):
@@ -328,7 +334,8 @@ def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside)
         for i in range(size):
             values[i] = x[rows[row_start[s] + i]]
         backward(panel, pivots[first[s] : first[s + 1]], values, aside)
-        x[first[s] : first[s + 1]] = values[:width]
+        for i in range(width):
+            x[first[s] + i] = values[i]
 
 
 LEAF = 12  # blocks that are not divided further
@@ -358,39 +365,50 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
     n = len(coordinates)
     segment = np.zeros(n, dtype=np.int64)
     rank, crossing, part = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int8)
-    kept, size = np.empty((3, n), dtype=np.int64), np.zeros(3, dtype=np.int64)
-    begins, ends = [0], [n]
+    kept, size, sorted_blocks = (
+        np.empty((3, n), dtype=np.int64),
+        np.zeros(3, dtype=np.int64),
+        np.empty(n, dtype=np.int64),
+    )
+    begins, ends = np.empty(n + 2, dtype=np.int64), np.empty(n + 2, dtype=np.int64)  # a stack of segments
+    begins[0], ends[0], height = 0, n, 1
     newest = 0
-    while len(begins) > 0:
-        begin, end = begins.pop(), ends.pop()
+    while height > 0:
+        height -= 1
+        begin, end = begins[height], ends[height]
         if end - begin <= LEAF:
             continue
         here = segment[along[0, begin]]
-        blocks = along[_longest(coordinates, along, begin, end), begin:end].copy()
+        longest, blocks = _longest(coordinates, along, begin, end), sorted_blocks[: end - begin]
         for k in range(len(blocks)):
+            blocks[k] = along[longest, begin + k]
             rank[blocks[k]] = k
         best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing)
         _separate(blocks, segment, here, rank, best, start, neighbours, part)
-        for row in along:
-            size[:] = 0
-            for b in row[begin:end]:
+        for d in range(len(along)):
+            row = along[d]
+            for side in range(3):
+                size[side] = 0
+            for k in range(begin, end):
+                b = row[k]
                 side = part[b]
                 kept[side, size[side]] = b
                 size[side] += 1
             at = begin
             for side in range(3):
-                row[at : at + size[side]] = kept[side, : size[side]]
+                for k in range(size[side]):
+                    row[at + k] = kept[side, k]
                 at += size[side]
         newest += 2
         at = begin
         for side in range(3):
-            for b in along[0, at : at + size[side]]:
-                segment[b] = newest - side if side < 2 else -1
+            for k in range(at, at + size[side]):
+                segment[along[0, k]] = newest - side if side < 2 else -1
             if side < 2 and size[side] > 0:
-                begins.append(at)
-                ends.append(at + size[side])
+                begins[height], ends[height] = at, at + size[side]
+                height += 1
             at += size[side]
-    return along[0].copy()
+    return along[0]
 
 
 @njit()
@@ -408,7 +426,8 @@ def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
 def _best_cut(blocks, segment, here, rank, start, neighbours, crossing):  # type: ignore[no-untyped-def]
     """Rank of the last block before the straight cut that few couplings cross, near the middle."""
     n = len(blocks)
-    crossing[: n + 1] = 0
+    for k in range(n + 1):
+        crossing[k] = 0
     for b in blocks:
         for e in range(start[b], start[b + 1]):
             other = neighbours[e]
