@@ -41,9 +41,10 @@ def timed(work: Callable[[], object], *, runs: int = 7, patience: float = 20.0) 
 
 def machine() -> str:
     """Processor, cores, memory and versions in one line."""
-    import numba
     import numpy
     import scipy
+
+    from rodshell.kernels import description
 
     cpu, memory = platform.processor() or platform.machine(), ""
     info, total = Path("/proc/cpuinfo"), Path("/proc/meminfo")
@@ -54,7 +55,7 @@ def machine() -> str:
     if total.exists():
         memory = f", {int(total.read_text().split()[1]) / 2**20:.0f} GB"
     python = f"Python {platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__}"
-    return f"{cpu}{memory}; {platform.system()}; {python}, Numba {numba.__version__}; one thread"
+    return f"{cpu}{memory}; {platform.system()}; {python}, kernels {description()}; one thread"
 
 
 def ms(seconds: float) -> str:

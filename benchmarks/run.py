@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 
-from benchmarks import earlier, factorisation, jobs, kernels, others, sameness, scaling, startup  # noqa: E402
+from benchmarks import earlier, factorisation, first_run, jobs, kernels, others, sameness, scaling, startup  # noqa: E402
 from benchmarks.rows import Row, Section, machine  # noqa: E402
 
 SECTIONS: dict[str, Callable[[bool], Section]] = {
@@ -29,6 +29,8 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "slider": lambda quick: jobs.slider(6 if quick else 20),
     "warm": lambda quick: jobs.warm(3 if quick else 9),
     "startup": lambda quick: startup.section(3 if quick else 7),
+    "first": lambda _: first_run.section(),
+    "first-jit": lambda _: first_run.section(jit=True),
     "sameness": sameness.sameness,
     "kernels": lambda _: kernels.kernels(),
     "pyelastica": others.pyelastica,

@@ -28,7 +28,7 @@ RUNS = 5
 ROOT = Path(__file__).parent.parent
 QUICK = ("--only", "csv,svg,obj,report", "--checks.stages", "0")  # what a designer looks at first
 FRONT = "typer" if find_spec("typer") else "click"  # of which command lines are made
-BARE = "import numpy, scipy.sparse, numba"
+BARE = "import numpy, scipy.sparse"
 STAGES = """
 import gc, json, tempfile, time
 clock = time.process_time if CPU else time.perf_counter
@@ -38,7 +38,7 @@ def told(name):
     now = clock()
     stages[name] = stages.get(name, 0.0) + now - last
     last = now
-import numpy, scipy.sparse, numba
+import numpy, scipy.sparse
 told("bare imports")
 from rodshell.cli import RARELY
 gc.set_threshold(RARELY)  # as the command does
@@ -154,7 +154,7 @@ def section(runs: int) -> Section:
     found = startup(runs=runs)
     rows = [
         Row(f"`rodshell --help` over `python -c 'import {FRONT}'`", f"{found.help / found.front:.2f}", "at most 3"),
-        Row("whole process over the bare imports of numpy, scipy.sparse and numba and the solve", f"{found.share:.2f}",
+        Row("whole process over the bare imports of numpy and scipy.sparse and the solve", f"{found.share:.2f}",
             "at most 3"),
         Row("read strictly: (whole process - solve) over the bare imports", f"{found.ratio:.2f}", "at most 3"),
         Row("the same, the deployment counted as a solve", f"{found.ratio_without_checks:.2f}"),

@@ -49,7 +49,7 @@ def test_jobs_call_every_kernel_with_the_types_of_its_row() -> None:
         if isinstance(value, Dispatcher)
     }
     for job in JOBS.values():
-        job()
+        list(job())
     for module, rows in KERNELS.items():
         for name, row in rows.items():
             kernel = getattr(sys.modules[f"rodshell.{module}"], name)

@@ -13,9 +13,14 @@ except ModuleNotFoundError as error:
 
 
 def dispatcher(function: Kernel, options: dict[str, object]) -> Kernel:
-    """The kernel of a function, which is compiled at its first call. Numba refuses to declare one that is to be kept
-    where no folder can be written."""
-    kernel: Kernel = njit(cache=kernels_are_kept(), **options)(function)
+    """The kernel of a function, which is compiled at its first call.
+
+    Divisions are those of NumPy, and floating-point numbers are rounded as written, unless it has an option for that.
+    By Numba's defaults a kernel takes such options from the kernel that calls it first, and its bits would depend on
+    the order of calls. Numba refuses to declare a kernel that is to be kept where no folder can be written.
+    """
+    of_its_own: dict[str, object] = {"error_model": "numpy", "fastmath": False, "cache": kernels_are_kept()}
+    kernel: Kernel = njit(**of_its_own | options)(function)
     return kernel
 
 

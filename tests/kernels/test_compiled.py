@@ -1,0 +1,100 @@
+"""Compiled kernels: the same bits as Numba's on one level of the processor, without Numba, and no other arrays."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from rodshell.kernels import COMPILED, LEVEL
+from rodshell.kernels.table import KERNELS
+from rodshell.rods.elements import _strains
+
+pytestmark = pytest.mark.skipif(COMPILED is None, reason="compiled kernels: pip install . with a C compiler")
+
+BITS = """
+import dataclasses, hashlib, json, sys
+import numpy as np
+from rodshell.kernels import description
+from tests.kernels.jobs import JOBS
+
+def arrays(found, seen):
+    if isinstance(found, np.ndarray):
+        yield found
+    elif dataclasses.is_dataclass(found) and id(found) not in seen:
+        seen[id(found)] = found
+        for field in dataclasses.fields(found):
+            yield from arrays(getattr(found, field.name), seen)
+    elif isinstance(found, (list, tuple, dict)):
+        for part in found.values() if isinstance(found, dict) else found:
+            yield from arrays(part, seen)
+
+bits = {}
+for name, job in JOBS.items():
+    floats = [array for array in arrays(list(job()), {}) if array.dtype == np.float64]
+    bits[name] = sum(map(np.size, floats)), hashlib.sha256(b"".join(map(np.ndarray.tobytes, floats))).hexdigest()
+print(json.dumps([description(), "numba" in sys.modules, bits]))
+"""
+
+
+@pytest.mark.slow
+def test_all_jobs_find_the_same_bits_with_compiled_kernels_and_with_numba() -> None:
+    by_numba = {"RODSHELL_KERNELS": "jit", "NUMBA_CPU_NAME": LEVEL, "NUMBA_CPU_FEATURES": ""}
+    (compiled, loaded, ours), (jit, _, theirs) = found_with({}), found_with(by_numba)
+    assert compiled == f"compiled for {LEVEL}"
+    assert jit.startswith("numba ")
+    assert not loaded
+    assert all(count > 500 for count, _ in ours.values())
+    assert ours == theirs
+
+
+def found_with(variables: dict[str, str]) -> list[object]:
+    """How kernels are compiled, whether Numba is loaded, and for each job the number of floats and their hash."""
+    environment = os.environ | variables
+    command = [sys.executable, "-c", BITS]
+    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True, timeout=600)
+    result: list[object] = json.loads(done.stdout)
+    return result
+
+
+def test_each_kernel_of_the_table_is_compiled() -> None:
+    assert COMPILED is not None
+    assert set(COMPILED) == {f"{module}.{name}" for module, rows in KERNELS.items() for name in rows}
+
+
+X = np.zeros((4, 3))
+EDGES = np.array([[0, 1], [2, 3]])
+REST = np.ones(2)
+
+
+@pytest.mark.parametrize(
+    ("x", "edges", "rest"),
+    [
+        (X.astype(np.float32), EDGES, REST),
+        (X.view(np.int64), EDGES, REST),
+        (X.astype(">f8"), EDGES, REST),
+        (np.asfortranarray(X), EDGES, REST),
+        (np.zeros((4, 6))[:, ::2], EDGES, REST),
+        (X, EDGES.astype(np.int32), REST),
+        (X, EDGES.view(np.uint64), REST),
+        (X, EDGES, REST[:, None]),
+        (X[None, None, None], EDGES, REST),
+        (X, EDGES, [1.0, 1.0]),
+        (None, EDGES, REST),
+    ],
+    ids=["single", "bits", "order", "columns", "strided", "int32", "unsigned", "more", "five", "list", "none"],
+)
+def test_an_array_of_another_kind_is_refused(x: object, edges: object, rest: object) -> None:
+    with pytest.raises(TypeError, match="a kernel needs an array of"):
+        _strains(x, edges, rest)
+
+
+def test_what_is_refused_is_not_kept_in_memory() -> None:
+    before = [sys.getrefcount(array) for array in (X, EDGES, REST)]
+    for _ in range(100):
+        with pytest.raises(TypeError):
+            _strains(X, EDGES, REST[:, None])
+        _strains(X, EDGES, REST)
+    assert [sys.getrefcount(array) for array in (X, EDGES, REST)] == before
