@@ -75,7 +75,7 @@ def _pip_cache() -> str:
 
 
 def section(*, jit: bool = False, earlier: str = EARLIER) -> Section:
-    """Environment, installation, build, first and second `form hemisphere`, all files; once, an earlier commit first."""
+    """Environment, installation, build, first and second `form hemisphere`, all files; an earlier commit first."""
     then, now = first_run(earlier, "gridshell"), first_run("HEAD", "rodshell", jit=jit)
     how = "without a compiler" if jit else "with a compiler"
     rows = [
@@ -83,8 +83,10 @@ def section(*, jit: bool = False, earlier: str = EARLIER) -> Section:
             "at most 0.75" if jit else "at most 0.7"),
         Row(f"first run, {how}, on the clock, over commit {earlier}", f"{now.first[0] / then.first[0]:.2f}",
             "at most 0.6" if jit else ""),
-        Row(f"first run over the second, {how}, on the clock", f"{now.first[0] / now.second[0]:.2f}", "" if jit else "at most 1.4"),
-        Row(f"installed size, {how}, over commit {earlier}", f"{now.size / then.size:.2f}", "" if jit else "at most 0.6"),
+        Row(f"first run over the second, {how}, on the clock", f"{now.first[0] / now.second[0]:.2f}",
+            "" if jit else "at most 1.4"),
+        Row(f"installed size, {how}, over commit {earlier}", f"{now.size / then.size:.2f}",
+            "" if jit else "at most 0.6"),
         *(Row(f"   {name}: installation, first, second run; size",
               f"{_both(run.install)}, {_both(run.first)}, {_both(run.second)} s; {run.size:.0f} MB")
           for name, run in ((f"commit {earlier}", then), ("now", now))),

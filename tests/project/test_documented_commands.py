@@ -63,7 +63,7 @@ def _rods() -> list[str]:
 @pytest.mark.parametrize("line", [*README, *FILES])
 def test_a_documented_command_runs(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(warmup, "compile_before_first", lambda quiet: 0)
+    monkeypatch.setattr(warmup, "compile_before_first", lambda **options: 0)
     _, command, *arguments = shlex.split(line, comments=True)
     assert main([command, *arguments, *([] if "--help" in arguments else QUICK.get(command, []))]) == 0
 

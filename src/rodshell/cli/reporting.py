@@ -103,8 +103,12 @@ class Progress:
         click.echo(f"rodshell: {words}", err=True)
 
 
-def compile_before_first(*, quiet: bool = False) -> int:
+def compile_before_first(*, quiet: bool = False, every: bool = False) -> int:
     """Compile the kernels that were not compiled with the wheel or by an earlier run; how many they were.
+
+    Parameters
+    ----------
+    every : those of joints, meshes and dynamics too, which otherwise are compiled when a job calls them.
 
     Raises
     ------
@@ -127,7 +131,7 @@ def compile_before_first(*, quiet: bool = False) -> int:
             progress("compiling kernels, once", f"[{bar:{BAR}}] {done} of {count}{left}", 0.0)
 
     with progress:
-        return compile_kernels(tell)
+        return compile_kernels(tell, every=every)
 
 
 class Result(Protocol):

@@ -17,12 +17,12 @@ def command(quiet: bool) -> int:
     """Compile all kernels now, once, instead of before the first job.
 
     It is of use where rodshell was installed without compiled kernels, and takes about a minute; later there is nothing
-    to compile. It is optional: without it, the first job begins with it.
+    to compile. It is optional: without it, the first job compiles what most jobs need, and later ones the rest.
     """
     if COMPILED is None and not kernels_are_kept():
         raise InputError(f"kernels compiled now would be lost: {UNKEPT}")
     begin = time.perf_counter()
-    compiled = compile_before_first(quiet=quiet)
+    compiled = compile_before_first(quiet=quiet, every=True)
     if quiet:
         return 0
     if compiled:

@@ -1,4 +1,4 @@
-"""All kernels of the table compiled by Numba at once, and kept: before the first job, or by `rodshell warmup`.
+"""Kernels of the table compiled by Numba at once, and kept: before the first job, or by `rodshell warmup`.
 
 Two processes share the work where there are two processors: this one begins with the first kernel of the list, a helper
 with the last, and both leave out what is kept already; so they meet. The helper only fills the cache, and ends with
@@ -18,24 +18,25 @@ from typing import Any
 
 from rodshell.kernels import PACKAGE, Kernel
 from rodshell.kernels.jit import arguments_of
-from rodshell.kernels.table import KERNELS
+from rodshell.kernels.table import KERNELS, OF_SOME_JOBS
 
 LONG_ENOUGH = 0.1  # share of the work after which the time that is left is estimated
 
 
-def compile_kernels(progress: Callable[[int, int, float | None], None]) -> int:
+def compile_kernels(progress: Callable[[int, int, float | None], None], *, every: bool) -> int:
     """Compile the kernels that are not kept; how many they were.
 
     Parameters
     ----------
     progress : called with how many of them are done, how many there are, and about how many seconds the rest takes,
         None while that is not known.
+    every : those of some jobs as well, which Numba otherwise compiles at their first call.
     """
-    missing = [row for row in _rows() if not _is_kept(*row)]
+    missing = [row for row in _rows(every) if not _is_kept(*row)]
     work = [_size(kernel) for kernel, _ in missing]
     waiting, begun = set(range(len(missing))), monotonic()
     progress(0, len(missing), None)
-    with _helper(len(missing)):
+    with _helper(len(missing), every):
         for k, (kernel, arguments) in enumerate(missing):
             if k in waiting and not _is_kept(kernel, arguments):
                 kernel.compile(arguments)
@@ -48,11 +49,12 @@ def compile_kernels(progress: Callable[[int, int, float | None], None]) -> int:
     return len(missing)
 
 
-def _rows() -> list[tuple[Any, tuple[Any, ...]]]:
+def _rows(every: bool) -> list[tuple[Any, tuple[Any, ...]]]:
     """Each kernel of the table, with the types of its arguments."""
     return [
         (getattr(import_module(f"{PACKAGE}{module}"), name), arguments_of(row))
         for module, rows in KERNELS.items()
+        if every or module not in OF_SOME_JOBS
         for name, row in rows.items()
     ]
 
@@ -73,7 +75,7 @@ def _size(kernel: Any, known: frozenset[Kernel] = frozenset()) -> int:
 
 
 @contextmanager
-def _helper(kernels: int) -> "Iterator[subprocess.Popen[bytes] | None]":
+def _helper(kernels: int, every: bool) -> "Iterator[subprocess.Popen[bytes] | None]":
     """A process that compiles from the end of the list, while the block runs; none where it would not help."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if processors < 2 or kernels < 2 or not sys.executable:
@@ -81,7 +83,10 @@ def _helper(kernels: int) -> "Iterator[subprocess.Popen[bytes] | None]":
         return
     nothing = subprocess.DEVNULL
     with subprocess.Popen(
-        [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=nothing, stderr=nothing
+        [sys.executable, "-m", __name__, *(["every"] if every else [])],
+        stdin=subprocess.PIPE,
+        stdout=nothing,
+        stderr=nothing,
     ) as helper:
         try:
             yield helper
@@ -98,7 +103,7 @@ def _help() -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=end_with_the_other, daemon=True).start()
-    for kernel, arguments in reversed(_rows()):
+    for kernel, arguments in reversed(_rows("every" in sys.argv)):
         if not _is_kept(kernel, arguments):
             kernel.compile(arguments)
 

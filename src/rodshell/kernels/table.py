@@ -4,6 +4,12 @@ A type is a letter and a number of dimensions, in C order: f float64, i int64, b
 (n, m) of float64, f alone a number; ff is a pair of numbers. Kernels that only kernels call need no row.
 """
 
+# Kernels of joints, meshes, twist and dynamics, which most forms do not call
+OF_SOME_JOBS = {
+    "contact.modified_mass", "joints.relative_rotation", "joints.ties", "rods.bend_twist", "solve.implicit_euler",
+    "solve.newton_matrix", "targets.field_fitting", "targets.rim", "targets.smooth_field",
+}  # fmt: skip
+
 KERNELS: dict[str, dict[str, str]] = {
     "contact.modified_mass": {
         "_turn": "f3 i1 i1 b1 f2 f1",
