@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from rodshell.arrays import Floats
+from rodshell.errors import OutOfTimeError
 from rodshell.refining.objectives import Objective, residuals, slopes
 from rodshell.refining.structure import Point
 from rodshell.refining.variables import Variables
@@ -82,7 +83,7 @@ def gauss_newton(
     lowest_before : eigenvalue to which those of the steps are related; None: they are not computed.
     radius : first trust radius, in scales of the variables.
     most : evaluations.
-    progress : called after each evaluation.
+    progress : called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
     """
     box = variables.box
     here, accepted, steps, factorizations = first, [first], list[Step](), 1
@@ -117,7 +118,7 @@ def gauss_newton(
                 lowest = float(there.modes.values[0]) / lowest_before
             good = allows(there)
         steps.append(Step(len(steps) + 1, None if there is None else there.rms, lowest, radius, good))
-        progress(steps[-1])
+        late = _late(progress, steps[-1])
         if not good or gain < POOR:
             radius *= 0.3 if there is None else 0.5
         elif gain > GOOD and reached:
@@ -125,7 +126,18 @@ def gauss_newton(
         if good and there is not None:
             here, fresh = there, True
             accepted.append(here)
+        if late:
+            break
     return Found(tuple(accepted), converged, factorizations, tuple(steps))
+
+
+def _late(progress: Callable[[Step], None], step: Step) -> bool:
+    """Whether the time is over, which `progress` says by an error."""
+    try:
+        progress(step)
+    except OutOfTimeError:
+        return True
+    return False
 
 
 def _reduced(jacobian: Floats, r: Floats) -> tuple[Floats, Floats]:

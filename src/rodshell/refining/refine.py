@@ -68,6 +68,7 @@ class Refinement:
     converged : whether no further step would gain much.
     factorizations : of the search.
     steps : its evaluations.
+    variables : what was varied.
     loaded : gaps before and after under the loads, where it was refined under loads; else None.
     """
 
@@ -79,6 +80,7 @@ class Refinement:
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
+    variables: Design
     loaded: tuple[Agreement, Agreement] | None = None
 
     @property
@@ -151,8 +153,42 @@ def refine(
     held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
     names = tuple(family.name for family in families)
     return Refinement(
-        names, ends, held, after, designs, found.converged, spent + found.factorizations + made, found.steps, loaded
+        names,
+        ends,
+        held,
+        after,
+        designs,
+        found.converged,
+        spent + found.factorizations + made,
+        found.steps,
+        variables,
+        loaded,
     )
+
+
+def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
+    """A design on the way from one to another.
+
+    Parameters
+    ----------
+    refinement : that found both.
+    low, high : two of its designs.
+    share : of the way [-].
+
+    Returns
+    -------
+    The design, or None where it has no stable equilibrium near the first or is no design of stock; and the
+    factorisations that it took.
+    """
+    variables, here = refinement.variables, low.point
+    if any(sizes is not None for sizes in variables.stock):
+        return None, 0
+    values = here.values + share * (high.point.values - here.values)
+    point, made = here.tried(values, variables.change(values))
+    if point is None:
+        return None, made + 1
+    grid = Grid(here.structure.mesh, here.structure.popped.boundary)
+    return Candidate(point, variables.applied(grid, values)), made + 1
 
 
 def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:
