@@ -177,7 +177,7 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
 
     Returns
     -------
-    The design, or None where it has no stable equilibrium near the first or is no design of stock; and the
+    The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
     factorisations that it took.
     """
     variables, here = refinement.variables, low.point
