@@ -68,6 +68,7 @@ class Refinement:
     converged : whether no further step would gain much.
     factorizations : of the search.
     steps : its evaluations.
+    variables : what was varied.
     stopped : when and where the search was out of time, or "".
     loaded : gaps before and after under the loads, where it was refined under loads; else None.
     """
@@ -80,6 +81,7 @@ class Refinement:
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
+    variables: Design
     stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
 
@@ -156,8 +158,33 @@ def refine(
     names = tuple(family.name for family in families)
     return Refinement(
         names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
-        found.steps, found.stopped, loaded,
+        found.steps, variables, found.stopped, loaded,
     )  # fmt: skip
+
+
+def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
+    """A design on the way from one to another.
+
+    Parameters
+    ----------
+    refinement : that found both.
+    low, high : two of its designs.
+    share : of the way [-].
+
+    Returns
+    -------
+    The design, or None where it has no stable equilibrium near the first, or is of sizes in stock; and the
+    factorisations that it took.
+    """
+    variables, here = refinement.variables, low.point
+    if any(sizes is not None for sizes in variables.stock):
+        return None, 0
+    values = here.values + share * (high.point.values - here.values)
+    point, made = here.tried(values, variables.change(values))
+    if point is None:
+        return None, made + 1
+    grid = Grid(here.structure.mesh, here.structure.popped.boundary)
+    return Candidate(point, variables.applied(grid, values)), made + 1
 
 
 def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:

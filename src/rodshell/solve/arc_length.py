@@ -29,6 +29,7 @@ from rodshell.solve.tangent import Tangent, by_projections, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
 MODES_CLOSE, MOST_SWEEPS = 1e-3, 20  # relative change of the lowest eigenvalue: modes only say how far to go
+RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
 SMALL = 24  # unknowns up to which LAPACK finds a mode
 MOST_STEPS = 12  # of Newton's method for a point
 STRAYED = 0.3  # of a step: a point so far off its prediction may be on another path. Half of it is aimed at
@@ -109,14 +110,15 @@ class ArcLength:
         self._scale = 1.0 / np.sqrt(np.abs(tangent.values[tangent.pattern.assembly.diagonal]))
         return self._on_path(0.0, start.state, start.forces, elements, tangent, rate)
 
-    def point(self, here: Point, other: Point | None, step: float) -> Point | None:
+    def point(self, here: Point, other: Point | None, step: float, *, near: float = NEGLIGIBLE) -> Point | None:
         """The point a step further; None where Newton's method does not find it, or strays from the prediction.
 
         Parameters
         ----------
         here : the last point.
-        other : a point that tells the curvature of the path, or None.
+        other : a point that shows the curvature of the path, or None.
         step : arc [m].
+        near : of the length: how far it may stray in any case. The tangent foresees no jump of the stiffness.
         """
         state, forces = here.state + step * here.motion, here.forces + step * here.change
         factor = here.factor + step * here.rate
@@ -125,12 +127,37 @@ class ArcLength:
             state, forces = state + half * (other.motion - here.motion), forces + half * (other.change - here.change)
             if self._loaded.load.motions is not None:  # supports move as the factor says
                 factor += half * (other.rate - here.rate)
-        reach = max(self.reach(state - here.state), NEGLIGIBLE * self.length / STRAYED)
+        reach = max(self.reach(state - here.state), near * self.length / STRAYED)
         found = self._correct(state, forces, factor, here.elements, across=here, near=STRAYED * reach)
         if found is None:
             return None
         point = self._on_path(*found, here, step)
         return replace(point, strayed=self.reach(point.state - state) / reach)
+
+    def unstable_next(self, here: Point, step: float) -> Point | None:
+        """What lies a step along the tangent, if the stiffness is unstable there, as it is where it has jumped.
+
+        None where it is stable, or singular.
+
+        Parameters
+        ----------
+        here : the last point.
+        step : arc [m], so short that its end is as good as the equilibrium.
+        """
+        state, forces = here.state + step * here.motion, here.forces + step * here.change
+        factor = here.factor + step * here.rate
+        elements = self._loaded.load.elements(here.elements, state, factor)
+        try:
+            tangent, _ = self._tangent(elements, state, forces, factor)
+        except SingularError:
+            return None
+        if not tangent.negative_modes:
+            return None
+        self._unstable = state, tangent
+        return replace(
+            here, factor=factor, arc=here.arc + step, state=state, forces=forces, elements=elements, rate=-here.rate,
+            negative_modes=tangent.negative_modes, modes=None, ahead=np.inf, behind=-np.inf,
+        )  # fmt: skip
 
     def at_factor(self, factor: float, here: Point, there: Point) -> Point | None:
         """The point at a factor between those of two neighbours on a stable path; None where it is not found.
@@ -156,11 +183,25 @@ class ArcLength:
         ----------
         motion : from the state at t = 0.
         """
-        start, stretch = self._unloaded, self._loaded.problem.stretch
-        forces = start.forces + stretch.stiffness * stretch.elongation(start.state, motion)
-        elements = self._loaded.load.elements(start.elements, start.state, 1.0)
-        found = self._correct(start.state + motion, forces, 1.0, elements, across=motion)
-        return None if found is None else self._on_path(*found, ahead=False)
+        for parts in RAMPS:
+            point = self._displaced_by_parts(motion, parts)
+            if point is not None:
+                return point
+        return None
+
+    def _displaced_by_parts(self, motion: Floats, parts: int) -> Point | None:
+        """As `displaced`, in so many equal parts."""
+        start, stretch, part = self._unloaded, self._loaded.problem.stretch, motion / parts
+        point: Point | None = None
+        state, forces, elements, factor = start.state, start.forces, start.elements, 0.0
+        for _ in range(parts):
+            forces = forces + stretch.stiffness * stretch.elongation(state, part)
+            found = self._correct(state + part, forces, factor + 1 / parts, elements, across=motion)
+            if found is None:
+                return None
+            point = self._on_path(*found, ahead=False)
+            state, forces, elements, factor = point.state, point.forces, point.elements, point.factor
+        return point
 
     def _correct(
         self, state: Floats, forces: Floats, factor: float, elements: tuple[Elements, ...], *,

@@ -36,6 +36,7 @@ APART = 0.5  # path, and is, if it lies so far off the tangent, over the arc to 
 UNACCOUNTED = 0.4  # of the factor that a step gains, by the trapezoidal rule: more is another path
 TURNING = 0.5  # of its mean so far: a smaller rate of the factor says that the path turns back
 ALONG = 0.02  # cosine: where the path is less along the mode that gives way, it is left sideways
+NEARBY = 1e-4  # of the length: no other path is so near, and the tangent need not foresee where this one leads
 RECEDING = 1.1  # times as far as it was foreseen: a singular stiffness that moves away as it is approached
 LEAST = 1e-5  # of the arc so far: shorter steps are given up; of the length: the least that counts as the arc so far
 FLAT, MOST_TURNS = 1e-6, 6  # of the factor: a turning point is as near as this; points that are spent on it
@@ -201,12 +202,20 @@ class _Search:
                     return "limit point" if here.rate * here.arc < TURNING * here.factor else "bifurcation", None
                 break
             there = self.path.point(here, before or beyond, step)
-            if there is None or (there.negative_modes == 0 and not self._follows(here, there, step)):
+            if there is not None and not (there.negative_modes or self._follows(here, there, step)):
+                there = None
+            if there is None and step * here.rate < self.close * here.factor:
+                jumped = self.path.unstable_next(here, step)
+                if jumped is not None:
+                    return "limit point", jumped
+            if there is None and step * self.path.reach(here.motion) < NEARBY * self.path.length:
+                there = self.path.point(here, None, step, near=NEARBY)
+            if there is None:
                 longest = SHRINKAGE * step
                 continue
             longest = min(GROWTH, sqrt(0.5 * STRAYED / max(there.strayed, 1e-9))) * step
             if there.negative_modes:
-                beyond = there
+                beyond, share = there, 0.98 * min(share, 1.0)
                 continue
             self._add(here, there)
             foreseen, now = here.ahead, step + there.ahead
