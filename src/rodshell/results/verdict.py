@@ -116,7 +116,7 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
 BY_WORDS = {
     "shear": "the rods use {} of their design strength in shear",
     "slip": "a joint has to transfer {} of the force at which it slips",
-    "permanent": "the bending of the erected shell uses {} of the rods' permanent design strength, ",
+    "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength",
 }
 """What is used too much, where it is not bending."""
 
