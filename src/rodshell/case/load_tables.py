@@ -320,9 +320,9 @@ class StabilityTable(Table):
 class StrengthTable(Table):
     permanent: Stress | None = Field(
         default=None,
-        description="design strength in bending under permanent loads; default: by the preset and its code",
+        description="design strength under permanent loads; default: a preset's",
     )
-    long: Stress | None = Field(default=None, description="the same under loads of months; default: the permanent one")
+    long: Stress | None = Field(default=None, description="under loads of months; default: permanent")
     medium: Stress | None = Field(default=None, description="the same under loads of weeks; default: the long one")
     short: Stress | None = Field(default=None, description="the same under loads of days; default: the medium one")
     instantaneous: Stress | None = Field(default=None, description="the same under gusts; default: the short one")
