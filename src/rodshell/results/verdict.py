@@ -42,7 +42,11 @@ def verdict(results: Results) -> Verdict:
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}
     usable = [ends for ends, found in faults.items() if not found]
-    deployment = [*_fibre_faults(results, "deployment"), *_contact_faults(results, "deployment")]
+    deployment = [
+        *_fibre_faults(results, "deployment"),
+        *_erection_faults(results),
+        *_contact_faults(results, "deployment"),
+    ]
     grave = [sentence for found in faults.values() for sentence in found] + deployment
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
@@ -111,6 +115,13 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
     yield from _contact_faults(results, ends)
     yield from _fibre_faults(results, ends)
     yield from _load_faults(results, ends)
+
+
+def _erection_faults(results: Results) -> Iterator[str]:
+    """Stress of the deployment above its design strength."""
+    used = results.strength.erection_utilisation if results.strength else None
+    if used is not None and used > 1:
+        yield f"during deployment the rods use {max(101, round(100 * used))} % of their design strength for erection"
 
 
 BY_WORDS = {
