@@ -29,7 +29,7 @@ STATED = (
     "Large displacements and the rods' stresses from bending are in every figure; supports do not yield unless a load "
     "moves them.",
     "Stiffness is the mean one, and not reduced: neither by partial factors nor by creep. Relaxation of bent rods, "
-    "their bearing at bolts, cladding and its stiffness, fatigue, fire and accidental loads are not checked.",
+    "pressure at bolts, cladding and its stiffness, fatigue, fire and accidental loads are not checked.",
 )
 
 
