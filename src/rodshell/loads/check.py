@@ -36,6 +36,7 @@ from rodshell.solve.sparse_ldl import SingularError
 from rodshell.units import shown
 from rodshell.validation import brief
 
+PERMANENT: Duration = "permanent"
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -333,7 +334,7 @@ def loaded_shell(
     bent = bending_under(shell, found.state, structure.rod, forces, limits)
     judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
     used = judged(shell, found.state, forces=forces, duration=duration, bent=bent)
-    erected = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration="permanent")
+    erected = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
     shapes = np.zeros((0, n, 3)) if buckling is None else buckling.shapes[:, :n]
     return LoadedShell(
@@ -369,14 +370,17 @@ def _of_bracing(
         known = preset_limits(bracing.rod, loads.strength.service_class).bending.get(duration)
         force = float(structure.bracing_forces(found).max(initial=0.0))
         return None if known is None else force / (known * area_of(bracing.rod))
-    alone = structure.laths_alone(found)
-    if alone is None or structure.laths is None:
+    if structure.laths is None:
         return None
-    rod, forces = structure.laths.rod, found.forces[len(structure.mesh.edges) :]
+    rod, edges, asked = structure.laths.rod, len(structure.mesh.edges), replace(loads.strength, slip=None)
     of_laths = limits if rod == structure.rod else preset_limits(rod, loads.strength.service_class)
-    asked = replace(loads.strength, slip=None)
-    used = utilisation(*alone, rod, forces=forces, limits=of_laths, asked=asked, duration=duration)
-    return max(used.largest.values(), default=None)
+    shares = list[float]()
+    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # laths stay bent, as rods do
+        alone = structure.laths_alone(state)
+        assert alone is not None
+        used = utilisation(*alone, rod, forces=state.forces[edges:], limits=of_laths, asked=asked, duration=lasting)
+        shares += used.largest.values()
+    return max(shares, default=None)
 
 
 def _with_imperfections(

@@ -10,7 +10,7 @@ from rodshell.output.pictures import mode_picture
 from rodshell.output.schedules import loaded_shells
 from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
-from rodshell.results.loaded import Governs, LoadedShell
+from rodshell.results.loaded import LoadedShell
 from rodshell.results.records import Ends
 from rodshell.results.wording import millimetres, percent, rounded, rounding_of, stress
 from rodshell.units import percent_text
@@ -52,11 +52,8 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
     ]
     return {
         "assumptions": [*_strengths(results), *STATED],
-        "columns": [
-            "Combination", "Ends", "At factor", "Utilisation", "By", "Rod", "From its start",
-            "Deflection", "Span over it", "Largest stress", "Over Euler load",
-        ],
-        "rows": [_row(results, *each) for each in shells],
+        "strength": [_strength(results, *each) for each in shells],
+        "deflection": [_deflection(results, *each) for each in shells],
         "stability": [_stability(*each) for each in shells],
         "modes": pictures,
         "foundations": [_foundation(results, *each) for each in shells],
@@ -75,8 +72,8 @@ def _strengths(results: Results) -> Iterator[str]:
         yield "No design strength is known, and none was judged: give [strength]."
     else:
         yield (
-            f"Design strengths in bending: {known}. Axial strength: {rounded(used.axial or 1.0)} of it, shear "
-            f"strength: {rounded(used.shear or 0.0)} of it. From: {used.source}."
+            f"Design strengths in bending: {known}. In tension and compression {percent(used.axial or 1.0)}, in shear "
+            f"{percent(used.shear or 0.0)} of that. From: {used.source}."
         )
     if used.erection_utilisation is not None:
         yield f"Erection uses at most {percent(used.erection_utilisation)} of {stress(used.erection or 0.0)}."
@@ -86,29 +83,37 @@ def _strengths(results: Results) -> Iterator[str]:
             "they are at first (k_def)."
         )
     else:
-        yield "Creep is not in the figures, and how large it is is not known."
+        yield "Creep is not in the figures; how large it is, is not known of this material."
 
 
-def _row(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
-    place, span = shell.governs, _span(results)
-    deflection = shell.max_deflection
-    over = "" if not deflection or span is None else f"span/{span / deflection:.0f}"
+def _strength(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    place, parts = shell.governs, shell.utilisations
+    each = [None] * 4 if parts is None else [parts.bending, parts.shear, parts.slip, parts.permanent]
+    where = ""
+    if place is not None:
+        at = millimetres(place.at, rounding=rounding_of(results))
+        where = f"{BY.get(place.by or '', place.by or '')}: {place.rod}, {at} from its start"
+    return [
+        name,
+        ends,
+        shell.duration or "",
+        *("not known" if value is None else percent(value) for value in each),
+        where,
+    ]
+
+
+def _deflection(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    deflection, span = shell.max_deflection, _span(results)
     return [
         name,
         ends,
         rounded(shell.at_factor or 0.0),
-        "not known" if shell.utilisation is None else percent(shell.utilisation),
-        "" if place is None else BY.get(place.by or "", place.by or ""),
-        *_place(results, place),
         millimetres(deflection, rounding=rounding_of(results)),
-        over,
-        "" if shell.max_stress is None else stress(shell.max_stress),
+        "" if not deflection or span is None else f"span/{span / deflection:.0f}",
+        "not known" if shell.max_stress is None else stress(shell.max_stress),
         "" if shell.euler is None else percent(shell.euler),
+        "" if shell.euler_at is None else shell.euler_at.rod,
     ]
-
-
-def _place(results: Results, at: Governs | None) -> tuple[str, str]:
-    return ("", "") if at is None else (at.rod, millimetres(at.at, rounding=rounding_of(results)))
 
 
 def _span(results: Results) -> float | None:
@@ -167,7 +172,7 @@ def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> 
 
 
 def _kilo(newtons: float | None) -> str:
-    return f"{1e-3 * (newtons or 0.0):.2f}"
+    return f"{round(1e-3 * (newtons or 0.0), 2) + 0.0:.2f}"
 
 
 def _bracing(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
