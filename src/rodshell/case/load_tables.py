@@ -317,6 +317,19 @@ class StabilityTable(Table):
         return Stability(imperfection=self.imperfection, modes=self.modes)
 
 
+def _service_class(value: object) -> int | None:
+    """1, 2 or 3."""
+    if value is None:
+        return None
+    found = read_quantity(value, "number")
+    if found not in (1, 2, 3):
+        raise ValueError("must be 1 (inside), 2 (covered) or 3 (in the weather)")
+    return int(found)
+
+
+ServiceClass = Annotated[Literal[1, 2, 3], BeforeValidator(_service_class)]
+
+
 class StrengthTable(Table):
     permanent: Stress | None = Field(
         default=None,
@@ -327,7 +340,7 @@ class StrengthTable(Table):
     short: Stress | None = Field(default=None, description="the same under loads of days; default: the medium one")
     instantaneous: Stress | None = Field(default=None, description="the same under gusts; default: the short one")
     erection: Stress | None = Field(default=None, description="the same during deployment; default: the short one")
-    service_class: Literal[1, 2, 3] | None = Field(
+    service_class: ServiceClass | None = Field(
         default=None, description="of timber: 1 inside, 2 covered (default), 3 in the weather"
     )
     hole: Distance = Field(default=0.0, description="diameter of the bolts' holes through the rods at joints")
