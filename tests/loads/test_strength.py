@@ -8,7 +8,7 @@ import pytest
 import rodshell as rs
 from rodshell.checks.loads import cut_forces, reactions
 from rodshell.loads.strength import Limits, Spans, Utilisation, net_section, preset_limits
-from tests.loads.shells import ROPE, TUBE, one, shell
+from tests.loads.shells import ROPE, TUBE, grid, one, shell
 
 TIMBER = rs.Rod(rs.RectangularSection(width=0.035, height=0.05), rs.Material.preset("larch"))
 
@@ -145,6 +145,16 @@ def test_what_governs_is_what_is_used_most() -> None:
     used = Utilisation({"bending": np.array([0.2, 0.6]), "slip": np.array([0.9, 0.0])}, np.zeros(2))
     assert used.governs == ("slip", 0)
     assert Utilisation({}, np.zeros(2)).governs is None
+
+
+def test_a_strength_of_rods_without_fibres_is_refused_in_one_sentence() -> None:
+    bare = rs.Rod(rs.GivenSection(EA=1e7, EI1=2e3, EI2=2e3, GJ=1e3, mass=0.7))
+    form = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), bare, ends="pinned")
+    with pytest.raises(rs.InputError, match="needs fibre_distances and fibre_modulus"):
+        rs.check_loads(form, one(rs.Snow(1.0), strength=rs.Strength(permanent=1e8)))
+    unknown = rs.check_loads(form, one(rs.Snow(1.0)))
+    assert unknown.shells["all"]["pinned"].utilisation is None
+    assert any("whether they break" in sentence for sentence in unknown.warnings)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.checks.bending import require_known_stress, rod_frames
 from rodshell.checks.loads import Reactions
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding import PatchForm, PopUp
@@ -195,7 +196,7 @@ def check_shells(
 
     Raises
     ------
-    InputError : a load does not fit the form.
+    InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
     if stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
@@ -206,6 +207,8 @@ def check_shells(
     stopped, braced = "", np.empty((0, 2), dtype=np.intp)
     try:
         for ends, popped in done.items():
+            if limits.bending:
+                require_known_stress(stages.rod, twisted=rod_frames(popped.shell) is not None)
             structure = _locked(popped, ends, loads, stages)
             braced = structure.braced
             nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
