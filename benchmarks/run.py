@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 
-from benchmarks import earlier, factorisation, jobs, kernels, others, sameness, scaling, startup  # noqa: E402
+from benchmarks import earlier, factorisation, jobs, kernels, others, sameness, scaling, startup, sweeps  # noqa: E402
 from benchmarks.rows import Row, Section, machine  # noqa: E402
 
 SECTIONS: dict[str, Callable[[bool], Section]] = {
@@ -30,6 +30,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "warm": lambda quick: jobs.warm(3 if quick else 9),
     "startup": lambda quick: startup.section(3 if quick else 7),
     "sameness": sameness.sameness,
+    "sweeps": lambda quick: sweeps.sweeps(20 if quick else 100),
     "kernels": lambda _: kernels.kernels(),
     "pyelastica": others.pyelastica,
 }
