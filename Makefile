@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-house accept-sweep house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -43,6 +43,12 @@ accept-paper: ## print the table of the paper's own time stepping (some minutes)
 
 accept-verdict: ## print the table of invalid inputs and verdicts (some minutes)
 	python -m tests.acceptance.verdict
+
+accept-loads: ## print the table of loads and stability
+	python -m tests.acceptance.loads
+
+accept-refine: ## print the table of refinement
+	python -m tests.acceptance.refine
 
 accept-house: ## print the table of results before and after, archives, misuses (ten minutes)
 	python -m tests.acceptance.house

@@ -18,7 +18,7 @@ SIZE = 0.2
 ROD = rs.Rod(rs.Circle(1e-3), rs.Material(1e6, 1e3))
 COARSE = {"layout.rods": "auto", "layout.length": "auto", "layout.spacing": "60 mm", "layout.edge": "20 mm"}
 COARSE |= {"checks.stages": 2}
-ALL = tuple(STAGES)[:-1]  # files are written when they are asked for
+ALL = tuple(stage for stage in STAGES if stage != "refine")[:-1]  # files are written when they are asked for
 SAME = 1e-9 * SIZE  # Newton's last step is shorter than 1e-6 of the size, the error left its square
 
 

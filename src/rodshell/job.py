@@ -366,6 +366,50 @@ def find_form(
     return job.run(warm_start=warm_start, progress=progress, time_limit=time_limit, until="pop-up")
 
 
+def refine(
+    form: Form,
+    vary: str | Sequence[str] = "taper",
+    *,
+    ends: Ends | None = None,
+    ratio: float = 8.0,
+    per: Literal["shell", "family", "rod"] = "shell",
+    varies: Literal["size", "width", "height", "a", "b"] = "size",
+    progress: Progress = silent,
+    time_limit: float | None = None,
+) -> Form:
+    """Bring a form nearer to its target by varying its rods; checks and fabrication are made when first asked for.
+
+    A design is accepted if it lies flat, pops up from flat to the same shape, does not depend on the mesh, and stays
+    stable and near its target when it is built with errors. Where none is, the form is as it was; `Form.refined` says
+    why.
+
+    Parameters
+    ----------
+    form : of a target.
+    vary : families, one or several: "taper" (EI along rods), "double" (two laths over a share of each rod), "tails"
+        (cut lengths), "clamps" (directions of clamped ends), "holes" (joints along rods), "offsets" (of rods).
+    ends : the only end condition of the refined form; None: the first of the form's.
+    ratio : of the largest EI to the smallest along a taper [-].
+    per : one taper for the whole shell, one for each family of rods, or one for each rod.
+    varies : what of the section a taper changes: "size", all its lengths alike, or one of them by its name.
+    progress, time_limit : as of `Job.run`.
+
+    Raises
+    ------
+    InputError : a value is of the wrong kind; the form comes from a table of rods.
+    """
+    instance("form", form, Form, FOUND)
+    if form.from_table:
+        raise InputError("a table of rods has no target to come nearer to: refine the form of a target")
+    asked = form.case.ends
+    end = choice("ends", ends, ENDS) if ends is not None else (asked or ENDS)[0]
+    changes: dict[str, object] = {"vary": vary, "ends": end, "ratio": ratio, "per": per, "varies": varies}
+    job = Job.of_case(form.case).changed({f"refine.{key}": value for key, value in changes.items()})
+    if end not in asked:
+        job = job.changed({"pop_up.ends": end})
+    return job.run(warm_start=form, progress=progress, time_limit=time_limit, until="pop-up")
+
+
 def pop_up_table(
     grid: FlatGrid,
     finals: ArrayLike,

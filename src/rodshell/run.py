@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rodshell.case import Case
 from rodshell.case.case import Built, built
@@ -22,6 +23,10 @@ from rodshell.targets import Target
 from rodshell.targets.patch import Seam
 from rodshell.units import length_text
 
+if TYPE_CHECKING:
+    from rodshell.refining.acceptance import Refined
+    from rodshell.refining.variables import Family
+
 Announce = Callable[[str], None]
 
 STAGES: dict[str, tuple[str, ...]] = {
@@ -29,8 +34,10 @@ STAGES: dict[str, tuple[str, ...]] = {
     "drape": ("layout", "rod", "joint", "drape", "seams"),
     "trim": (),
     "pop-up": ("pop_up",),
+    "refine": ("refine",),
     "checks": ("checks",),
-    "fabrication": ("fabrication",),
+    "fabrication": ("fabrication", "bracing"),
+    "loads": ("loads", "combinations", "stability"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
@@ -85,7 +92,7 @@ class Run:
         case = case.with_rod(found.rod)
         same = self._unchanged(case)
         stages = self._patches(case, found, same) if case.seams.lines else self._one_piece(case, found, same)
-        return self._made(case, stages, searched, same)
+        return self._made(case, stages, searched, same, self._refined(case, stages, same))
 
     def table_form(self) -> Form:
         """Of a table of rods."""
@@ -106,7 +113,7 @@ class Run:
         method = found.method
         if isinstance(method, Fall) and case.drape.frames is not None and case.drape.held is None:
             method = replace(method, stream=self.frames_in / case.drape.frames)
-        earlier = self.earlier.stages if self.earlier is not None else None
+        earlier = self.earlier.unrefined if self.earlier is not None else None
         streams = isinstance(method, Fall) and method.stream is not None
         return find_stages(
             found.target, found.layout, found.rod,
@@ -117,7 +124,7 @@ class Run:
         )  # fmt: skip
 
     def _patches(self, case: Case, found: Built, same: Sequence[str]) -> PatchedForm:
-        earlier = self.earlier.stages if self.earlier is not None else None
+        earlier = self.earlier.unrefined if self.earlier is not None else None
         return find_patched_stages(
             found.target, [Seam.of(line) for line in case.seams.lines], found.layout, found.rod,
             patch_layouts=case.seams.patch_layouts(), joint=found.joint,
@@ -125,6 +132,18 @@ class Run:
             warm_start=earlier if isinstance(earlier, PatchedForm) else None,
             same_drape="trim" in same, progress=self.progress,
         )  # fmt: skip
+
+    def _refined(self, case: Case, stages: Stages, same: Sequence[str]) -> "Refined | None":
+        """The refinement of these stages, where the case asks for one."""
+        vary: tuple[Family, ...] = built(case.refine)
+        if not vary or stages.status != "converged" or not stages.ends:
+            return None
+        earlier = self.earlier
+        if earlier is not None and "refine" in same and _same_pop_ups(stages, earlier.unrefined):
+            return earlier.refined
+        from rodshell.refining.acceptance import refined  # it takes a tenth of a second to load, which few jobs need
+
+        return refined(stages, vary, ends=case.refine.ends, progress=self.progress)
 
     def _decided(self, case: Case, found: Built) -> tuple[Case, Built, Search | None]:
         """The case with anchor and heading, and the search for them, if they are "auto"."""
@@ -154,23 +173,31 @@ class Run:
             eccentricity=found.joint.eccentricity, progress=self.progress,
         )  # fmt: skip
 
-    def _made(self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str]) -> Form:
+    def _made(
+        self, case: Case, stages: Stages, searched: Search | None, same: Sequence[str], better: "Refined | None" = None
+    ) -> Form:
         """The form, with what it takes over from the earlier one."""
-        form = Form(case, self.asked, stages, self.options, self.inputs, searched)
+        built = stages if better is None else better.after
+        form = Form(case, self.asked, built, self.options, self.inputs, searched, better)
         earlier = self.earlier
         if earlier is None:
             return form
         reused = ["target"] if "target" in same else []
-        if _same_drapes(stages, earlier.stages):
+        if _same_drapes(stages, earlier.unrefined):
             reused += [] if form.from_table else ["drape", "trim"]
-            taken = _same_pop_ups(form, earlier)
+            taken = _same_pop_ups(stages, earlier.unrefined)
             reused += ["pop-up"] if taken else []
+            taken = taken and better is earlier.refined
+            reused += ["refine"] if taken and better is not None else []
             checks = earlier.known_checks if taken and "checks" in same else None
             if checks is not None and not checks.stopped:
                 reused += ["checks"]
                 made = earlier.known_fabrication if "fabrication" in same else None
                 reused += ["fabrication"] if made is not None else []
-                form = replace(form, _known_checks=checks, _known_fabrication=made)
+                loaded = earlier.known_loaded if "loads" in same else None
+                loaded = None if loaded is None or loaded.stopped else loaded
+                reused += ["loads"] if "loads" in same and (loaded is not None or not case.loads) else []
+                form = replace(form, _known_checks=checks, _known_fabrication=made, _known_loaded=loaded)
         return replace(form, reused=tuple(reused))
 
     def _unchanged(self, case: Case) -> list[str]:
@@ -224,11 +251,12 @@ def _same_drapes(now: Stages, before: Stages) -> bool:
     return now is before
 
 
-def _same_pop_ups(now: Form, before: Form) -> bool:
+def _same_pop_ups(now: Stages, before: Stages) -> bool:
     """Whether all pop-ups of a form are those of an earlier one, which has no others."""
-    if now.ends != before.ends:
+    pieces = [(form,) if isinstance(form, PatchForm) else tuple(form.patches.values()) for form in (now, before)]
+    if now.ends != before.ends or len(pieces[0]) != len(pieces[1]):
         return False
-    pairs = zip(now.patches, before.patches, strict=True)
+    pairs = zip(*pieces, strict=True)
     return all(
         list(patch.popped) == list(earlier.popped)
         and all(shell is earlier.popped[ends] for ends, shell in patch.popped.items())

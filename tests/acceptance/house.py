@@ -70,12 +70,12 @@ def run(source: Path, folder: Path, *arguments: str) -> int:
     return done.returncode
 
 
-def earlier_source(folder: Path) -> Path:
-    """The checkout of the commit `BEFORE` in `folder`."""
+def earlier_source(folder: Path, commit: str = BEFORE) -> Path:
+    """The checkout of an earlier commit in `folder`."""
     if not folder.exists():
-        done = subprocess.run(["git", "archive", BEFORE, "src", "examples"], cwd=ROOT, capture_output=True, check=False)
+        done = subprocess.run(["git", "archive", commit, "src", "examples"], cwd=ROOT, capture_output=True, check=False)
         if done.returncode:
-            raise SystemExit(f"this checkout has no history back to {BEFORE}: clone it with its history")
+            raise SystemExit(f"this checkout has no history back to {commit}: clone it with its history")
         with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
             archive.extractall(folder, filter="data")
     return folder

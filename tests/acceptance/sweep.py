@@ -108,11 +108,10 @@ def killed_rows(folder: Path, designs: int) -> Iterator[Row]:
             time.sleep(0.05)
         time.sleep(rng.random() * 0.3)
         before = seen | recorded(out)
-        if process.poll() is None and rng.random() < 0.5:
-            workers = [child for child in psutil.Process(process.pid).children() if child.is_running()]
-            if workers:
-                rng.choice(workers).kill()
-                kinds["workers"] += 1
+        workers = psutil.Process(process.pid).children() if process.poll() is None and rng.random() < 0.5 else []
+        if workers:
+            rng.choice(workers).kill()
+            kinds["workers"] += 1
         else:
             process.kill()
             process.wait()

@@ -7,7 +7,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks import reactions, self_weight
-from rodshell.solve.critical import CLOSE
+from rodshell.solve.load_path import CLOSE
 from tests.checks.loaded_twin import LoadedTwin
 from tests.checks.shells import ROD, dome
 

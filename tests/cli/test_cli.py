@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numba
 import numpy as np
 import pytest
 
@@ -61,6 +60,7 @@ class FakeForm:
     options: OutputOptions
     inputs: dict[str, bytes]
     search: Search | None
+    refined: None
 
     told: ClassVar = list[OutputOptions]()
 
@@ -106,7 +106,6 @@ def _elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def finder(monkeypatch: pytest.MonkeyPatch) -> FakeFinder:
     fake = FakeFinder()
     fake.stand_in(monkeypatch)
-    monkeypatch.setattr("rodshell.cli.reporting.compiled_before", lambda: True)
     return fake
 
 
@@ -398,23 +397,6 @@ def test_out_of_time_is_said_as_such(finder: FakeFinder, capsys: pytest.CaptureF
 def test_quiet_says_nothing(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["form", "hemisphere", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
-
-
-def test_the_first_run_announces_the_compilation(
-    finder: FakeFinder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.undo()
-    monkeypatch.chdir(tmp_path)
-    finder.stand_in(monkeypatch)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    numba.config.reload_config()  # type: ignore[attr-defined]
-    assert main(["form", "hemisphere", "--out", "a"]) == 0
-    assert "compiling kernels, once" in capsys.readouterr().err
-    kernel = f"stretch.energy-12.py{sys.version_info.major}{sys.version_info.minor}.nbi"
-    (tmp_path / "kernels" / "rods_1").mkdir(parents=True)
-    (tmp_path / "kernels" / "rods_1" / kernel).write_text("")
-    assert main(["form", "hemisphere", "--out", "b"]) == 0
-    assert "compiling" not in capsys.readouterr().err
 
 
 def test_popup_reads_a_table_in_its_unit(finder: FakeFinder) -> None:

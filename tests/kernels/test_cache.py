@@ -20,15 +20,16 @@ caching.CacheImpl.__init__ = no_locator  # as where neither the package nor a ho
 import os
 os.access = lambda path, mode: not mode & os.W_OK
 import rodshell.geometry.curves
-from rodshell.cli.reporting import announce_compilation
-announce_compilation()
+from rodshell.cli.reporting import compile_before_first
+compile_before_first()
 """
 
 
 def test_kernels_that_cannot_be_kept_are_declared_and_that_is_one_sentence(tmp_path: Path) -> None:
-    ended = subprocess.run([sys.executable, "-c", DECLARED], capture_output=True, text=True, env={**os.environ})
+    environment = {**os.environ, "RODSHELL_KERNELS": "jit"}
+    ended = subprocess.run([sys.executable, "-c", DECLARED], capture_output=True, text=True, env=environment)
     assert ended.returncode == 0, ended.stderr
-    assert ended.stderr.startswith("rodshell: compiling kernels again")
+    assert ended.stderr.startswith("rodshell: kernels are compiled again")
     assert ended.stderr.count("\n") == 1
 
 
@@ -46,6 +47,7 @@ def test_a_folder_counts_that_can_be_written_or_made(monkeypatch: pytest.MonkeyP
 def test_warming_up_what_would_be_lost_is_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr("rodshell.cli.warmup.COMPILED", None)
     monkeypatch.setattr("rodshell.cli.warmup.kernels_are_kept", lambda: False)
     assert main(["warmup"]) == 2
     assert "would be lost: no folder" in capsys.readouterr().err

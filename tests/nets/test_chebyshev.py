@@ -20,7 +20,7 @@ from rodshell.errors import InputError, NetLimitError
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net, geodesics
 from rodshell.nets.compass import march
-from rodshell.nets.net_ends import Cut, Lines, cut_lines, extrapolated, inside_nodes
+from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated, inside_nodes
 from rodshell.targets import Cap, Disc, Ellipsoid, HeightField, Hemisphere, Paraboloid, Rectangle, Target
 from tests.nets.goursat import goursat_ends
 from tests.nets.sphere_net import LIMIT, crossing_angle, sphere_net_end, sphere_net_rod
@@ -296,8 +296,8 @@ def test_error_estimate_on_spheres_is_the_error_before_extrapolation(name):
         offsets, _ = ends_of(net, family)
         rows = np.abs(across - offsets[:, None]).argmin(axis=1)
         (cuts,) = cut_lines(net.target, [Lines(s, lines[rows], mask[rows])])
-        marched = np.array([(cut.start, cut.end) for (cut,) in cuts])
-        worst = max(worst, np.abs(marched - exact_ends(net, offsets)).max())
+        assert cuts.line.tolist() == list(range(len(offsets)))
+        worst = max(worst, np.abs(cuts.ends - exact_ends(net, offsets)).max())
     assert net.error_estimate == pytest.approx(worst, rel=0.03)  # 0.9 % measured where rods graze, else 0.1 %
     assert sphere_error(net) < 0.03 * net.error_estimate  # 0.0085 measured where rods graze, else 0.001
 
@@ -497,17 +497,22 @@ def test_every_piece_of_a_rod_is_cut_at_its_own_ends_and_said(spacing, offset):
 
 
 def test_an_end_that_one_march_alone_has_found_counts_in_the_error():
-    coarse, fine = [Cut(-1.0, 1.004)], [Cut(-1.001, -0.1), Cut(0.1, 1.001)]
-    cuts, error = extrapolated(coarse, fine, step=0.02)
-    assert cuts == [Cut(pytest.approx(-1.0 - 0.004 / 3), -0.1), Cut(0.1, pytest.approx(1.0))]
-    assert error == pytest.approx(0.1)  # half the gap that the coarse march does not see
-    cuts, error = extrapolated(coarse, [Cut(-1.001, 1.001)], step=0.02)
-    assert cuts == [Cut(pytest.approx(-1.0 - 0.004 / 3), pytest.approx(1.0))]
-    assert error == pytest.approx(0.001)
-    cuts, error = extrapolated([], [Cut(0.3, 0.34)], step=0.02)
-    assert cuts == [Cut(0.3, 0.34)]
-    assert error == pytest.approx(0.02)
-    assert extrapolated(coarse, [], step=0.02) == ([], 0.0)
+    """Of line 0 both marches find the ends, of line 1 the finer one finds a gap, of line 3 it alone finds a piece."""
+    coarse = Cuts(np.array([0, 1, 2]), np.array([[-1.0, 1.004]] * 3))
+    ends = [[-1.001, 1.001], [-1.001, -0.1], [0.1, 1.001], [0.3, 0.34]]
+    cuts, errors = extrapolated(coarse, Cuts(np.array([0, 1, 1, 3]), np.array(ends)), 5, step=0.02)
+    assert cuts.of_line(0) == [[pytest.approx(-1.001 - 0.001 / 3), pytest.approx(1.0)]]
+    assert cuts.of_line(1) == [[pytest.approx(-1.001 - 0.001 / 3), -0.1], [0.1, pytest.approx(1.0)]]
+    assert cuts.of_line(3) == [[0.3, 0.34]]
+    # of line 1 half the gap that the coarse march does not see
+    assert errors == pytest.approx([0.001, 0.1, 0.0, 0.02, 0.0])
+
+
+def test_ends_that_would_change_places_are_not_extrapolated():
+    coarse, fine = (Cuts(np.array([0]), np.array([ends])) for ends in ([0.0, 0.002], [0.01, 0.0101]))
+    cuts, errors = extrapolated(coarse, fine, 1, step=0.02)
+    assert cuts.of_line(0) == [[0.01, 0.0101]]
+    assert errors == pytest.approx([0.02])
 
 
 def lines_at(heights: Floats, s: Floats) -> Floats:
@@ -521,24 +526,25 @@ def test_lines_are_cut_wherever_they_cross_the_base():
         (s + 0.83) * (s - 0.76) * (s - 2), -1 + 0 * s,
         -(s + 0.81) * (s + 0.42) * (s - 0.11) * (s - 0.93), -(s + 0.81) * (s + 0.02) * (s - 0.11) * (s - 0.73),
     ])  # fmt: skip
-    ((one, none, *both),) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights, s), heights > 0)])
+    (cuts,) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights, s), heights > 0)])
+    one, none, *both = map(cuts.of_line, range(4))
     # a cubic is its own interpolant; the cubic misses a quartic by h^4 or so: 4e-5 measured, where its slope is small
-    assert one == [(pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13))]
+    assert one == [[pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13)]]
     assert none == []
     assert np.array(both) == pytest.approx(
         np.array([[[-0.81, -0.42], [0.11, 0.93]], [[-0.81, -0.02], [0.11, 0.73]]]), abs=1e-4
     )
     (mirrored,) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights[:, ::-1], s), heights[:, ::-1] > 0)])
-    assert np.array(mirrored[2]) == pytest.approx(np.array([[-0.93, -0.11], [0.42, 0.81]]), abs=1e-4)
+    assert np.array(mirrored.of_line(2)) == pytest.approx(np.array([[-0.93, -0.11], [0.42, 0.81]]), abs=1e-4)
 
 
 def test_a_piece_counts_where_any_of_it_is_deep_enough():
     """With a waist in its middle, 8 mm above the base, and 50 mm beside it."""
     s = np.linspace(-1.0, 1.0, 41)
     heights = (0.81 - s**2) * (0.01 + 0.3 * s**2) * np.array([[1.0], [0.1]])
-    ((deep, grazing),) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights, s), heights > 0)], depth=0.02)
-    assert np.array(deep) == pytest.approx(np.array([[-0.9, 0.9]]), abs=1e-4)
-    assert grazing == []
+    (cuts,) = cut_lines(HEMISPHERE, [Lines(s, lines_at(heights, s), heights > 0)], depth=0.02)
+    assert cuts.line.tolist() == [0]
+    assert cuts.ends == pytest.approx(np.array([[-0.9, 0.9]]), abs=1e-4)
 
 
 @pytest.mark.parametrize("beyond", [1, 2, 3])
@@ -550,8 +556,8 @@ def test_a_line_that_stops_just_past_the_base_is_cut_from_within(beyond):
     first, last = np.flatnonzero(inside)[[0, -1]]
     line = lines_at(heights[None], s)
     line[0, : first - beyond] = line[0, last + 1 + beyond :] = np.nan
-    ((cuts,),) = cut_lines(HEMISPHERE, [Lines(s, line, inside[None])])
-    assert cuts == [(pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13))]
+    (cuts,) = cut_lines(HEMISPHERE, [Lines(s, line, inside[None])])
+    assert cuts.of_line(0) == [[pytest.approx(-0.83, abs=1e-13), pytest.approx(0.76, abs=1e-13)]]
 
 
 # Order

@@ -9,8 +9,9 @@ from scipy.ndimage import label
 import rodshell as rs
 from rodshell.geometry.curves import resampled
 from rodshell.nets import net_extent
+from rodshell.nets.apron import RINGS
 from rodshell.nets.compass import Net, fill_quadrants, march
-from rodshell.nets.net_ends import RINGS, inside_nodes
+from rodshell.nets.net_ends import inside_nodes
 from rodshell.nets.net_extent import Covering, march_covering, wanted_nodes
 from tests.targets.test_nets_on_files import TARGETS as FILES
 

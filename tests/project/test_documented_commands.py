@@ -14,7 +14,10 @@ from rodshell.job import Job
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-QUICK = {"form": ["--only", "csv", "--checks.stages", "0", "--pop_up.ends", "clamped"]}
+QUICK = {
+    "form": ["--only", "csv", "--checks.stages", "0", "--pop_up.ends", "clamped"],
+    "refine": ["--only", "csv", "--checks.stages", "0", "--layout.spacing", "60 mm"],
+}
 """What is added to a command so that it does no more than it must."""
 
 README = [
@@ -60,7 +63,7 @@ def _rods() -> list[str]:
 @pytest.mark.parametrize("line", [*README, *FILES])
 def test_a_documented_command_runs(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(warmup, "JOBS", {})
+    monkeypatch.setattr(warmup, "compile_before_first", lambda quiet: 0)
     _, command, *arguments = shlex.split(line, comments=True)
     assert main([command, *arguments, *([] if "--help" in arguments else QUICK.get(command, []))]) == 0
 

@@ -1,9 +1,9 @@
 """The tables of a case's stages: layout, drape, pop-up, seams, checks, fabrication and drawings."""
 
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from rodshell.case.values import (
     Acceleration,
@@ -23,6 +23,7 @@ from rodshell.case.values import (
     Point,
     PointOrAuto,
     Polylines,
+    Ratio,
     Share,
     Stress,
     Table,
@@ -30,6 +31,7 @@ from rodshell.case.values import (
     Whole,
     polylines,
     unit,
+    words,
 )
 from rodshell.errors import InputError
 from rodshell.units import rounded_down, shown
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.methods import Method
     from rodshell.formfinding.patches import PatchLayout
     from rodshell.layout import GridLayout
+    from rodshell.refining.variables import Family
     from rodshell.targets import Target
 
 
@@ -153,6 +156,35 @@ class PopUpTable(Table):
     ends: Literal["pinned", "clamped", "both"] = Field(
         default="both", description="supports: free to turn, with fixed direction, or one form with each"
     )
+
+
+FAMILIES = ("taper", "double", "tails", "clamps", "holes", "offsets")
+Families = Annotated[tuple[str, ...], BeforeValidator(words(FAMILIES))]
+
+
+class RefineTable(Table):
+    vary: Families = Field(default=(), description=f"what is varied: {', '.join(FAMILIES)}")
+    ends: Literal["pinned", "clamped"] | None = Field(
+        default=None, description="supports of the refined shell; default: the first of pop_up.ends"
+    )
+    ratio: Ratio = Field(default=8.0, description="of the largest EI to the smallest along a taper")
+    per: Literal["shell", "family", "rod"] = Field(
+        default="shell", description="one taper for the shell, one for each family, or for each rod"
+    )
+    varies: Literal["size", "width", "height", "a", "b"] = Field(
+        default="size", description="what of the section a taper changes: all lengths, or one"
+    )
+    offer: Literal["on", "off"] = Field(default="on", description="say of any form what double laths would gain")
+
+    def build(self) -> "tuple[Family, ...]":
+        """The families that are varied."""
+        if not self.vary:
+            return ()
+        from rodshell.refining.refine import FAMILIES as KNOWN
+        from rodshell.refining.stiffness_families import Taper
+
+        taper = Taper(ratio=self.ratio, per=self.per, varies=self.varies)
+        return tuple(taper if name == "taper" else KNOWN[name] for name in self.vary)
 
 
 class PatchTable(Table):

@@ -4,9 +4,10 @@ A reader of a value raises ValueError with the reason, without the key.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date
+from difflib import get_close_matches
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PrivateAttr
@@ -218,6 +219,33 @@ def polylines(value: object) -> tuple[tuple[tuple[float, float], ...], ...]:
     return tuple(tuple(pair(quantity("length"))(point) for point in row) for row in rows)
 
 
+def ratio(value: object) -> float:
+    number = read_quantity(value, "number")
+    if number <= 1:
+        raise ValueError("must be larger than 1, such as 4")
+    return number
+
+
+def words(choices: Sequence[str]) -> Callable[[object], tuple[str, ...]]:
+    """Some of these words, each once: ["a", "b"], or "a, b"."""
+
+    def read(value: object) -> tuple[str, ...]:
+        items = value.split(",") if isinstance(value, str) else value
+        if not isinstance(items, list | tuple) or not all(isinstance(item, str) for item in items):
+            raise ValueError(f"give one or several of {', '.join(choices)}")
+        found = tuple(item.strip() for item in items if item.strip())
+        for word in found:
+            if word not in choices:
+                near = get_close_matches(word, choices, n=1)
+                hint = f": did you mean {near[0]}?" if near else ""
+                raise ValueError(f"{word} is not one of {', '.join(choices)}{hint}")
+        if len(set(found)) < len(found):
+            raise ValueError("give each word once")
+        return found
+
+    return read
+
+
 def iso_date(value: object) -> str:
     """A day as "2026-11-22"; "" for none; TOML's own dates too."""
     try:
@@ -250,6 +278,7 @@ Counts = Annotated[tuple[int, int] | Auto, BeforeValidator(counts)]
 Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], BeforeValidator(polylines)]
 Point3 = Annotated[tuple[float, float, float], BeforeValidator(triple("length"))]
 Angles = Annotated[tuple[float, float, float], BeforeValidator(triple("angle"))]
+Ratio = Annotated[float, BeforeValidator(ratio)]
 Factor = Annotated[float, BeforeValidator(positive("number"))]
 Unit = Annotated[float, BeforeValidator(unit)]
 Stiffness = Annotated[float | Literal["rigid"], BeforeValidator(stiffness)]
@@ -271,4 +300,9 @@ AngleStiffness = Annotated[float, BeforeValidator(positive("rotational stiffness
 Share = Annotated[float, BeforeValidator(not_negative("number"))]
 Density = Annotated[float, BeforeValidator(positive("density"))]
 Acceleration = Annotated[float, BeforeValidator(positive("acceleration"))]
+Pressure = Annotated[float, BeforeValidator(not_negative("pressure"))]
+MassPerArea = Annotated[float, BeforeValidator(not_negative("mass per area"))]
+Forces3 = Annotated[tuple[float, float, float], BeforeValidator(triple("force"))]
+ForcePerLength3 = Annotated[tuple[float, float, float], BeforeValidator(triple("force per length"))]
+KelvinChange = Annotated[float, BeforeValidator(quantity("temperature"))]
 PoissonRatio = Annotated[float, BeforeValidator(poisson_ratio)]

@@ -28,8 +28,8 @@ from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
-from rodshell.solve.critical import MOST_FACTORIZATIONS
 from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.solve.load_path import MOST_FACTORIZATIONS
 from rodshell.units import length_text, stress_text
 from rodshell.validation import brief
 

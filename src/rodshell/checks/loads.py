@@ -27,8 +27,8 @@ from rodshell.geometry.frames import cross, dot, unit
 from rodshell.joints.crossings import LinkerBend, RodNodes
 from rodshell.model import Shell
 from rodshell.rods.elements import Elements
-from rodshell.solve.critical import first_critical
 from rodshell.solve.equilibrium import Equilibrium
+from rodshell.solve.load_path import load_path
 from rodshell.validation import brief
 
 
@@ -275,16 +275,16 @@ def self_weight(
     found : the equilibrium of the shell without loads, its ends held.
     gravity : [m/s2].
     most : largest factor that is looked for.
-    progress : as of `first_critical`.
+    progress : as of `load_path`.
     """
     if not shell.mass[np.unique(shell.stretch.blocks), 2].all():  # joints may have some even then
         return SelfWeight(None, None, "no mass")
     load = np.zeros_like(found.state)
     load[:, 2] = -gravity * shell.mass[:, 2]
-    end = first_critical(found, load, most=most, progress=progress)
-    deflection = None
-    if end.state is not None:
-        moved = shell.positions(end.state) - shell.positions(found.state)
+    end = load_path(found, load, most=most, progress=progress)
+    deflection, whole = None, end.at(1.0)
+    if whole is not None:
+        moved = shell.positions(whole.state) - shell.positions(found.state)
         deflection = float(np.linalg.norm(moved, axis=1).max())
     if end.limit == "none":
         return SelfWeight(None, deflection, "none", end.factorizations)

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rodshell.case import BUILT_IN, load_case
-from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.cli.options import (
+    CaseCommand,
+    RunOptions,
+    case_options,
+    output_options,
+    overrides_of,
+    read_output_options,
+)
 from rodshell.cli.reporting import run_and_deliver
 
 if TYPE_CHECKING:
@@ -31,7 +38,17 @@ def command(name: str, **values: Any) -> int:
     glTF), a surface from Rhino (3dm) or from STEP, or heights (CSV, PNG). Each key of a case file is also an option.
     """
     output = read_output_options(values)
-    case = load_case(name, overrides_of(values))
+    return run_case(load_case(name, overrides_of(values)), name, output)
+
+
+def run_case(case: "Case", name: str, output: RunOptions) -> int:
+    """Run the job of a case and write its form; the exit code.
+
+    Parameters
+    ----------
+    name : of the folder out/NAME.
+    output : where and what to write.
+    """
     from rodshell.results.archive import kept_case, read_inputs
 
     copies = kept_case(case.to_toml(), read_inputs(case.to_toml()), Path())[1]

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from rodshell.cli.options import QUIET
-from rodshell.cli.reporting import FOUND, NOT_CONVERGED, Progress, announce_compilation
+from rodshell.cli.reporting import FOUND, NOT_CONVERGED, Progress, compile_before_first
 
 
 @click.command(epilog="A search file is described in docs/sweeps.md; examples/optimise.toml is one.")
@@ -24,7 +24,7 @@ def command(file: str, out: str | None, report: bool, retry: bool, quiet: bool) 
     from rodshell.sweeps.search import optimise
 
     folder = Path(out) if out else Path("out") / opened(file)[0]
-    announce_compilation(quiet=quiet)
+    compile_before_first(quiet=quiet)
     with Progress(quiet=quiet) as progress:
         found = optimise(file, folder, retry=retry, report=report, progress=progress)
     if not quiet:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rodshell.cli.options import FORCE, QUIET
-from rodshell.cli.reporting import Progress, announce_compilation, deliver, output_folder
+from rodshell.cli.reporting import Progress, compile_before_first, deliver, output_folder
 from rodshell.errors import InputError
 from rodshell.paper import FIGURES, figure_maker, reserved
 
@@ -44,7 +44,7 @@ def command(figure: str, out: str | None, force: bool, as_json: bool, quiet: boo
             stack.enter_context(output_folder(folder, name, reserved(name), force=force))
             for name, folder in zip(names, folders, strict=True)
         ]
-        announce_compilation(quiet=quiet)
+        compile_before_first(quiet=quiet)
         codes = []
         for name, place in zip(names, result_folders, strict=True):  # each is written as soon as it is made
             with Progress(quiet=quiet) as progress:

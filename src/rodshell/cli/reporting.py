@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import click
 
 from rodshell.cli.interruption import Interruption
+from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one"
 SILENCE = 10.0  # s: the longest without a word, away from a terminal
 TICK = 0.5  # s, on a terminal
+BAR = 24  # characters
 FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
 
 
@@ -101,29 +103,31 @@ class Progress:
         click.echo(f"rodshell: {words}", err=True)
 
 
-def announce_compilation(*, quiet: bool = False) -> None:
-    """Before the first run, say what it will wait for; and before each one, where nothing can be kept."""
-    if quiet:
-        return
+def compile_before_first(*, quiet: bool = False) -> int:
+    """Compile the kernels that were not compiled with the wheel or by an earlier run; how many they were.
+
+    Raises
+    ------
+    KeyboardInterrupt : interrupted; what was compiled until then is kept.
+    """
+    if COMPILED is not None or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return 0
     if not kernels_are_kept():
-        click.echo(f"rodshell: compiling kernels again, about 20 s: {UNKEPT}", err=True)
-    elif not compiled_before():
-        click.echo("rodshell: compiling kernels, once, about 20 s (rodshell warmup compiles all in advance)", err=True)
+        if not quiet:
+            click.echo(f"rodshell: kernels are compiled again in this run, about a minute: {UNKEPT}", err=True)
+        return 0
+    from rodshell.kernels.ahead import compile_kernels
 
+    progress = Progress(quiet=quiet)
 
-def compiled_before() -> bool:
-    """Whether an earlier run of this Python left kernels where Numba keeps them."""
-    import numba
-    from numba.misc.appdirs import user_cache_dir
+    def tell(done: int, count: int, seconds: float | None) -> None:
+        if count:
+            bar = "#" * (BAR * done // count)
+            left = f", about {seconds:.0f} s left" if seconds is not None else ""
+            progress("compiling kernels, once", f"[{bar:{BAR}}] {done} of {count}{left}", 0.0)
 
-    import rodshell
-
-    if numba.config.DISABLE_JIT:
-        return True
-    index = f"*.py{sys.version_info.major}{sys.version_info.minor}.nbi"
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    folders = [given] if given else [Path(rodshell.__file__).parent, user_cache_dir("numba", appauthor=False)]
-    return any(next(Path(place).rglob(index), None) for place in folders)
+    with progress:
+        return compile_kernels(tell)
 
 
 class Result(Protocol):
@@ -184,7 +188,7 @@ def run_and_deliver(
 
     reserved_names = ["result.json", "states.npz", *names, *reserved(output.kinds)]
     with output_folder(output.out, name, reserved_names, force=output.force) as place:
-        announce_compilation(quiet=output.quiet)
+        compile_before_first(quiet=output.quiet)
         from rodshell.job import Job
 
         progress = Progress(quiet=output.quiet)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rodshell.cli.options import QUIET
-from rodshell.cli.reporting import FOUND, NOT_CONVERGED, Progress, announce_compilation
+from rodshell.cli.reporting import FOUND, NOT_CONVERGED, Progress, compile_before_first
 
 if TYPE_CHECKING:
     from rodshell.sweeps.plan import Plan
@@ -32,7 +32,7 @@ def command(file: str, out: str | None, dry_run: bool, report: bool, retry: bool
     folder = Path(out) if out else Path("out") / plan.name
     if dry_run:
         return _dry_run(plan, folder)
-    announce_compilation(quiet=quiet)
+    compile_before_first(quiet=quiet)
     with Progress(quiet=quiet) as progress:
         found = sweep(file, folder, retry=retry, report=report, progress=progress)
     if not quiet:

@@ -1,37 +1,28 @@
-"""`rodshell warmup`: compile every kernel ahead, so that the first form does not wait for it.
-
-Numba compiles a kernel at its first call and keeps the machine code on disk. So warming up is to run one small job of
-each kind; those whose kernels were kept by an earlier run are over at once.
-"""
+"""`rodshell warmup`: compile every kernel now, so that the first form does not wait for it."""
 
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import click
 
 from rodshell.cli.options import QUIET
-from rodshell.cli.reporting import UNKEPT, Progress
+from rodshell.cli.reporting import UNKEPT, compile_before_first
 from rodshell.errors import InputError
+from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
-
-if TYPE_CHECKING:
-    from rodshell.layout import GridLayout
-    from rodshell.rods.section import Rod
 
 
 @click.command()
 @QUIET
 def command(quiet: bool) -> int:
-    """Compile all kernels now, once, instead of in the first job of each kind.
+    """Compile all kernels now, once, instead of before the first job.
 
-    It takes one or two minutes after an installation; later there is nothing to compile. It is optional: without it,
-    each job compiles what it needs.
+    It is of use where rodshell was installed without compiled kernels, and takes about a minute; later there is nothing
+    to compile. It is optional: without it, the first job begins with it.
     """
-    if not kernels_are_kept():
+    if COMPILED is None and not kernels_are_kept():
         raise InputError(f"kernels compiled now would be lost: {UNKEPT}")
     begin = time.perf_counter()
-    compiled = warm_up(Progress(quiet=quiet))
+    compiled = compile_before_first(quiet=quiet)
     if quiet:
         return 0
     if compiled:
@@ -39,124 +30,3 @@ def command(quiet: bool) -> int:
     else:
         click.echo("nothing to do: all kernels were compiled before")
     return 0
-
-
-def warm_up(progress: Progress) -> int:
-    """Run all jobs; how many kernels were compiled for it. Each kernel is named on `progress`."""
-    from numba.core import event
-
-    class Heard(event.Listener):  # type: ignore[misc, unused-ignore]
-        """Counts compilations, and reports each as it begins; what a kernel calls is compiled within it."""
-
-        depth = count = 0
-        stage = ""
-
-        def on_start(self, heard: event.Event) -> None:
-            kernel = heard.data["dispatcher"].py_func
-            if self.depth == 0 and kernel.__module__.startswith("rodshell"):
-                self.count += 1
-                progress(self.stage, f"compiling {kernel.__name__.strip('_')}", 0.0)
-            self.depth += 1
-
-        def on_end(self, heard: event.Event) -> None:
-            self.depth -= 1
-
-    heard = Heard()
-    with progress, event.install_listener("numba:compile", heard):
-        for k, (name, job) in enumerate(JOBS.items(), start=1):
-            heard.stage = f"warm-up {k} of {len(JOBS)}, {name}"
-            progress(heard.stage, "running", 0.0)
-            job()
-    return heard.count
-
-
-def _forms() -> None:
-    import rodshell as rs
-
-    target = rs.Hemisphere(radius=0.2)
-    layout = rs.GridLayout.orthogonal(spacing=0.06, edge=0.02)
-    form = rs.find_form(target, layout, _rod())
-    rs.find_form(target, layout, _rod(), warm_start=form)
-    rs.find_form(rs.HeightField(formula="0.1 - x**2 - y**2", domain=rs.Rectangle((0.4, 0.3))), layout, _rod())
-
-
-def _joints() -> None:
-    from math import inf
-
-    import rodshell as rs
-
-    target, rod = rs.Hemisphere(radius=0.2), _rod()
-    layout = rs.GridLayout.orthogonal(rods=(5, 5), spacing=0.06, length=0.7, edge=0.02)
-    trimmed = rs.trim(rs.drape(layout, rod, target))
-    stiff = rs.Spring(shear=1e-5, out_of_plane=inf, twist=inf)
-    lath = rs.Rod(rs.RectangularSection(width=2e-3, height=1e-3), rod.material)
-    for joint, of in ((rs.Pin(), rod), (stiff, lath), (rs.Linker(), rod), (rs.Pin(eccentricity=2e-3), rod)):
-        rs.pop_up(rs.map_back(trimmed), trimmed.boundary, of, ends="clamped", joint=joint)
-
-
-def _meshes() -> None:
-    import numpy as np
-
-    import rodshell as rs
-
-    count = 24
-    across = np.linspace(-0.2, 0.2, count)
-    x, y = (axis.ravel() for axis in np.meshgrid(across, across))
-    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
-    faces = np.column_stack([corner, corner + 1, corner + count + 1, corner, corner + count + 1, corner + count])
-    points = np.column_stack([x, y, 0.15 - 1.5 * x**2 - y**2])
-    target = rs.Freeform.of(points, faces.reshape(-1, 3))
-    rs.find_form(target, rs.GridLayout.orthogonal(spacing=0.07, edge=0.035), _rod())
-    target.contact(points)
-
-
-def _gravity() -> None:
-    import rodshell as rs
-
-    rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method=rs.Gravity())
-
-
-def _falls() -> None:
-    import rodshell as rs
-
-    couplings = (rs.SharedDofs(), rs.ImplicitPenalty(), rs.ExplicitPenalty())
-    for coupling in couplings:
-        for joint in (rs.Ball(), rs.Linker()):
-            step = 1e-4 if isinstance(coupling, rs.ExplicitPenalty) else 5e-3
-            fall = rs.Fall(coupling=coupling, duration=8 * step, time_step=step)
-            rs.drape(_few(), _rod(), rs.Hemisphere(radius=0.2), method=fall, joint=joint)
-    rubbing = rs.Fall(friction=0.3, duration=0.2, time_step=1e-2, height=1e-3)
-    rs.drape(_few(), _rod(), rs.Ellipsoid(a=0.2, b=0.15, c=0.12), method=rubbing)
-
-
-def _single_rods() -> None:
-    import numpy as np
-
-    import rodshell as rs
-
-    straight = np.linspace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 12)
-    round_section, oval = rs.Circle(radius=2e-3), rs.Ellipse(a=3e-3, b=2e-3)
-    for section, twist in ((round_section, False), (round_section, True), (oval, True)):
-        kind = rs.Rod(section, rs.Material(youngs_modulus=1e7, density=1e3))
-        rod = rs.ElasticRod.of(straight, kind, clamped=("start",), twist=twist)
-        rs.solve_rod(rod, loads=rs.RodLoads(forces={-1: (0.0, 0.0, -1e-4)}))
-        motion = rs.Motion.of(rod, forces=(rs.GravityForce(rod.nodes),))
-        rs.simulate(motion, rod.state(), until=4e-3, step=1e-3)
-
-
-def _rod() -> "Rod":
-    import rodshell as rs
-
-    return rs.Rod(rs.Circle(radius=1e-3), rs.Material(youngs_modulus=1e6, density=1e3))
-
-
-def _few() -> "GridLayout":
-    import rodshell as rs
-
-    return rs.GridLayout.orthogonal(rods=(3, 3), spacing=0.06, length=0.7, edge=0.06)
-
-
-JOBS: dict[str, Callable[[], None]] = {
-    "forms": _forms, "joints": _joints, "meshes": _meshes, "gravity": _gravity, "falls": _falls,
-    "single rods": _single_rods,
-}  # fmt: skip

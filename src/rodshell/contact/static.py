@@ -33,12 +33,12 @@ class BoundToTarget:
     __repr__ = brief
 
     @cached_property
-    def _surface(self) -> "_LatestSurface":
-        return _LatestSurface(self.target)
+    def _latest(self) -> "_Latest":
+        return _Latest(self)
 
     def freedom(self, state: Floats) -> Freedom:
         """The free directions of the nodes (n, 3) [m]."""
-        return Freedom(_tangents(self._surface.at(state).normal, self.guides), self.count)
+        return self._latest.at(state).freedom
 
     def curvature(self, state: Floats, gradient: Floats) -> Floats:
         """(n, 3, 3) what the surface's curvature adds to the Hessian for a `gradient` (n, 3) [N].
@@ -48,7 +48,7 @@ class BoundToTarget:
         state : (n, 3) nodes [m].
         gradient : (n, 3) of the energy there [N].
         """
-        surface = self._surface.at(state)
+        surface = self._latest.at(state).surface
         return -dot(surface.normal, gradient)[:, None, None] * surface.hessian
 
     def remaining(self, state: Floats) -> Floats | None:
@@ -67,21 +67,31 @@ class BoundToTarget:
         state : (n, 3) nodes [m].
         gradient : (n, 3) of the energy there [N].
         """
-        return dot(self._surface.at(state).normal, gradient)
+        return dot(self._latest.at(state).surface.normal, gradient)
 
 
-class _LatestSurface:
-    """Normals and curvature of a target at the latest state: a solver needs them several times at each state."""
+class _Latest:
+    """Free directions and curvature at the latest state: a solver needs them several times at each state."""
 
-    def __init__(self, target: Target) -> None:
-        self._target = target
-        self._points = np.empty((0, 3))
-        self._gap = target.on_surface(self._points)
+    def __init__(self, bound: BoundToTarget) -> None:
+        self._bound, self._points = bound, np.empty((0, 3))
 
-    def at(self, points: Floats) -> Gap:
+    def at(self, points: Floats) -> "_Latest":
+        """This, at `points` (n, 3) [m]."""
         if not np.array_equal(points, self._points):
-            self._points, self._gap = points.copy(), self._target.on_surface(points)
-        return self._gap
+            self._points = points.copy()
+            self.__dict__.pop("freedom", None)
+            self.__dict__.pop("surface", None)
+        return self
+
+    @cached_property
+    def freedom(self) -> Freedom:
+        bound = self._bound
+        return Freedom(_tangents(bound.target.level(self._points)[1], bound.guides), bound.count)
+
+    @cached_property
+    def surface(self) -> Gap:
+        return self._bound.target.on_surface(self._points)
 
 
 @dataclass(frozen=True, eq=False)

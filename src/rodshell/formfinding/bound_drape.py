@@ -6,7 +6,7 @@ result does not depend on scale or material. The axes and the anchor are held, a
 from the net's lines with their ends corrected, close to the final rods.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import degrees
 
@@ -17,15 +17,15 @@ from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.geometry.frames import dot
+from rodshell.geometry.frames import dot, unit
 from rodshell.joints import Joint
 from rodshell.kernels import njit
 from rodshell.layout import FlatRod, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import whole_rods
-from rodshell.layout.mesh import nodes_along
+from rodshell.layout.mesh import entries_along
 from rodshell.model import Shell
 from rodshell.nets import ChebyshevNet, chebyshev_net
-from rodshell.nets.net_ends import with_apron
+from rodshell.nets.apron import with_apron
 from rodshell.rods.elements import Stretch
 from rodshell.rods.section import GivenSection, Rod
 from rodshell.solve.equilibrium import MOST_ITERATIONS, STRAIN_TOLERANCE, Equilibrium, SolveReport, find_equilibrium
@@ -67,13 +67,13 @@ def bound_drape(
     near = warm_start.net if warm_start else None
     net = chebyshev_net(target, layout, anchor=anchor, warm_start=near, eccentricity=eccentricity)
     grid = with_apron(net.rods, net.net, net.lines, CLEARANCE * layout.edge)
-    cuts = [list[FlatRod]() for _ in grid.rods]
-    for whole, piece in zip(whole_rods(grid.rods, net.rods), net.rods, strict=True):
-        cuts[whole].append(piece)
-    mesh = mesh_grid(grid, layout.edge, marks=[[s for cut in pieces for s in (cut.start, cut.end)] for pieces in cuts])
-    start = np.empty((mesh.node_count, 3))
-    for k, line in enumerate(grid.rods):
-        start[mesh.nodes_of(k)] = net.positions(line, mesh.stations[mesh.rod_slice(k)])
+    whole = whole_rods(grid.rods, net.rods)
+    marks: list[list[float]] = [[] for _ in grid.rods]
+    for rod_of, piece in zip(whole.tolist(), net.rods, strict=True):
+        marks[rod_of] += (piece.start, piece.end)
+    mesh = mesh_grid(grid, layout.edge, marks=marks)
+    on_rods = entries_along(mesh, net.rods, whole)
+    start = net.node_positions(mesh)
     rod_within = _within_surface(rod)
     shell, corrected = Shell.of(mesh, rod_within), corrected_ends(target, mesh, start)
     problem = Problem(
@@ -88,11 +88,11 @@ def bound_drape(
         problem, target, mesh, corrected, eccentricity,
         progress=lambda k, step: progress("drape", f"bound, iteration {k} of at most {MOST_ITERATIONS}", step),
     )  # fmt: skip
-    on_target = _nodes_on_target(mesh, cuts)
+    touching = np.zeros(mesh.node_count, dtype=bool)
+    touching[mesh.rod_nodes[on_rods[1]]] = True
+    on_target = np.flatnonzero(touching)
     pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
     warnings = [*target.warnings, *net.warnings]
-    touching = np.zeros(mesh.node_count, dtype=bool)
-    touching[on_target] = True
     edges, bends = (np.asarray(touching[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
     strong = strong_bending(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
     if strong is not None:
@@ -113,11 +113,11 @@ def bound_drape(
             "the joints there nearly close; another anchor or heading, a smaller part or a seam may open them"
         )
     figures = DrapeFigures(
-        max_gap=float(np.abs(target.distance(found.state[on_target])).max()),
+        max_gap=_largest_gap(target, found.state[on_target]),
         contact_pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
         min_angle=net.min_angle,
         min_angle_at=net.min_angle_at,
-        net_deviation=_net_deviation(target, mesh, cuts, found.state),
+        net_deviation=_net_deviation(target, mesh, net.rods, whole, on_rods, found.state),
         strong_bending=strong,
     )
     return Draped(
@@ -198,7 +198,7 @@ def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
     """All nodes on the target; those of the two axes are held on their lines, and the anchor at its point."""
     count = np.full(mesh.node_count, 2, dtype=np.intp)
     guides = np.tile([1.0, 0.0, 0.0], (mesh.node_count, 1))
-    guides[np.abs(target.on_surface(start).normal[:, 0]) > 0.7] = [0.0, 1.0, 0.0]
+    guides[np.abs(unit(target.level(start)[1])[:, 0]) > 0.7] = [0.0, 1.0, 0.0]
     for k, line in enumerate(mesh.grid.rods):
         if line.offset == 0.0:
             nodes = mesh.nodes_of(k)
@@ -207,13 +207,10 @@ def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
     return BoundToTarget(target, count, guides)
 
 
-def _nodes_on_target(mesh: GridMesh, cuts: list[list[FlatRod]]) -> Ints:
-    """Nodes between the ends of the rods: all but the apron's."""
-    whole = np.repeat(np.arange(len(cuts)), [len(pieces) for pieces in cuts])
-    _, _, nodes = nodes_along(mesh, [cut for pieces in cuts for cut in pieces], whole)
-    between = np.zeros(mesh.node_count, dtype=bool)
-    between[nodes] = True
-    return np.flatnonzero(between)
+def _largest_gap(target: Target, points: Floats) -> float:
+    """Largest distance of points (n, 3) from the target they were moved onto, to first order [m]."""
+    value, gradient = target.level(points)
+    return float(np.abs(value / np.linalg.norm(gradient, axis=1)).max())
 
 
 def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[str]:
@@ -229,18 +226,33 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
     ]
 
 
-def _net_deviation(target: Target, mesh: GridMesh, cuts: list[list[FlatRod]], positions: Floats) -> Floats:
-    """(k, 2) how far past both ends of each rod this state crosses the target's end, along the rod [m]."""
-    windows, offsets = list[Ints](), list[Floats]()
-    for k, pieces in enumerate(cuts):
-        s, nodes = mesh.stations[mesh.rod_slice(k)], mesh.nodes_of(k)
-        for end in (end for cut in pieces if not cut.virtual for end in (cut.start, cut.end)):
-            first = min(max(int(np.searchsorted(s, end)) - 1, 0), max(len(s) - 3, 0))
-            three = np.minimum(first + np.arange(3), len(s) - 1)
-            windows.append(nodes[three])
-            offsets.append(s[three] - end)
-    x = np.array(offsets).T
-    f = target.margin(positions[np.concatenate(windows)]).reshape(-1, 3).T
+def _net_deviation(
+    target: Target,
+    mesh: GridMesh,
+    rods: Sequence[FlatRod],
+    whole: Ints,
+    on_rods: tuple[Ints, Ints],
+    positions: Floats,
+) -> Floats:
+    """(k, 2) how far past both ends of each rod that is built this state crosses the target's end, along the rod [m].
+
+    Parameters
+    ----------
+    rods, whole : as cut by the net, and the rod of the mesh that each belongs to.
+    on_rods : see `entries_along`.
+    positions : (n, 3) of the mesh's nodes [m].
+    """
+    rod, entry = on_rods
+    starts = np.searchsorted(rod, np.arange(len(rods) + 1))
+    nodes = entry[np.column_stack([starts[:-1], starts[1:] - 1])]  # those at both ends
+    ends = np.array([(piece.start, piece.end) for piece in rods])
+    built = np.flatnonzero([not piece.virtual for piece in rods])
+    nodes, ends, whole = nodes[built].ravel(), ends[built].ravel(), np.repeat(whole[built], 2)
+    first, last = mesh.rod_start[whole], mesh.rod_stop[whole] - 1
+    window = np.maximum(np.minimum(nodes - (mesh.stations[nodes] >= ends), last - 2), first)
+    three = np.minimum(window + np.arange(3)[:, None], last)
+    x = mesh.stations[three] - ends
+    f = target.margin(positions[mesh.rod_nodes[three.ravel()]]).reshape(3, -1)
     slope = (f[1] - f[0]) / (x[1] - x[0])  # Newton's parabola through three nodes
     bend = np.zeros_like(slope)
     bent = x[2] > x[1]
@@ -280,7 +292,7 @@ def corrected_ends(target: Target, mesh: GridMesh, points: Floats) -> Floats:
     """
     joint = np.zeros(mesh.node_count, dtype=bool)
     joint[mesh.joint_nodes] = True
-    normal = target.on_surface(points).normal
+    normal = unit(target.level(points)[1])
     result = points.copy()
     rods = np.flatnonzero([rod.offset != 0.0 for rod in mesh.grid.rods])
     _correct(points, normal, mesh.rod_nodes, mesh.rod_start[rods], mesh.rod_stop[rods], mesh.stations, joint, result)

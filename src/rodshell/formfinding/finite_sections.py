@@ -136,7 +136,7 @@ def thickness_warnings(
     spacing : of the rods [m].
     """
     thick = rod_thickness(rod)
-    normal, (a, b) = target.on_surface(positions).normal, mesh.edges[edges].T
+    normal, (a, b) = unit(target.level(positions)[1]), mesh.edges[edges].T
     chord = positions[b] - positions[a]
     bent = thick * dot(normal[b] - normal[a], chord) / dot(chord, chord)
     if not (np.abs(bent).max(initial=0.0) > THICK or thick > CLOSE * spacing):

@@ -111,7 +111,7 @@ def trim(draped: Draped, *, fewest: int = FEWEST_JOINTS) -> Trimmed:
         raise InputError(
             f"no rod of the grid has {fewest} joints on the target: use a smaller spacing or a larger target"
         )
-    mesh, nodes = cut_mesh(source, kept.rods, margin=margin)
+    mesh, nodes = cut_mesh(source, kept)
     positions = positions[nodes]
     normals: Floats | None = None
     if draped.eccentricity:

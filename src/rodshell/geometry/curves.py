@@ -56,12 +56,14 @@ def on_curve(knots: Floats, points: Floats, s: Floats) -> Floats:
 
 @njit()
 def _on_curve(knots, points, s):  # type: ignore[no-untyped-def]
-    window = _nearest(knots, s)
-    near, around = np.empty(window.shape), np.empty((*window.shape, points.shape[1]))
-    for n in range(window.shape[0]):
-        for k in range(window.shape[1]):
-            near[n, k] = knots[window[n, k]]
-            around[n, k] = points[window[n, k]]
+    count, axes = min(4, len(knots)), points.shape[1]
+    near, around = np.empty((len(s), count)), np.empty((len(s), count, axes))
+    for n in range(len(s)):
+        first = min(max(_right_of(knots, s[n]) - count // 2, 0), len(knots) - count)
+        for k in range(count):
+            near[n, k] = knots[first + k]
+            for d in range(axes):
+                around[n, k, d] = points[first + k, d]
     return lagrange(near, around, s)
 
 
@@ -84,8 +86,10 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
     """
     count, lines, spare, most = len(knots), points.shape[1], len(s), min(4, len(knots))
     result = np.empty((lines, len(s), 3))
-    right, windows, shares = np.searchsorted(knots, s), np.empty(len(s), dtype=np.intp), np.empty((spare + 1, 4))
+    right, windows = np.empty(len(s), dtype=np.int64), np.empty(len(s), dtype=np.int64)
+    shares = np.empty((spare + 1, 4))
     for n in range(len(s)):
+        right[n] = _right_of(knots, s[n])
         windows[n] = _window(knots, s[n], right[n], 0, count - 1, shares, n)
     for m in range(lines):
         first, last = origin, origin
@@ -125,16 +129,16 @@ def _window(knots, at, right, first, last, shares, row):  # type: ignore[no-unty
 
 
 @njit()
-def _nearest(knots, s):  # type: ignore[no-untyped-def]
-    """(n, 4) the knots around each `s` (n,), or all if there are fewer."""
-    count = min(4, len(knots))
-    window = np.empty((len(s), count), dtype=np.intp)
-    right = np.searchsorted(knots, s)
-    for n in range(len(s)):
-        first = min(max(right[n] - count // 2, 0), len(knots) - count)
-        for k in range(count):
-            window[n, k] = first + k
-    return window
+def _right_of(knots, at):  # type: ignore[no-untyped-def]
+    """How many knots are before `at`; all if it is not a number."""
+    low, high = 0, len(knots)
+    while low < high:
+        middle = (low + high) // 2
+        if knots[middle] < at or np.isnan(at):
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 def closed_loops(strokes: Iterable[Floats]) -> list[Floats]:

@@ -15,6 +15,8 @@ from importlib.machinery import ExtensionFileLoader, ModuleSpec
 from importlib.util import module_from_spec
 from typing import Any
 
+from rodshell.errors import InputError
+
 Kernel = Callable[..., Any]
 
 PACKAGE = "rodshell."
@@ -72,12 +74,16 @@ def _compiled() -> tuple[dict[str, Kernel] | None, str]:
     if chosen == "jit" or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return None, ""
     folder = chosen or os.path.dirname(__file__)
-    found = [name for name in sorted(os.listdir(folder)) if name.startswith("compiled_")]
+    found = [
+        name for name in (sorted(os.listdir(folder)) if os.path.isdir(folder) else ()) if name.startswith("compiled_")
+    ]
     for level in levels_here() if found else ():
         libraries = [name for name in found if name.startswith(library_name(level, 0)[:-1])]
         if libraries:
             loaded = (_load(os.path.join(folder, file)) for file in libraries)
             return {name: kernel for library in loaded for name, kernel in library.items()}, level
+    if chosen:
+        raise InputError(f"no kernels for this processor in RODSHELL_KERNELS={chosen}")
     return None, ""
 
 

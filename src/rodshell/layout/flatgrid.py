@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from reprlib import repr as short
 from typing import Literal
 
@@ -80,16 +81,6 @@ class FlatRod:
         """Flat positions (..., 2) [m] at the material coordinates `s` (...) [m]."""
         return np.asarray(np.asarray(self.origin) + np.asarray(s, dtype=float)[..., None] * np.asarray(self.direction))
 
-    @property
-    def line(self) -> tuple[object, ...]:
-        """Key of the line that the rod is on, which does not depend on its ends."""
-        return self.family, self.offset, self.origin, self.direction
-
-    def contains(self, piece: "FlatRod") -> bool:
-        """Whether another rod is this one or a piece of it."""
-        tiny = 1e-9 * self.length
-        return self.line == piece.line and self.start - tiny <= piece.start and piece.end <= self.end + tiny
-
     def cut(self, start: float, end: float) -> "FlatRod":
         """The same rod with other ends.
 
@@ -97,10 +88,11 @@ class FlatRod:
         ----------
         start, end : material coordinates of the new ends [m].
         """
-        return replace(self, start=start, end=end)
+        line = self.name, self.family, self.offset, start, end, self.origin, self.direction
+        return FlatRod(*line, self.virtual, self.profile)
 
 
-def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:
+def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
     """Find the rods that pieces of rods belong to.
 
     Parameters
@@ -110,22 +102,31 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> list[int]:
 
     Returns
     -------
-    The index of the whole rod of each piece.
+    (m,) the index of the whole rod of each piece.
 
     Raises
     ------
     ValueError : a piece belongs to no rod.
     """
-    on_line: dict[tuple[object, ...], list[int]] = {}
-    for k, rod in enumerate(rods):
-        on_line.setdefault(rod.line, []).append(k)
-    found = []
-    for piece in pieces:
-        whole = [k for k in on_line.get(piece.line, []) if rods[k].contains(piece)]
-        if not whole:
-            raise ValueError(f"{piece.name} is not a piece of any rod")
-        found.append(whole[0])
-    return found
+    (line, start, end), (of_piece, begin, stop) = _lines(rods), _lines(pieces)
+    tiny = 1e-9 * (end - start)
+    holds = (start - tiny <= begin[:, None]) & (stop[:, None] <= end + tiny)
+    for whole, piece in zip(line, of_piece, strict=True):
+        holds &= whole == piece[:, None]
+    found = holds.argmax(axis=1)
+    lost = ~holds[np.arange(len(pieces)), found]
+    if lost.any():
+        raise ValueError(f"{pieces[int(lost.argmax())].name} is not a piece of any rod")
+    return np.asarray(found)
+
+
+def _lines(rods: Sequence[FlatRod]) -> tuple[Floats, Floats, Floats]:
+    """The line of each rod, as (6, m) numbers that are equal on one line, and its start and end (m,) [m]."""
+    families = {"u": 0.0, "v": 1.0, "free": 2.0}
+    table = np.array(
+        [(families[rod.family], rod.offset, *rod.origin, *rod.direction, rod.start, rod.end) for rod in rods]
+    ).reshape(-1, 8)
+    return table.T[:6], table[:, 6], table[:, 7]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +173,11 @@ class FlatGrid:
 
     rods: tuple[FlatRod, ...]
     crossings: Crossings
+
+    @cached_property
+    def ends(self) -> Floats:
+        """(m, 2) material coordinates of start and end of each rod [m]."""
+        return np.array([(rod.start, rod.end) for rod in self.rods]).reshape(-1, 2)
 
     @staticmethod
     def of(rods: Sequence[FlatRod], *, margin: float = 0.0) -> "FlatGrid":

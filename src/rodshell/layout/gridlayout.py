@@ -178,8 +178,8 @@ class GridLayout:
             offsets = whole.offsets(family)
             assert offsets is not None
             rods += [
-                make(rod_name(family, k, len(offsets)), float(c), middle - length / 2, middle + length / 2)
-                for k, c in enumerate(offsets)
+                make(name, c, middle - length / 2, middle + length / 2)
+                for name, c in zip(rod_names(family, len(offsets)), offsets.tolist(), strict=True)
             ]
         return FlatGrid.of(rods)
 
@@ -215,13 +215,13 @@ def _counts(rods: object) -> tuple[int, int]:
     return int(first), int(second)
 
 
-def rod_name(family: Family, index: int, count: int) -> str:
-    """Name of a rod: U01, U02, ... in ascending offset.
+def rod_names(family: Family, count: int) -> list[str]:
+    """Names of the rods of a family: U01, U02, ... in ascending offset.
 
     Parameters
     ----------
-    family : the rod's family.
-    index : the rod's position in its family, from 0.
+    family : of the rods.
     count : number of rods of the family, which determines the number of digits.
     """
-    return f"{family.upper()}{index + 1:0{max(2, len(str(count)))}d}"
+    letter, digits = family.upper(), max(2, len(str(count)))
+    return [f"{letter}{k + 1:0{digits}d}" for k in range(count)]

@@ -234,7 +234,7 @@ def _fixed_points(
     rank = np.concatenate([np.zeros(len(once), dtype=np.intp), 1 + np.arange(len(added))])  # the lowest is kept
     order = np.lexsort((rank, s, rod))
     rod, s, nodes, rank = rod[order], s[order], nodes[order], rank[order]
-    tiny = 1e-9 * np.array([rod.length for rod in grid.rods])
+    tiny = 1e-9 * (grid.ends[:, 1] - grid.ends[:, 0])
     near = (rod[1:] == rod[:-1]) & (s[1:] - s[:-1] <= tiny[rod[1:]])
     group = np.cumsum(np.append(0, ~near))  # points of a rod at one place: the first is kept, and every joint
     first = np.full(group[-1] + 1, len(rank))
@@ -245,24 +245,23 @@ def _fixed_points(
     return rod[~out], s[~out], nodes[~out], joints + len(fresh)
 
 
-def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple[GridMesh, Ints]:
+def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
     """Cut a part out of a mesh.
 
-    Joints too close to an end of either rod are not made: each rod keeps its own node there, unless that would be so
-    close to the end that it makes an edge far shorter and stiffer than the other edges.
+    Where a joint of the mesh is not in the part, because it is too close to an end, each rod keeps its own node, unless
+    that would be so close to the end that it makes an edge far shorter and stiffer than the other edges.
 
     Parameters
     ----------
     mesh : to be cut.
-    rods : pieces of its rods, cut at nodes.
-    margin : smallest distance of a joint from the ends of its rods [m].
+    grid : pieces of its rods, cut at nodes, and their joints.
 
     Returns
     -------
     The part, and its nodes (n,) in `mesh`.
     """
-    index, count = np.array(whole_rods(mesh.grid.rods, rods)), len(mesh.grid.rods)
-    grid = FlatGrid.of(rods, margin=margin)
+    rods, count = grid.rods, len(mesh.grid.rods)
+    index = whole_rods(mesh.grid.rods, rods)
     pairs = np.sort(index[grid.crossings.rods], axis=1) @ [count, 1]
     known = np.append(mesh.grid.crossings.rods @ [count, 1], -1)  # the last is not a pair: there may be none
     order = np.argsort(known, kind="stable")
@@ -273,13 +272,17 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     rank = np.argsort(np.argsort(first))  # joints keep the order of the crossings
     joint = rank[joint]
     shared = mesh.joint_nodes[found[kept]][np.sort(first)]
-    piece, s, node = nodes_along(mesh, rods, index)
+    piece, entry = entries_along(mesh, rods, index)
+    s, node = mesh.stations[entry], mesh.rod_nodes[entry]
     node_of = np.full(len(mesh.flat), -1)
     node_of[shared] = np.arange(len(shared))
     joined = np.isin(piece * mesh.node_count + node, (grid.crossings.rods * mesh.node_count + shared[joint][:, None]))
     starts = np.searchsorted(piece, np.arange(len(rods) + 1))
     from_end = np.minimum(s - s[starts[piece]], s[starts[piece + 1] - 1] - s)
-    single = ~joined & ~((from_end > 0.0) & (from_end < CROWDED * _usual_edges(mesh)[index][piece]))
+    crowded = ~joined & (from_end > 0.0) & (from_end < CROWDED * mesh.edge_lengths.max())
+    if crowded.any():
+        crowded &= from_end < CROWDED * _usual_edges(mesh)[index][piece]
+    single = ~joined & ~crowded
     nodes = np.where(joined, node_of[node], len(shared) - 1 + np.cumsum(single))
     made = joined | single
     chosen = np.concatenate([shared, node[single]])
@@ -287,7 +290,7 @@ def cut_mesh(mesh: GridMesh, rods: Sequence[FlatRod], *, margin: float) -> tuple
     return GridMesh(grid, mesh.flat[chosen], nodes[made], starts, s[made], joint), chosen
 
 
-def nodes_along(mesh: GridMesh, rods: Sequence[FlatRod], whole: Ints) -> tuple[Ints, Floats, Ints]:
+def entries_along(mesh: GridMesh, rods: Sequence[FlatRod], whole: Ints) -> tuple[Ints, Ints]:
     """Find all nodes on pieces of rods.
 
     Parameters
@@ -298,15 +301,15 @@ def nodes_along(mesh: GridMesh, rods: Sequence[FlatRod], whole: Ints) -> tuple[I
 
     Returns
     -------
-    Piece (k,), material coordinate (k,) [m] and node (k,) of each.
+    Piece (k,), and entry (k,) of the mesh's `rod_nodes` and `stations`, of each.
     """
     begin, length = mesh.rod_start[whole], (mesh.rod_stop - mesh.rod_start)[whole]
     piece = np.repeat(np.arange(len(rods)), length)
     entry = np.arange(len(piece)) + np.repeat(begin - (np.cumsum(length) - length), length)
-    s = mesh.stations[entry]
-    start, end = np.array([(rod.start - 1e-9 * rod.length, rod.end + 1e-9 * rod.length) for rod in rods]).T
-    on = (s >= start[piece]) & (s <= end[piece])
-    return piece[on], s[on], mesh.rod_nodes[entry[on]]
+    start, end = np.array([(rod.start, rod.end) for rod in rods]).T
+    tiny, s = 1e-9 * (end - start), mesh.stations[entry]
+    on = (s >= (start - tiny)[piece]) & (s <= (end + tiny)[piece])
+    return piece[on], entry[on]
 
 
 def _usual_edges(mesh: GridMesh) -> Floats:
@@ -339,10 +342,12 @@ def _merge_joints(grid: FlatGrid) -> Ints:
     """
     rods, at = grid.crossings.rods.ravel(), grid.crossings.at.ravel()
     order = np.lexsort((at, rods))
-    tiny = 1e-7 * max((rod.length for rod in grid.rods), default=0.0)
+    tiny = 1e-7 * (grid.ends[:, 1] - grid.ends[:, 0]).max(initial=0.0)
     together = (np.diff(rods[order]) == 0) & (np.diff(at[order]) < tiny)
     joint = order // 2
     node = np.arange(len(grid.crossings))
+    if not together.any():
+        return node
     for a, b in zip(joint[:-1][together], joint[1:][together], strict=True):
         node[node == node[b]] = node[a]
     return np.unique(node, return_inverse=True)[1].astype(np.intp)

@@ -42,6 +42,7 @@ class EdgeProperties:
     joint : one for all crossings, or one for each.
     before, after : (b,) edge before and after each bend; of a clamp the last edge, twice.
     table : (e, 5) its own properties, in the order EA, EI1, EI2, GJ, length.
+    weight : (e,) weight per length over EA of each edge, which loads its nodes [1/m]; None: rods have no weight.
     """
 
     shell: Shell
@@ -49,6 +50,7 @@ class EdgeProperties:
     before: Ints
     after: Ints
     table: Floats
+    weight: Floats | None = None
 
     @staticmethod
     def of(shell: Shell, joint: Joint | Sequence[Joint], table: Floats) -> "EdgeProperties":
@@ -89,8 +91,22 @@ class EdgeProperties:
         """
         return replace(self, shell=self.shell.with_elements(tuple(elements)))
 
+    def load(self, size: int) -> Floats:
+        """(size, 3) weight of the edges, half at either node, downwards [N].
+
+        Parameters
+        ----------
+        size : number of blocks of the state.
+        """
+        result = np.zeros((size, 3))
+        if self.weight is not None:
+            half = 0.5 * self.weight * self.table[:, EA] * self.table[:, LENGTH]
+            for side in range(2):
+                np.subtract.at(result[:, 2], self.shell.stretch.blocks[:, side], half)
+        return result
+
     def gradient_slopes(self, state: Floats) -> csr_array:
-        """(3N, 5e) derivatives of the gradient by the logarithms of the properties [N, at twist angles N m].
+        """(3N, 5e) derivatives of the gradient, less the weight, by the logarithms of the properties [N, N m].
 
         Parameters
         ----------
@@ -106,6 +122,11 @@ class EdgeProperties:
         for kind, force in ((EA, stretch.stiffness * stretch.strains(state)), (LENGTH, by_log_length)):
             spread = _spread(force[:, None, None] * pulls, stretch.blocks, state.size)
             total += spread @ self._columns([(edges, kind, np.ones(len(edges)))])
+        if self.weight is not None:
+            upwards = np.zeros((len(edges), 2, 3))
+            upwards[:, :, 2] = (0.5 * self.weight * self.table[:, EA] * self.table[:, LENGTH])[:, None]
+            both = self._columns([(edges, kind, np.ones(len(edges))) for kind in (EA, LENGTH)])
+            total += _spread(upwards, stretch.blocks, state.size) @ both
         return total
 
     def curvature_slopes(self, state: Floats, motion: Floats) -> Floats:

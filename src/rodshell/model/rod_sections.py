@@ -52,11 +52,9 @@ class RodSections:
         InputError : a profile changes a length that the section does not have.
         """
         rod_of = np.repeat(np.arange(len(rods)), mesh.rod_stop - mesh.rod_start)
-        stiffness = np.array([(*rod.bend_stiffnesses, rod.twist_stiffness) for rod in rods])
-        nodes, edges = stiffness[rod_of], stiffness[mesh.edge_rods]
-        stretch = np.array([rod.stretch_stiffness for rod in rods])[mesh.edge_rods]
-        mass = np.array([rod.mass_per_length for rod in rods])[mesh.edge_rods]
-        rotary = np.array([rod.rotary_inertia for rod in rods])[mesh.edge_rods]
+        of_rods = _uniform(rods)
+        nodes, on_edges = of_rods[rod_of, :3], of_rods[mesh.edge_rods]
+        edges, stretch, mass, rotary = on_edges[:, :3].copy(), *on_edges[:, 3:].T.copy()
         for rod, profile, entries in varied_rods(mesh, rods):
             inner = rod_of[entries[1:]] == rod_of[entries[:-1]]
             here = (entries - rod_of[entries])[:-1][inner]  # edges are counted rod by rod
@@ -73,6 +71,19 @@ class RodSections:
                 compliance[side] += half / edges[here]
             nodes[entries] = length[entries] / compliance[entries]
         return RodSections(edges, nodes, stretch, mass, rotary)
+
+
+def _uniform(rods: Sequence[Rod]) -> Floats:
+    """(m, 6) EI1, EI2, GJ, EA, mass and rotary inertia per length of each rod; computed once for each that differs."""
+    different = (rods[0],) if rods and rods.count(rods[0]) == len(rods) else tuple(dict.fromkeys(rods))
+    values = np.array([
+        (*rod.bend_stiffnesses, rod.twist_stiffness, rod.stretch_stiffness, rod.mass_per_length, rod.rotary_inertia)
+        for rod in different
+    ]).reshape(-1, 6)  # fmt: skip
+    if len(different) == 1:
+        return np.tile(values, (len(rods), 1))
+    row = {rod: k for k, rod in enumerate(different)}
+    return np.asarray(values[[row[rod] for rod in rods]])
 
 
 def _inverse(rod: Rod, varies: str, factors: Floats) -> Floats:

@@ -10,12 +10,13 @@ mass of that block is divided equally among its copies, so that none is counted 
 Eccentric joints lay the rods in two layers, whose mesh gives each rod its own nodes (`GridMesh.in_layers`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
@@ -32,7 +33,7 @@ from rodshell.joints import (
     require_joint,
 )
 from rodshell.joints.crossings import Corners, LinkerBend, RodNodes
-from rodshell.joints.joint import elastic_joints, refuse_mixtures
+from rodshell.joints.joint import Elastic, elastic_joints, refuse_mixtures
 from rodshell.joints.ties import offset_ties
 from rodshell.layout import GridMesh
 from rodshell.model.assembly import Freedom
@@ -149,8 +150,9 @@ class Shell:
         """(N, 2) coordinates of each block in the flat grid [m]; of a twist angle those of its edge's middle."""
         flat = self.mesh.flat[:, :2]
         ghosts = flat[self.mesh.ends.ravel()[: len(self.ghosts)]]
-        middles = flat[self.mesh.edges].mean(axis=1)
-        angles = np.vstack([middles, ghosts])[: self.angles]
+        angles = np.empty((0, 2))
+        if self.angles:
+            angles = np.vstack([flat[self.mesh.edges].mean(axis=1), ghosts])[: self.angles]
         return np.vstack([flat, ghosts, angles])[self.like]
 
     def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
@@ -238,12 +240,12 @@ class _Builder:
         clamped: bool,
         twist: bool | None,
     ) -> None:
-        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
-        for item in self.rods:
+        for item in rod if isinstance(rod, Sequence) else (rod,):
             instance("rod", item, Rod)
-        self.joints = _per_item(joint or Ball(), len(mesh.grid.crossings), "crossings")
+        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
+        self.joints, self.joint_of = _kinds(_per_item(joint or Ball(), len(mesh.grid.crossings), "crossings"))
         if isinstance(joint, Sequence):
-            refuse_mixtures(mesh.joint_nodes, self.joints)
+            refuse_mixtures(mesh.joint_nodes, joint)
         eccentricity = max((item.eccentricity for item in self.joints), default=0.0)
         if eccentricity and not mesh.layered:
             mesh = mesh.in_layers(eccentricity)
@@ -268,6 +270,10 @@ class _Builder:
         rest = shared + np.arange(len(self.ghosts) + self.angles)
         self.like = np.append(mesh.rod_nodes if self.apart else np.arange(shared), rest)
 
+    def _of_joints(self, value: Callable[[Joint], object], kind: type = float) -> NDArray[Any]:
+        """A value of each joint (c,), float or bool."""
+        return np.array([value(joint) for joint in self.joints], dtype=kind)[self.joint_of]
+
     def shell(self) -> Shell:
         mesh, parts = self.mesh, self.parts
         stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, self.sections.stretch)
@@ -285,7 +291,7 @@ class _Builder:
         """Block of the first twist angle of each rod that could spin about itself."""
         if not (self.isotropic and self.twist):
             return np.empty(0, dtype=np.intp)
-        holding = [index for index, joint in enumerate(self.joints) if joint.holds_normals]
+        holding = self._of_joints(lambda joint: joint.holds_normals, bool)
         held = np.unique(self.mesh.grid.crossings.rods[holding])
         loose = np.setdiff1d(np.arange(len(self.rods)), held)
         return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
@@ -337,17 +343,19 @@ class _Builder:
 
     def _elastic(self) -> tuple[Elements, ...]:
         """Joints other than linkers."""
-        crossings = [index for index, joint in enumerate(self.joints) if not isinstance(joint, Linker)]
-        joints = [self.joints[index] for index in crossings]
-        return elastic_joints(
-            self.rod_nodes, np.array(crossings, dtype=np.intp), joints, self.stiffness, self.size  # type: ignore[arg-type]
-        )  # fmt: skip
+        crossings = np.flatnonzero(
+            self._of_joints(lambda joint: isinstance(joint, Elastic) and joint.turns_frames, bool)
+        )
+        joints = [self.joints[kind] for kind in self.joint_of[crossings].tolist()]
+        return elastic_joints(self.rod_nodes, crossings, joints, self.stiffness, self.size)
 
     def _linkers(self) -> tuple[list[Elements], list[Elements]]:
         """Linkers, and the ties of those with their own unknowns, whose blocks are added here."""
         linkers, ties = list[Elements](), list[Elements]()
-        for joint in {item for item in self.joints if isinstance(item, Linker)}:
-            crossings = np.array([index for index, item in enumerate(self.joints) if item == joint], dtype=np.intp)
+        for kind, joint in enumerate(self.joints):
+            if not isinstance(joint, Linker):
+                continue
+            crossings = np.flatnonzero(self.joint_of == kind)
             corners = Corners.of(self.rod_nodes, crossings, joint.corners)
             blocks = corners.blocks
             if self.apart:
@@ -377,12 +385,10 @@ class _Builder:
         """Between the nodes of rods at joints without linkers."""
         if not self.apart:
             return []
-        eccentricity = np.array([joint.eccentricity for joint in self.joints])
-        centric = [
-            index for index, joint in enumerate(self.joints) if not (eccentricity[index] or isinstance(joint, Linker))
-        ]
-        pairs = self.rod_nodes.blocks[self.rod_nodes.at_crossings[np.array(centric, dtype=np.intp)]]
-        ties = [_ties(pairs, self._penalties()[0])] if centric else []
+        eccentricity = self._of_joints(lambda joint: joint.eccentricity)
+        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not isinstance(joint, Linker), bool)
+        pairs = self.rod_nodes.blocks[self.rod_nodes.at_crossings[centric]]
+        ties = [_ties(pairs, self._penalties()[0])] if centric.any() else []
         return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]
 
     def _offset_stiffness(self) -> float:
@@ -406,13 +412,14 @@ class _Builder:
     def _shared_mass(self) -> Floats:
         """Lumped mass of the blocks of the shared form."""
         mesh = self.mesh
-        mass = np.zeros((int(self.like.max()) + 1, 3))
+        of_nodes = np.zeros(mesh.node_count)
         half = 0.5 * mesh.edge_lengths * self.sections.mass
-        for side in range(2):
-            np.add.at(mass, mesh.edges[:, side], half[:, None])
-        of_joints = 0.5 * np.array([joint.mass for joint in self.joints])
-        for nodes in (mesh.joint_nodes, mesh.joint_nodes if mesh.second_nodes is None else mesh.second_nodes):
-            np.add.at(mass, nodes, of_joints[:, None])  # half on either rod
+        of_joints = 0.5 * self._of_joints(lambda joint: joint.mass)
+        pairs = mesh.joint_pairs  # half of a joint's mass on either rod
+        for nodes, share in (*((end, half) for end in mesh.edges.T), *((joint, of_joints) for joint in pairs.T)):
+            of_nodes += np.bincount(nodes, share, minlength=mesh.node_count)
+        mass = np.zeros((int(self.like.max()) + 1, 3))
+        mass[: mesh.node_count] = of_nodes[:, None]
         if self.twist:
             first = mesh.node_count + len(self.ghosts)
             mass[first : first + len(mesh.edges), 0] = mesh.edge_lengths * self.sections.rotary_inertia
@@ -426,6 +433,14 @@ def _per_item(value: Item | Sequence[Item], count: int, items: str) -> tuple[Ite
     if len(value) != count:
         raise InputError(f"the grid has {count} {items}: give one value for all, or one for each, not {len(value)}")
     return tuple(value)
+
+
+def _kinds(joints: tuple[Joint, ...]) -> tuple[tuple[Joint, ...], Ints]:
+    """The different ones among joints, and which of these each is."""
+    if joints and joints.count(joints[0]) == len(joints):
+        return joints[:1], np.zeros(len(joints), dtype=np.intp)
+    number = {joint: kind for kind, joint in enumerate(dict.fromkeys(joints))}
+    return tuple(number), np.array([number[joint] for joint in joints], dtype=np.intp)
 
 
 def _ties(pairs: Ints, stiffness: float) -> Ties:

@@ -6,21 +6,22 @@ model; the difference of the two marches estimates the error. Lines of the latti
 net: they are kept as virtual rods.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, degrees, sin
 from string import ascii_lowercase
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError, NetLimitError
-from rodshell.geometry.curves import on_curve
+from rodshell.geometry.frames import cross
 from rodshell.kernels import njit
-from rodshell.layout import FlatRod, GridLayout
+from rodshell.layout import FlatRod, GridLayout, GridMesh
 from rodshell.layout.flatgrid import Family
-from rodshell.layout.gridlayout import rod_name
+from rodshell.layout.gridlayout import rod_names
 from rodshell.nets.compass import ON_SURFACE
-from rodshell.nets.net_ends import Cut, Lines, cut_lines, extrapolated
+from rodshell.nets.net_ends import Cuts, Lines, cut_lines, extrapolated
 from rodshell.nets.net_extent import Covering, LatticeLines, find_lines, march_lines
 from rodshell.targets import Target
 from rodshell.units import length_text
@@ -74,12 +75,22 @@ class ChebyshevNet:
         -------
         (n, 3) points [m].
         """
-        if rod.family == "u":
-            knots, points = self.net.u, self.net.points[:, int(np.argmin(np.abs(self.net.v - rod.offset)))]
-        else:
-            knots, points = self.net.v, self.net.points[int(np.argmin(np.abs(self.net.u - rod.offset)))]
-        known = np.flatnonzero(np.isfinite(points[:, 0]))
-        return on_curve(knots[known], points[known], s)
+        return self._along((rod,), np.zeros(1, dtype=np.intp), s)
+
+    def node_positions(self, mesh: GridMesh) -> Floats:
+        """As `positions`, of the nodes (n, 3) of a mesh of such rods [m]; at a joint by the last of its rods."""
+        result = np.empty((mesh.node_count, 3))
+        result[mesh.rod_nodes] = self._along(mesh.grid.rods, mesh.rod_start, mesh.stations)
+        return result
+
+    def _along(self, rods: Sequence[FlatRod], start: Ints, s: Floats) -> Floats:
+        """Points (k, 3) [m] at the material coordinates `s` (k,) [m] of rods one after the other, which begin at
+        `start` (m,) in `s`."""
+        offset, across = np.array([(rod.offset, rod.family == "v") for rod in rods]).T
+        line = np.where(across > 0, _nearest(self.net.u, offset), _nearest(self.net.v, offset))
+        result = np.empty((len(s), 3))
+        _interpolate(self.net.u, self.net.v, self.net.points, line, across > 0, np.append(start, len(s)), s, result)
+        return result
 
     def __repr__(self) -> str:
         built = sum(not rod.virtual for rod in self.rods)
@@ -219,7 +230,7 @@ def _smallest_angle(net: Covering) -> tuple[float, tuple[float, float, float]]:
         raise _hole(net)
     along, across = net.points[i + 1, j] - net.points[i - 1, j], net.points[i, j + 1] - net.points[i, j - 1]
     x, y, z = net.points[i, j].tolist()
-    return float(np.arctan2(np.linalg.norm(np.cross(along, across)), abs(along @ across))), (x, y, z)
+    return float(np.arctan2(np.linalg.norm(cross(along, across)), abs(along @ across))), (x, y, z)
 
 
 @njit(error_model="numpy")
@@ -240,65 +251,104 @@ def _sharpest(points, inside):  # type: ignore[no-untyped-def]
     return i_found, j_found, whole
 
 
-@dataclass(frozen=True)
-class _Ends:
-    """Extrapolated pieces of the lines of both families."""
+def _nearest(ascending: Floats, values: Floats) -> Ints:
+    """Indices (k,) of the nearest of `ascending` numbers to each of the `values` (k,)."""
+    return np.asarray(np.searchsorted(0.5 * (ascending[1:] + ascending[:-1]), values))
 
-    u: list[list[Cut]]
-    v: list[list[Cut]]
+
+@njit(error_model="numpy")
+def _interpolate(u, v, points, line, across, start, s, result):  # type: ignore[no-untyped-def]
+    """Points `result` (k, 3) at the places `s` (k,) of lines of a net, by cubics through the four nearest known nodes.
+
+    line, across : (m,) index of each line in its family, and whether that is family v.
+    start : (m + 1,) where each line begins in `s`.
+    """
+    known, shares = np.empty(max(len(u), len(v)), dtype=np.intp), np.empty(4)
+    for m in range(len(line)):
+        knots, count = (v if across[m] else u), 0
+        for n in range(len(knots)):
+            if np.isfinite(points[line[m], n, 0] if across[m] else points[n, line[m], 0]):
+                known[count] = n
+                count += 1
+        near, after = min(4, count), 0
+        for e in range(start[m], start[m + 1]):
+            while after > 0 and knots[known[after - 1]] >= s[e]:
+                after -= 1
+            while after < count and knots[known[after]] < s[e]:
+                after += 1
+            first = min(max(after - near // 2, 0), count - near)
+            for j in range(near):
+                shares[j] = 1.0
+                for k in range(near):
+                    if j != k:
+                        at_k = knots[known[first + k]]
+                        shares[j] *= (s[e] - at_k) / (knots[known[first + j]] - at_k)
+            for d in range(3):
+                value = 0.0
+                for j in range(near):
+                    n = known[first + j]
+                    value += shares[j] * (points[line[m], n, d] if across[m] else points[n, line[m], d])
+                result[e, d] = value
 
 
 def _extrapolate(
     target: Target, lines: LatticeLines, nets: tuple[Covering, Covering], depth: float
-) -> tuple[_Ends, float, Floats]:
-    """The pieces of all lines, the largest error of an end before extrapolation [m], and a point of that line."""
+) -> tuple[tuple[Cuts, Cuts], float, Floats]:
+    """The cuts of the lines of families u and v, the largest error of an end before extrapolation [m], and a point of
+    that line."""
     sets = list[Lines]()
     for net in nets:
         row, column = np.searchsorted(net.u, lines.u - 1e-12), np.searchsorted(net.v, lines.v - 1e-12)
-        sets.append(Lines(net.u, net.points[:, column].transpose(1, 0, 2), net.inside[:, column].T))
+        along_u = np.ascontiguousarray(net.points[:, column].transpose(1, 0, 2))
+        sets.append(Lines(net.u, along_u, np.ascontiguousarray(net.inside[:, column].T)))
         sets.append(Lines(net.v, net.points[row], net.inside[row]))
     cuts = cut_lines(target, sets, depth=depth)
     step = max(np.diff(nets[0].u).max(), np.diff(nets[0].v).max())
-    error, where = 0.0, nets[1].points[nets[1].origin]
-    families = list[list[list[Cut]]]()
-    for coarse, fine, (_, points, _) in zip(cuts[:2], cuts[2:], sets[2:], strict=True):
-        both = [extrapolated(rough, exact, step) for rough, exact in zip(coarse, fine, strict=True)]
-        families.append([pieces for pieces, _ in both])
-        worst = int(np.argmax([missed for _, missed in both]))
-        if both[worst][1] > error:
-            error, known = both[worst][1], points[worst][np.isfinite(points[worst][:, 0])]
-            where = known[np.argmin(np.abs(target.margin(known)))]
-    return _Ends(*families), error, where
+    in_u, errors_u = extrapolated(cuts[0], cuts[2], len(lines.v), step)
+    in_v, errors_v = extrapolated(cuts[1], cuts[3], len(lines.u), step)
+    errors = np.concatenate([errors_u, errors_v])
+    worst = int(np.argmax(errors))
+    if errors[worst] == 0.0:
+        return (in_u, in_v), 0.0, nets[1].points[nets[1].origin]
+    points = sets[2].points[worst] if worst < len(errors_u) else sets[3].points[worst - len(errors_u)]
+    known = points[np.isfinite(points[:, 0])]
+    return (in_u, in_v), float(errors[worst]), known[np.argmin(np.abs(target.margin(known)))]
 
 
 def _name_rods(
-    layout: GridLayout, lines: LatticeLines, ends: _Ends
+    layout: GridLayout, lines: LatticeLines, ends: tuple[Cuts, Cuts]
 ) -> tuple[tuple[FlatRod, ...], list[tuple[str, str]], list[str]]:
     """Rods from the lines: those of the layout get their names, all other lines are virtual."""
     rods, dropped, broken = list[FlatRod](), list[tuple[str, str]](), list[str]()
-    families: tuple[tuple[Family, Floats, list[list[Cut]]], ...] = (("u", lines.v, ends.u), ("v", lines.u, ends.v))
-    for family, offsets, cuts in families:
+    families: tuple[tuple[Family, Floats, Cuts], ...] = (("u", lines.v, ends[0]), ("v", lines.u, ends[1]))
+    spacing = max(layout.spacing)
+    for family, every, cuts in families:
         make = FlatRod.u if family == "u" else FlatRod.v
-        touching = {float(c): cut for c, cut in zip(offsets, cuts, strict=True) if cut}
+        touching, first = np.unique(cuts.line, return_index=True)
+        offsets, stops, pieces = every[touching], [*first.tolist(), len(cuts.line)], cuts.ends.tolist()
         built = layout.offsets(family)
         if built is None:
-            near = np.array(list(touching))
-            lattice = layout.lattice(family, near.min(initial=0.0), near.max(initial=0.0))
-            built = near[(np.abs(near[:, None] - lattice) < 1e-6 * max(layout.spacing)).any(axis=1)]
-        for k, c in enumerate(built):
-            name = rod_name(family, k, len(built))
-            here = min(touching, key=lambda offset: abs(offset - c), default=np.inf)
-            if abs(here - c) > 1e-9 * max(layout.spacing):
+            lattice = layout.lattice(family, offsets.min(initial=0.0), offsets.max(initial=0.0))
+            built = offsets[np.abs(lattice[_nearest(lattice, offsets)] - offsets) < 1e-6 * spacing]
+        here, found = np.full(len(built), -1), np.zeros(len(built), dtype=bool)
+        if len(offsets):
+            here = _nearest(offsets, built)
+            found = np.abs(offsets[here] - built) <= 1e-9 * spacing
+        others = np.ones(len(offsets), dtype=bool)
+        others[here[found]] = False
+        for name, line, on_target in zip(rod_names(family, len(built)), here.tolist(), found.tolist(), strict=True):
+            if not on_target:
                 dropped.append((name, "it never touches the target"))
                 continue
-            pieces = touching.pop(here)
-            for label, cut in zip(piece_names(name, len(pieces)), pieces, strict=True):
-                rods.append(make(label, here, *cut, virtual=label in layout.left_out))
-            if len(pieces) > 1:
+            parts, offset = pieces[stops[line] : stops[line + 1]], float(offsets[line])
+            for label, (start, end) in zip(piece_names(name, len(parts)), parts, strict=True):
+                rods.append(make(label, offset, start, end, virtual=label in layout.left_out))
+            if len(parts) > 1:
                 broken.append(name)
-        for c, pieces in touching.items():
-            labels = piece_names(f"virtual {family.upper()} {c:+.4f}", len(pieces))
-            rods += [make(label, c, *cut, virtual=True) for label, cut in zip(labels, pieces, strict=True)]
+        for line in np.flatnonzero(others).tolist():
+            parts, offset = pieces[stops[line] : stops[line + 1]], float(offsets[line])
+            labels = piece_names(f"virtual {family.upper()} {offset:+.4f}", len(parts))
+            rods += [make(label, offset, *part, virtual=True) for label, part in zip(labels, parts, strict=True)]
     return tuple(rods), dropped, [_in_pieces(broken)] if broken else []
 
 
@@ -331,13 +381,15 @@ def _require_names(layout: GridLayout, names: list[str]) -> None:
 
 def _require_length(layout: GridLayout, rods: tuple[FlatRod, ...]) -> None:
     """Refuse a layout whose rods are too short to reach the end of the target."""
+    if layout.length == "auto":
+        return
 
     def needed(rod: FlatRod) -> float:
         middle = layout.middle(rod.family)
         return 2 * max(rod.end - middle, middle - rod.start)
 
     longest = max((rod for rod in rods if not rod.virtual), key=needed, default=None)
-    if longest is not None and layout.length != "auto" and needed(longest) > layout.length:
+    if longest is not None and needed(longest) > layout.length:
         raise InputError(
             f"rod {longest.name} is too short to reach the end of the target: it needs {needed(longest):.4g} m, "
             f'the layout gives {layout.length:.4g} m: use a longer length, or "auto"'

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from rodshell.arrays import Bools, Floats
-from rodshell.geometry.frames import cross, dot, unit
+from rodshell.geometry.frames import cross, unit
 from rodshell.kernels import njit
 from rodshell.targets import Implicit, Target
 
@@ -73,26 +73,28 @@ def march(
     return net
 
 
-def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> None:
+def lay_axes(target: Target, net: Net, anchor: Floats, heading: Floats, *, tolerance: float = TOLERANCE) -> None:
     """Fill the axes of a net with two discrete geodesics through the anchor, each on its own layer.
 
     Parameters
     ----------
     target, anchor, heading : see `march`.
     net : whose points on the axes are set.
+    tolerance : see `geodesics`.
     """
     i0, j0 = net.origin
     net.points[i0, j0] = anchor
     steps = [np.diff(net.u[i0:]), np.diff(-net.u[i0::-1]), np.diff(net.v[j0:]), np.diff(-net.v[j0::-1])]
     directions = axes(target, anchor, heading)
     if net.heights == ON_SURFACE:
-        arms = geodesics(target, np.tile(anchor, (4, 1)), directions, steps)
+        arms = geodesics(target, np.tile(anchor, (4, 1)), directions, steps, tolerance=tolerance)
     else:
         arms = list[Floats]()
         for height, pair in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
             layer = Layer(target, height)
             start = np.tile(layer.of(anchor[None]), (2, 1))
-            arms += [layer.below(arm) for arm in geodesics(layer, start, directions[pair], steps[pair])]
+            on_layer = geodesics(layer, start, directions[pair], steps[pair], tolerance=tolerance)
+            arms += [layer.below(arm) for arm in on_layer]
     net.points[i0 + 1 :, j0], net.points[i0 - 1 :: -1, j0] = arms[0], arms[1] if i0 else arms[1][:0]
     net.points[i0, j0 + 1 :], net.points[i0, j0 - 1 :: -1] = arms[2], arms[3] if j0 else arms[3][:0]
 
@@ -106,10 +108,10 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
     anchor : (3,) point of the surface where the axes cross [m].
     heading : (3,) direction of the u axis there; its part in the tangent plane is used.
     """
-    normal = target.on_surface(anchor[None]).normal[0]
-    along = unit(heading - (heading @ normal) * normal)
-    across = cross(normal, along)
-    return np.stack([along, -along, across, -across])
+    normal = target.level(anchor[None])[1][0]
+    along = heading - (heading @ normal) / (normal @ normal) * normal
+    both = unit(np.stack([along, cross(normal, along)]))
+    return np.stack([both, -both], axis=1).reshape(4, 3)
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,9 @@ class Layer:
         return result
 
 
-def geodesics(target: Target | Layer, start: Floats, direction: Floats, steps: list[Floats]) -> list[Floats]:
+def geodesics(
+    target: Target | Layer, start: Floats, direction: Floats, steps: list[Floats], *, tolerance: float = TOLERANCE
+) -> list[Floats]:
     """Discrete geodesics, several at once, by given chord lengths; second order.
 
     The next chord lies in the plane of the last chord's direction and the surface normal at the node, so that
@@ -158,60 +162,98 @@ def geodesics(target: Target | Layer, start: Floats, direction: Floats, steps: l
     start : (k, 3) points of the surface [m].
     direction : (k, 3) unit tangents there.
     steps : k arrays of chord lengths [m].
+    tolerance : of Newton's last change of a chord, relative to its length; the error that is left is about its square.
 
     Returns
     -------
     k arrays (len(steps), 3) of points; NaN from where a chord finds no surface.
     """
     count = len(steps)
-    longest = max((len(s) for s in steps), default=0)
-    chords = np.zeros((longest, count))
+    chords = np.zeros((max((len(s) for s in steps), default=0), count))
     for k, s in enumerate(steps):
         chords[: len(s), k] = s
-    path = np.full((longest, count, 3), np.nan)
-    point, tangent = start.copy(), direction.copy()
-    for step in range(longest):
-        going = np.flatnonzero((chords[step] > 0) & np.isfinite(point[:, 0]))
-        if len(going) == 0:
+    path = np.full((*chords.shape, 3), np.nan)
+    row, turn, change = np.arange(count), np.zeros(count), np.empty(count)
+    here, tangent, flat, normal = start.copy(), direction.copy(), np.empty((count, 3)), np.empty((count, 3))
+    for chord, reached in zip(chords, path, strict=True):
+        count = _still_going(chord, row, count, here, tangent, turn)
+        if count == 0:
             break
-        here, h = point[going], chords[step, going]
-        normal = unit(target.level(here)[1])
-        flat = unit(tangent[going] - dot(tangent[going], normal)[:, None] * normal)
-        turn, change = np.zeros(len(going)), np.full(len(going), np.inf)  # angle of the chord out of the tangent plane
-        chord, swing = flat.copy(), normal.copy()
+        going = row[:count]
+        ahead = _begin_chords(chord, going, here, tangent, target.level(here[:count])[1], flat, normal, turn)
         for _ in range(NEWTON_STEPS):
-            value, gradient = target.level(here + h[:, None] * chord)
-            if not _turned(flat, normal, value, gradient, h, turn, change, chord, swing):
+            value, gradient = target.level(ahead)
+            if not _turn_chords(chord, going, here, flat, normal, value, gradient, tolerance, turn, change, ahead):
                 break
-        lost = ~(np.abs(turn) < 1.2) | ~(np.abs(change) < TOLERANCE)
-        point[going] = here + h[:, None] * chord
-        point[going[lost]] = np.nan
-        tangent[going] = chord
-        path[step, going] = point[going]
+        _end_chords(chord, going, here, ahead, tolerance, turn, change, tangent, reached)
     return [path[: len(s), k] for k, s in enumerate(steps)]
 
 
+@njit()
+def _still_going(chord, row, count, here, tangent, turn):  # type: ignore[no-untyped-def]
+    """Of the first `count` geodesics those that have a next chord and were not lost, moved to the front."""
+    left = 0
+    for m in range(count):
+        if chord[row[m]] > 0.0 and np.isfinite(here[m, 0]):
+            row[left], turn[left] = row[m], turn[m]
+            for k in range(3):
+                here[left, k], tangent[left, k] = here[m, k], tangent[m, k]
+            left += 1
+    return left
+
+
 @njit(error_model="numpy")
-def _turned(flat, normal, value, gradient, h, turn, change, chord, swing):  # type: ignore[no-untyped-def]
-    """One Newton step of all chords, in place; `swing` is the derivative of `chord` by `turn`. Returns whether another
-    step is needed."""
-    going = False
-    for m in range(len(turn)):
-        slope = 0.0
+def _begin_chords(chord, row, here, tangent, gradient, flat, normal, turn):  # type: ignore[no-untyped-def]
+    """Unit normals at the points `here`, unit tangents `flat` across them, and a first guess (n, 3) of the next points:
+    chords that `turn` out of the tangent plane as the last ones did."""
+    ahead = np.empty((len(row), 3))
+    for m in range(len(row)):
+        steep, out, square = np.sqrt(_dot(gradient[m], gradient[m])), 0.0, 0.0
         for k in range(3):
-            slope += gradient[m, k] * swing[m, k]
-        change[m] = value[m] / (h[m] * slope)
+            normal[m, k] = gradient[m, k] / steep
+            out += tangent[m, k] * normal[m, k]
+        for k in range(3):
+            flat[m, k] = tangent[m, k] - out * normal[m, k]
+            square += flat[m, k] * flat[m, k]
+        cos, sin = np.cos(turn[m]), np.sin(turn[m])
+        for k in range(3):
+            flat[m, k] /= np.sqrt(square)
+            ahead[m, k] = here[m, k] + chord[row[m]] * (cos * flat[m, k] + sin * normal[m, k])
+    return ahead
+
+
+@njit(error_model="numpy")
+def _turn_chords(  # type: ignore[no-untyped-def]
+    chord, row, here, flat, normal, value, gradient, tolerance, turn, change, ahead
+):
+    """One Newton step of the angles `turn` between chords and tangent planes, in place, with the points `ahead` that
+    follow. Returns whether another step is needed."""
+    going = False
+    for m in range(len(row)):
+        cos, sin, slope, h = np.cos(turn[m]), np.sin(turn[m]), 0.0, chord[row[m]]
+        for k in range(3):
+            slope += gradient[m, k] * (cos * normal[m, k] - sin * flat[m, k])
+        change[m] = value[m] / (h * slope)
         turn[m] -= change[m]
         cos, sin = np.cos(turn[m]), np.sin(turn[m])
         for k in range(3):
-            chord[m, k] = cos * flat[m, k] + sin * normal[m, k]
-            swing[m, k] = cos * normal[m, k] - sin * flat[m, k]
-        if not abs(change[m]) < TOLERANCE:
+            ahead[m, k] = here[m, k] + h * (cos * flat[m, k] + sin * normal[m, k])
+        if not abs(change[m]) < tolerance:
             going = True
     return going
 
 
-def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None) -> None:
+@njit()
+def _end_chords(chord, row, here, ahead, tolerance, turn, change, tangent, reached):  # type: ignore[no-untyped-def]
+    """Continue from the points `ahead`, which are also `reached` (k, 3); NaN for chords that found none."""
+    for m in range(len(row)):
+        lost = not (abs(turn[m]) < 1.2 and abs(change[m]) < tolerance)
+        for k in range(3):
+            tangent[m, k] = (ahead[m, k] - here[m, k]) / chord[row[m]]
+            here[m, k] = reached[row[m], k] = np.nan if lost else ahead[m, k]
+
+
+def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None, *, tolerance: float = TOLERANCE) -> None:
     """Find the unknown nodes of all four quadrants, in each pass those whose neighbours are known.
 
     If only the axes are known, these are on one anti-diagonal after the other.
@@ -221,23 +263,26 @@ def fill_quadrants(target: Target, net: Net, wanted: Bools | None = None) -> Non
     target : the surface.
     net : whose points are set.
     wanted : (nu, nv) nodes to find; default all.
+    tolerance : of Newton's last change of a node, relative to the step; the error that is left is about its square.
     """
     tried = np.zeros(net.points.shape[:2], dtype=bool) if wanted is None else ~wanted
     diagonal = 2
     while True:
-        diagonal, i, j, *rest = _next_nodes(net.points, tried, net.u, net.v, *net.origin, diagonal)
-        if len(i) == 0:
+        diagonal, nodes, known, chords = _next_nodes(net.points, tried, net.u, net.v, *net.origin, diagonal)
+        if len(nodes) == 0:
             return
-        tried[i, j] = True
-        net.points[i, j] = _compass(target, net.heights, *rest)
+        found, change, sine = _compass(target, net.heights, known, chords, tolerance)
+        _keep(nodes, found, chords, change, sine, tolerance, net.points, tried)
 
 
 @njit()
 def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyped-def]
     """The nodes of all anti-diagonals from `diagonal` on that are unknown, not `tried`, and whose neighbours are known.
-    Returns the anti-diagonal to continue from; their indices; the neighbours A towards the u axis, B towards the v
-    axis, and D across; the two chords; and the sign of the quadrant."""
-    nodes, count, first = np.empty((tried.size, 4), dtype=np.intp), 0, len(u) + len(v)
+
+    Returns the anti-diagonal to continue from; the indices (n, 2) of the nodes; their neighbours (3, n, 3): A towards
+    the u axis, B towards the v axis, and D across; and (3, n) the two chords and the sign of the quadrant.
+    """
+    nodes, count, first = np.empty((tried.size, 2), dtype=np.intp), 0, len(u) + len(v)
     for quadrant in range(4):
         i_side, j_side = 1 - 2 * (quadrant // 2), 1 - 2 * (quadrant % 2)
         rows, columns = (len(u) - 1 - i0 if i_side > 0 else i0), (len(v) - 1 - j0 if j_side > 0 else j0)
@@ -248,25 +293,24 @@ def _next_nodes(points, tried, u, v, i0, j0, diagonal):  # type: ignore[no-untyp
                     continue
                 p, q = i - i_side, j - j_side
                 if np.isfinite(points[i, q, 0] + points[p, j, 0] + points[p, q, 0]):
-                    nodes[count, 0], nodes[count, 1], nodes[count, 2], nodes[count, 3] = i, j, p, q
+                    nodes[count, 0], nodes[count, 1] = i, j
                     count, first = count + 1, min(first, along + across)
-    a, b, d = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
-    from_a, from_b, side = np.empty(count), np.empty(count), np.empty(count)
+    known, chords = np.empty((3, count, 3)), np.empty((3, count))
     for n in range(count):
-        i, j, p, q = nodes[n]
-        a[n], b[n], d[n] = points[i, q], points[p, j], points[p, q]
-        from_a[n], from_b[n], side[n] = abs(v[j] - v[q]), abs(u[i] - u[p]), (i - p) * (j - q)
-    return first + 1, nodes[:count, 0], nodes[:count, 1], a, b, d, from_a, from_b, side
+        i, j = nodes[n, 0], nodes[n, 1]
+        p, q = (i - 1 if i > i0 else i + 1), (j - 1 if j > j0 else j + 1)
+        for k in range(3):
+            known[0, n, k], known[1, n, k], known[2, n, k] = points[i, q, k], points[p, j, k], points[p, q, k]
+        chords[0, n], chords[1, n], chords[2, n] = abs(v[j] - v[q]), abs(u[i] - u[p]), (i - p) * (j - q)
+    return first + 1, nodes[:count].copy(), known, chords
 
 
 def _compass(
-    target: Target, heights: Heights, a: Floats, b: Floats, d: Floats, from_a: Floats, from_b: Floats, side: Floats
-) -> Floats:
-    """Points P (n, 3) of the surface with |P - A| = from_a and |P - B| = from_b, opposite to D; for rods at `heights`
-    the distances are those of points of their layers.
-
-    NaN where there is none, or where the net folds: (P - B) x (P - A) no longer points along the normal.
-    """
+    target: Target, heights: Heights, known: Floats, chords: Floats, tolerance: float
+) -> tuple[Floats, Floats, Floats]:
+    """Points P (n, 3) of the surface at the `chords` from A and from B, opposite to D, see `_next_nodes`; for rods at
+    `heights` the distances are those of points of their layers. And their last changes and sines, see `_towards`."""
+    a, b, d = known
     p = a + b - d
     layered, none = heights != ON_SURFACE, np.empty((0, 3, 3))
     if layered:  # A and B on the layers of the rods that lead from them to P
@@ -274,14 +318,25 @@ def _compass(
     change, sine = np.empty(len(p)), np.empty(len(p))
     for _ in range(NEWTON_STEPS):
         value, gradient, hessian = target.implicit(p) if layered else (*target.level(p), none)
-        if not _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change, sine):
+        if not _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, change, sine):
             break
-    p[~(change < TOLERANCE) | ~(sine * side > SMALLEST_SINE)] = np.nan
-    return p
+    return p, change, sine
+
+
+@njit()
+def _keep(nodes, found, chords, change, sine, tolerance, points, tried):  # type: ignore[no-untyped-def]
+    """Put the points that were `found` (n, 3) in their places; not those that did not converge, nor where the net
+    folds: (P - B) x (P - A) no longer points along the normal."""
+    for n in range(len(nodes)):
+        i, j = nodes[n, 0], nodes[n, 1]
+        tried[i, j] = True
+        good = change[n] < tolerance and sine[n] * chords[2, n] > SMALLEST_SINE
+        for k in range(3):
+            points[i, j, k] = found[n, k] if good else np.nan
 
 
 @njit(error_model="numpy")
-def _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change, sine):  # type: ignore[no-untyped-def]
+def _towards(p, a, b, chords, heights, value, gradient, hessian, tolerance, change, sine):  # type: ignore[no-untyped-def]
     """One step of `compass_step` of all points p (n, 3), in place; `change` (n,) its size over the chords, `sine` (n,)
     of the crossing angle before it. Returns whether another step is needed.
 
@@ -289,18 +344,19 @@ def _towards(p, a, b, from_a, from_b, heights, value, gradient, hessian, change,
     """
     going = False
     for m in range(len(p)):
+        from_a, from_b = chords[0, m], chords[1, m]
         here = (p[m, 0], p[m, 1], p[m, 2])
         at_a, at_b = (a[m, 0], a[m, 1], a[m, 2]), (b[m, 0], b[m, 1], b[m, 2])
         slope = (gradient[m, 0], gradient[m, 1], gradient[m, 2])
         if len(hessian):
-            step, sine[m] = layered_step(here, at_a, at_b, slope, hessian[m], heights, from_a[m], from_b[m], value[m])
+            step, sine[m] = layered_step(here, at_a, at_b, slope, hessian[m], heights, from_a, from_b, value[m])
         else:
             x, y = less(here, at_a), less(here, at_b)
-            step, sine[m] = compass_step(x, y, x, y, slope, from_a[m], from_b[m], value[m])
+            step, sine[m] = compass_step(x, y, x, y, slope, from_a, from_b, value[m])
         for k in range(3):
             p[m, k] -= step[k]
-        change[m] = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a[m], from_b[m])
-        if change[m] >= TOLERANCE:
+        change[m] = max(abs(step[0]), abs(step[1]), abs(step[2])) / min(from_a, from_b)
+        if change[m] >= tolerance:
             going = True
     return going
 

@@ -1,15 +1,6 @@
-"""Where the lines of a net end on a target: runs of inside nodes, cuts between nodes, and the apron past them.
+"""Where the lines of a net end on a target: runs of inside nodes, and the cuts between nodes."""
 
-A rod that ends at the rim is free from its last joint on: there it would follow a geodesic, not the net, and its end
-would be up to millimetres off. So the net that is bound to a target is continued by an apron, two more rings of joints
-past every end, on the surface's smooth continuation, with all the lines that meet there; the apron is cut off
-afterwards. Across an opening the net simply continues: the drape ignores it.
-"""
-
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
-from math import inf
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,24 +8,29 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.geometry.curves import lagrange
 from rodshell.kernels import njit
-from rodshell.layout import FlatGrid, FlatRod
 from rodshell.nets.compass import Net
 from rodshell.targets import Target
 
 SQUARE = 5  # nodes each way
-RINGS = 2  # of joints: on a 0.2 m hemisphere at 40 mm spacing the ends are 0.1 mm off the net; 0.5 mm with 1 ring
+MOST_STEPS = 100  # of false position; 10 are usual
 
 
-class Cut(NamedTuple):
-    """A part of one line that is on the target.
+class Cuts(NamedTuple):
+    """The parts of lines that are on the target, line by line and along each.
 
     Parameters
     ----------
-    start, end : material coordinates of its ends [m].
+    line : (k,) index of the line of each part, ascending.
+    ends : (k, 2) material coordinates of its ends [m].
     """
 
-    start: float
-    end: float
+    line: Ints
+    ends: Floats
+
+    def of_line(self, line: int) -> list[list[float]]:
+        """Start and end of each part of one line."""
+        parts: list[list[float]] = self.ends[self.line == line].tolist()
+        return parts
 
 
 def inside_nodes(target: Target, net: Net) -> Bools:
@@ -88,46 +84,61 @@ def _region(target: Target, net: Net) -> Bools:
 
     A square of nodes whose corners are closer to its middle than the end is needs only one evaluation.
     """
-    middles, way = _squares(net.points, net.u, net.v)
-    margin = target.margin(net.points[middles[:, 0], middles[:, 1]])
-    inside, asked = _by_squares(net.points, middles, np.where(np.abs(margin) > way, margin, 0.0))
-    inside[asked[:, 0], asked[:, 1]] = target.margin(net.points[asked[:, 0], asked[:, 1]]) > 0
+    middles, points, way = _squares(net.points, net.u, net.v)
+    asked, points, inside = _by_squares(net.points, middles, target.margin(points), way)
+    _set_inside(asked, target.margin(points), inside)
     return np.asarray(inside)
 
 
 @njit()
 def _squares(points, u, v):  # type: ignore[no-untyped-def]
-    """Indices (n, 2) of the middle of each square of nodes that are all known, and path lengths (n,) to its corners."""
+    """The middle of each square of nodes that are all known: its indices (n, 2) and point (n, 3); and path lengths (n,)
+    to the square's corners."""
     half, count = SQUARE // 2, 0
     middles = np.empty(((len(u) // SQUARE) * (len(v) // SQUARE), 2), dtype=np.intp)
-    way = np.empty(len(middles))
+    at, way = np.empty((len(middles), 3)), np.empty(len(middles))
     for i in range(half, len(u) - half, SQUARE):
         for j in range(half, len(v) - half, SQUARE):
-            if not np.isnan(points[i - half : i + half + 1, j - half : j + half + 1, 0]).any():
+            known = True
+            for p in range(i - half, i + half + 1):
+                for q in range(j - half, j + half + 1):
+                    known &= not np.isnan(points[p, q, 0])
+            if known:
                 middles[count, 0], middles[count, 1] = i, j
+                for k in range(3):
+                    at[count, k] = points[i, j, k]
                 way[count] = max(u[i + half] - u[i], u[i] - u[i - half]) + max(v[j + half] - v[j], v[j] - v[j - half])
                 count += 1
-    return middles[:count], way[:count]
+    return middles[:count], at[:count], way[:count]
 
 
 @njit()
-def _by_squares(points, middles, margin):  # type: ignore[no-untyped-def]
-    """Which nodes (nu, nv) are in squares with a positive `margin` (n,), and indices (m, 2) of the known nodes that
-    are in no square with a margin other than 0."""
+def _by_squares(points, middles, margin, way):  # type: ignore[no-untyped-def]
+    """Indices (m, 2) and points (m, 3) of the known nodes that are in no square whose end is further than its corners;
+    and which of the other nodes (nu, nv) are inside."""
     nu, nv = points.shape[:2]
     half, count = SQUARE // 2, 0
-    inside, asked = np.zeros((nu, nv), dtype=np.bool_), np.empty((nu * nv, 2), dtype=np.intp)
-    clear = np.zeros((nu, nv), dtype=np.bool_)
+    inside, clear = np.zeros((nu, nv), dtype=np.bool_), np.zeros((nu, nv), dtype=np.bool_)
+    asked, at = np.empty((nu * nv, 2), dtype=np.intp), np.empty((nu * nv, 3))
     for n in range(len(middles)):
-        i, j = middles[n]
-        clear[i - half : i + half + 1, j - half : j + half + 1] = margin[n] != 0.0
-        inside[i - half : i + half + 1, j - half : j + half + 1] = margin[n] > 0.0
+        if abs(margin[n]) > way[n]:
+            for i in range(middles[n, 0] - half, middles[n, 0] + half + 1):
+                for j in range(middles[n, 1] - half, middles[n, 1] + half + 1):
+                    clear[i, j], inside[i, j] = True, margin[n] > 0.0
     for i in range(nu):
         for j in range(nv):
             if not clear[i, j] and not np.isnan(points[i, j, 0]):
                 asked[count, 0], asked[count, 1] = i, j
+                for k in range(3):
+                    at[count, k] = points[i, j, k]
                 count += 1
-    return inside, asked[:count]
+    return asked[:count], at[:count], inside
+
+
+@njit()
+def _set_inside(asked, margin, inside):  # type: ignore[no-untyped-def]
+    for n in range(len(asked)):
+        inside[asked[n, 0], asked[n, 1]] = margin[n] > 0.0
 
 
 class Lines(NamedTuple):
@@ -145,7 +156,7 @@ class Lines(NamedTuple):
     inside: Bools
 
 
-def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[list[list[Cut]]]:
+def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> list[Cuts]:
     """Cut lines of nets at the target's end, to fourth order between nodes.
 
     Parameters
@@ -156,32 +167,136 @@ def cut_lines(target: Target, sets: Sequence[Lines], *, depth: float = 0.0) -> l
 
     Returns
     -------
-    For each set and each of its lines the pieces, in its direction; none for a line without inside nodes.
+    For each set the pieces of its lines; none of a line without inside nodes.
     """
-    runs = [_runs(target, lines, depth) for lines in sets]
-    ends = _roots(target, sets, runs).reshape(-1, 2).tolist()
-    result, done = list[list[list[Cut]]](), 0
-    for lines, (row, _, _) in zip(sets, runs, strict=True):
-        cuts: list[list[Cut]] = [[] for _ in lines.points]
-        for k, (start, end) in zip(row.tolist(), ends[done : done + len(row)], strict=True):
-            cuts[k].append(Cut(start, end))
-        result.append(cuts)
-        done += len(row)
-    return result
+    runs = _deep(target, sets, [_runs(lines.inside) for lines in sets], depth)
+    count = 2 * sum(len(run) for run in runs)
+    knots, points = np.empty((count, 4)), np.empty((count, 4, 3))
+    outer, inner = np.empty(count), np.empty(count)
+    stops = np.cumsum([0, *(2 * len(run) for run in runs)]).tolist()
+    for (s, nodes, _), run, begin, stop in zip(sets, runs, stops, stops[1:], strict=False):
+        here = slice(begin, stop)
+        _around_ends(s, nodes, run, knots[here], points[here], outer[here], inner[here])
+    ends = _roots(target, knots, points, outer, inner).reshape(-1, 2)
+    return [
+        Cuts(run[:, 0].copy(), ends[begin // 2 : stop // 2])
+        for run, begin, stop in zip(runs, stops, stops[1:], strict=False)
+    ]
 
 
-def _runs(target: Target, lines: Lines, depth: float) -> tuple[Ints, Ints, Ints]:
-    """The line, the first and the last node of each run of inside nodes that is `depth` [m] inside somewhere."""
-    change = np.diff(lines.inside.astype(np.int8), axis=1, prepend=0, append=0)
-    (row, first), last = np.nonzero(change == 1), np.nonzero(change == -1)[1] - 1
-    deep = target.margin(lines.points[row, (first + last) // 2]) > depth
-    for k in np.flatnonzero(~deep):  # not in the middle, but elsewhere?
-        deep[k] = (target.margin(lines.points[row[k], first[k] : last[k] + 1]) > depth).any()
-    return row[deep], first[deep], last[deep]
+@njit()
+def _runs(inside):  # type: ignore[no-untyped-def]
+    """(k, 3) the line, the first and the last node of each run of nodes of `inside` (m, n)."""
+    lines, nodes = inside.shape
+    runs, count = np.empty((lines * ((nodes + 1) // 2), 3), dtype=np.intp), 0
+    for m in range(lines):
+        for n in range(nodes):
+            if inside[m, n]:
+                if n == 0 or not inside[m, n - 1]:
+                    runs[count, 0], runs[count, 1] = m, n
+                    count += 1
+                runs[count - 1, 2] = n
+    return runs[:count].copy()
 
 
-def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[Cut], float]:
-    """Extrapolate the cuts of one line from two marches (Richardson).
+def _deep(target: Target, sets: Sequence[Lines], runs: list[Ints], depth: float) -> list[Ints]:
+    """Of the runs (k, 3) of each set those that are `depth` [m] inside somewhere."""
+    middles = [lines.points[run[:, 0], (run[:, 1] + run[:, 2]) // 2] for lines, run in zip(sets, runs, strict=True)]
+    deep = target.margin(np.concatenate(middles)) > depth
+    kept, done = list[Ints](), 0
+    for lines, run in zip(sets, runs, strict=True):
+        here = deep[done : done + len(run)]
+        for k in np.flatnonzero(~here).tolist():  # not in the middle, but elsewhere?
+            row, first, last = run[k].tolist()
+            here[k] = (target.margin(lines.points[row, first : last + 1]) > depth).any()
+        kept.append(run[here])
+        done += len(run)
+    return kept
+
+
+@njit()
+def _around_ends(s, points, runs, knots, around, outer, inner):  # type: ignore[no-untyped-def]
+    """Four nodes around both ends of each of the `runs` (k, 3): their places `knots` (2k, 4) and points `around`
+    (2k, 4, 3); and the places of the nodes between which the end is, `outer` and `inner` (2k,)."""
+    for e in range(len(outer)):
+        line, last = runs[e // 2, 0], e % 2 == 1
+        i = runs[e // 2, 2] if last else runs[e // 2, 1] - 1  # the cut is between nodes i and i + 1
+        outer[e], inner[e] = (s[i + 1], s[i]) if last else (s[i], s[i + 1])
+        window = min(max(i - 1, 0), len(s) - 4)
+        for shift in (-1, 1):  # near the net's limit, four nodes further inside
+            for k in range(window, window + 4):
+                if not np.isfinite(points[line, k, 0]):
+                    window = min(max(i - 1 + shift, 0), len(s) - 4)
+                    break
+        for k in range(4):
+            knots[e, k] = s[window + k]
+            for d in range(3):
+                around[e, k, d] = points[line, window + k, d]
+
+
+def _roots(target: Target, knots: Floats, points: Floats, outer: Floats, inner: Floats) -> Floats:
+    """Where cubics through four nodes each cross the target's end, to round-off.
+
+    By false position (Illinois): an end of the bracket that does not move twice is weighted by half in the next step.
+    A root that was found is not evaluated again.
+
+    Parameters
+    ----------
+    knots, points : (n, 4), (n, 4, 3) places of the nodes on their line [m], and the nodes [m].
+    outer, inner : (n,) places outside and inside the end [m].
+    """
+    below = np.minimum(target.margin(lagrange(knots, points, outer)), 0.0)
+    above = target.margin(lagrange(knots, points, inner))
+    found, index, at = inner.copy(), np.arange(len(inner)), inner.copy()
+    bracket = np.stack([outer, inner, below, above, np.zeros(len(inner)), 1e-15 * (np.abs(outer) + np.abs(inner))])
+    left = _narrow(above, found, index, at, bracket, True)
+    for _ in range(MOST_STEPS):
+        if left == 0:
+            break
+        here = index[:left]
+        value = target.margin(lagrange(knots[here], points[here], at[:left]))
+        left = _narrow(value, found, index, at, bracket, False)
+    return found
+
+
+@njit(error_model="numpy")
+def _narrow(value, found, index, at, bracket, first):  # type: ignore[no-untyped-def]
+    """One step of `_roots`: the brackets of the roots that are left are narrowed by the `value` (n,) at their last
+    guess, except the `first` time. Returns how many roots are left: these are moved to the front.
+
+    found : (m,) the last guess of every root.
+    index, at : (m,) of those that are left: the root, and the next guess.
+    bracket : (6, m) of those: outer and inner end, the values there, the end that moved last (1 for the inner, -1 for
+        the outer), and the smallest step.
+    """
+    left = 0
+    for k in range(len(value)):
+        outer, inner, below, above = bracket[0, k], bracket[1, k], bracket[2, k], bracket[3, k]
+        side, tiny, before = bracket[4, k], bracket[5, k], at[k]
+        if not first:
+            found[index[k]] = before
+            if value[k] > 0.0:
+                below, above, inner = (0.5 if side > 0.0 else 1.0) * below, value[k], before
+                side = 1.0
+            else:
+                below, above, outer = value[k], (0.5 if side < 0.0 else 1.0) * above, before
+                side = -1.0
+            if value[k] == 0.0 or not abs(outer - inner) > tiny:
+                continue
+        share = above / (above - below)
+        guess = inner + (share if np.isfinite(share) else 0.5) * (outer - inner)
+        if not first and not abs(guess - before) > tiny:
+            found[index[k]] = guess
+            continue
+        index[left], at[left] = index[k], guess
+        bracket[0, left], bracket[1, left], bracket[2, left] = outer, inner, below
+        bracket[3, left], bracket[4, left], bracket[5, left] = above, side, tiny
+        left += 1
+    return left
+
+
+def extrapolated(coarse: Cuts, fine: Cuts, lines: int, step: float) -> tuple[Cuts, Floats]:
+    """Extrapolate the cuts of lines from two marches (Richardson).
 
     Each end is matched with the nearest of its kind in the coarse march: where a line grazes the end of the target, the
     marches may find different pieces. An end that only the finer march finds is kept; its error is at most about half
@@ -189,152 +304,51 @@ def extrapolated(coarse: list[Cut], fine: list[Cut], step: float) -> tuple[list[
 
     Parameters
     ----------
-    coarse, fine : cuts of the line from the two marches.
+    coarse, fine : cuts of the lines from the two marches.
+    lines : their number.
     step : distance within which ends are matched [m].
 
     Returns
     -------
-    The cuts, and a bound of the finer march's error [m].
+    The cuts, and for each line a bound (lines,) of the finer march's error [m].
     """
-    ends, error = [end for cut in fine for end in cut], 0.0
-    better = list[float]()
-    for k, end in enumerate(ends):
-        change = min((end - cut[k % 2] for cut in coarse), key=abs, default=inf)
-        if abs(change) <= step:
-            better.append(end + change / 3)
-            error = max(error, abs(change) / 3)
-        else:
-            better.append(end)
-            error = max(error, min(abs(change), 0.5 * min(abs(other - end) for other in ends[:k] + ends[k + 1 :])))
-    if any(after <= before for before, after in pairwise(better)):
-        return fine, max(error, step)
-    return [Cut(start, end) for start, end in zip(better[::2], better[1::2], strict=True)], error
+    ends, errors = fine.ends.copy(), np.zeros(lines)
+    _extrapolate(coarse.line, coarse.ends, fine.line, fine.ends, step, ends, errors)
+    return Cuts(fine.line, ends), errors
 
 
-def _roots(target: Target, sets: Sequence[Lines], runs: Sequence[tuple[Ints, Ints, Ints]]) -> Floats:
-    """Where each run's line crosses the end before and after it, by a cubic through four nodes."""
-    gathered = list[tuple[Floats, Floats, Floats, Floats]]()
-    for (s, points, _), (line, first, last) in zip(sets, runs, strict=True):
-        row = np.repeat(line, 2)
-        i = np.column_stack([first - 1, last]).ravel()  # the cut is between nodes i and i + 1
-        side = np.tile([-1, 1], len(line))
-        window = np.clip(i - 1, 0, len(s) - 4)
-        for shift in (-1, 1):  # near the net's limit, four nodes further inside
-            lost = ~np.isfinite(points[row[:, None], window[:, None] + np.arange(4), 0]).all(axis=1)
-            window = np.where(lost, np.clip(i - 1 + shift, 0, len(s) - 4), window)
-        nodes = window[:, None] + np.arange(4)
-        gathered.append((s[nodes], points[row[:, None], nodes], s[i + (side > 0)], s[i + (side < 0)]))
-    knots, points, outer, inner = (np.concatenate(part) for part in zip(*gathered, strict=True))
-    return _bracketed(lambda at, index: target.margin(lagrange(knots[index], points[index], at)), outer, inner)
-
-
-def _bracketed(margin: Callable[[Floats, Ints], Floats], outer: Floats, inner: Floats) -> Floats:
-    """Roots (n,) of functions that are positive at `inner` (n,) and not at `outer` (n,), to round-off.
-
-    `margin(at, index)` evaluates the functions `index` (k,) at `at` (k,). By false position (Illinois): an end that
-    does not move twice is weighted by half in the next step. A root that was found is not evaluated again.
-    """
-    index = np.arange(len(inner))
-    below, above = np.minimum(margin(outer, index), 0.0), margin(inner, index)
-    tiny = 1e-15 * (np.abs(outer) + np.abs(inner))
-    side = np.zeros(len(inner))  # the end that moved last: 1 for the inner, -1 for the outer
-    found, at = inner.copy(), inner
-    for _ in range(100):
-        share = above / (above - below)
-        before, at = at, inner + np.where(np.isfinite(share), share, 0.5) * (outer - inner)
-        value = margin(at, index)
-        found[index] = at
-        inside = value > 0
-        below = np.where(inside, np.where(side > 0, 0.5, 1.0) * below, value)
-        above = np.where(inside, value, np.where(side < 0, 0.5, 1.0) * above)
-        outer, inner, side = np.where(inside, outer, at), np.where(inside, at, inner), np.where(inside, 1.0, -1.0)
-        left = (np.abs(at - before) > tiny) & (np.abs(outer - inner) > tiny) & (value != 0.0)
-        if not left.any():
-            break
-        index, at, outer, inner, below, above, side, tiny = (
-            array[left] for array in (index, at, outer, inner, below, above, side, tiny)
-        )
-    return found
-
-
-def with_apron(rods: Sequence[FlatRod], net: Net, lines: tuple[Floats, Floats], clearance: float) -> FlatGrid:
-    """The flat grid of rods, each prolonged past both ends.
-
-    Pieces of a line become one rod where the net continues between them. Lines that are crossed only there become
-    virtual rods. A rod keeps its end where the net ends.
-
-    Parameters
-    ----------
-    rods : each from end to end of the target.
-    net : in which they lie.
-    lines : offsets of the lines of the lattice, see `ChebyshevNet` [m].
-    clearance : distance of the first joint past an end from that end, at least [m].
-    """
-    u, v = lines
-    alive = np.isfinite(net.points[np.searchsorted(net.u, u - 1e-12)][:, np.searchsorted(net.v, v - 1e-12), 0])
-    families = {"u": _Lines.of(u, v, alive.T), "v": _Lines.of(v, u, alive)}
-    spans: dict[tuple[str, int, int], FlatRod] = {}
-    for rod in rods:
-        key = (rod.family, *families[rod.family].stretch_of(rod))
-        known = spans.get(key, rod)
-        spans[key] = known.cut(min(known.start, rod.start), max(known.end, rod.end))
-    joints = {family: np.zeros(family_lines.live.shape, dtype=bool) for family, family_lines in families.items()}
-    for (family, line, _), rod in spans.items():
-        stations, live = families[family].stations, families[family].live[line]
-        first = int(np.searchsorted(stations, rod.start - clearance, side="right")) - RINGS
-        last = int(np.searchsorted(stations, rod.end + clearance, side="left")) + RINGS - 1
-        span = np.arange(max(first, 0), min(last, len(stations) - 1) + 1)
-        joints[family][line, span[live[span]]] = True
-    spanned: dict[tuple[str, int], set[int]] = {}
-    for family, line, stretch in spans:
-        spanned.setdefault((family, line), set()).add(stretch)
-    points = joints["u"] | joints["v"].T
-    prolonged = list[FlatRod]()
-    for family, table in (("u", points), ("v", points.T)):
-        family_lines = families[family]
-        for line, offset in enumerate(family_lines.offsets.tolist()):
-            stations = family_lines.stations[table[line]]
-            stretches = family_lines.stretches[line][table[line]]
-            for stretch in sorted(spanned.get((family, line), set()).union(stretches.tolist())):
-                prolonged += _prolonged(
-                    spans.get((family, line, stretch)), family, offset, stations[stretches == stretch]
-                )
-    return FlatGrid.of(prolonged)
-
-
-@dataclass(frozen=True, eq=False)
-class _Lines:
-    """Lines of one family.
-
-    Parameters
-    ----------
-    stations : (n,) where they are crossed [m].
-    offsets : (m,) [m].
-    live : (m, n) where the net has nodes.
-    stretches : (m, n) number of the stretch of each node on its line; a stretch ends where the net has no node.
-    """
-
-    stations: Floats
-    offsets: Floats
-    live: Bools
-    stretches: Ints
-
-    @staticmethod
-    def of(stations: Floats, offsets: Floats, live: Bools) -> "_Lines":
-        return _Lines(stations, offsets, live, np.cumsum(~live, axis=1))
-
-    def stretch_of(self, rod: FlatRod) -> tuple[int, int]:
-        """The line and the stretch of it on which a rod lies."""
-        line = int(np.argmin(np.abs(self.offsets - rod.offset)))
-        away = np.where(self.live[line], np.abs(self.stations - 0.5 * (rod.start + rod.end)), np.inf)
-        return line, int(self.stretches[line, np.argmin(away)])
-
-
-def _prolonged(rod: FlatRod | None, family: str, offset: float, joints: Floats) -> list[FlatRod]:
-    """A rod from the first to the last joint on its line, including its own ends."""
-    if rod is not None:
-        return [rod.cut(min(rod.start, *joints), max(rod.end, *joints)) if len(joints) else rod]
-    if len(joints) < 2:
-        return []
-    make = FlatRod.u if family == "u" else FlatRod.v
-    return [make(f"apron {family.upper()} {offset:+.4f}", offset, float(joints[0]), float(joints[-1]), virtual=True)]
+@njit()
+def _extrapolate(coarse_line, coarse, line, fine, step, ends, errors):  # type: ignore[no-untyped-def]
+    begin, matching = 0, 0
+    while begin < len(line):
+        on, stop, error = line[begin], begin + 1, 0.0
+        while stop < len(line) and line[stop] == on:
+            stop += 1
+        while matching < len(coarse_line) and coarse_line[matching] < on:
+            matching += 1
+        for k in range(begin, stop):
+            for side in range(2):
+                change, c = np.inf, matching
+                while c < len(coarse_line) and coarse_line[c] == on:
+                    if abs(fine[k, side] - coarse[c, side]) < abs(change):
+                        change = fine[k, side] - coarse[c, side]
+                    c += 1
+                if abs(change) <= step:
+                    ends[k, side] = fine[k, side] + change / 3
+                    error = max(error, abs(change) / 3)
+                else:
+                    apart = fine[k, 1] - fine[k, 0]
+                    if side == 0 and k > begin:
+                        apart = min(apart, fine[k, 0] - fine[k - 1, 1])
+                    if side == 1 and k + 1 < stop:
+                        apart = min(apart, fine[k + 1, 0] - fine[k, 1])
+                    error = max(error, min(abs(change), 0.5 * apart))
+        ascending = True
+        for k in range(begin, stop):
+            ascending &= ends[k, 0] < ends[k, 1] and (k == begin or ends[k - 1, 1] < ends[k, 0])
+        if not ascending:
+            error = max(error, step)
+            for k in range(begin, stop):
+                ends[k, 0], ends[k, 1] = fine[k, 0], fine[k, 1]
+        errors[on] = error
+        begin = stop

@@ -25,6 +25,7 @@ from rodshell.units import length_text
 MARGIN = 2.3  # spacings marched past the end of the target: two rings of joints are bound there, see `with_apron`
 STRIDE = 0.2  # of the target's size: steps of the first march
 STRIDES = 10  # steps of the first march, from the anchor each way
+ROUGH = 1e-2  # of a step: tolerance of the first march
 FEWEST_STEPS = 6  # from each line to the next
 MOST_NODES = 4_000_000
 
@@ -226,10 +227,10 @@ def _stride(target: Target, start: Floats, heading: Floats, heights: Heights) ->
     """The first net, in long steps: its axes, and the nodes between the parts of them that are inside."""
     s: Floats = np.arange(-STRIDES, STRIDES + 1) * np.float64(STRIDE * target.size)
     net = Net(s, s, np.full((len(s), len(s), 3), np.nan), heights=heights)
-    lay_axes(target, net, start, heading)
+    lay_axes(target, net, start, heading, tolerance=ROUGH)
     inside = target.margin(np.concatenate([net.points[:, STRIDES], net.points[STRIDES]])).reshape(2, -1) > 0
     rows, columns = (_around(axis) for axis in inside)
-    fill_quadrants(target, net, rows[:, None] & columns)
+    fill_quadrants(target, net, rows[:, None] & columns, tolerance=ROUGH)
     return Covering(s, s, net.points, inside_nodes(target, net), heights=heights)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats
 from rodshell.geometry.curves import resampled
-from rodshell.geometry.frames import cross, unit
+from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
 from rodshell.nets.compass import (
     NEWTON_STEPS,
@@ -98,85 +98,111 @@ def interpolated(net: Net, u: Floats, v: Floats) -> Floats:
 def _refine_axes(target: Target, net: Net, anchor: Floats, heading: Floats) -> bool:
     """Move the guess of the axes to the two geodesics through the anchor; return whether this converged."""
     i0, j0 = net.origin
-    ahead, back, left, right = axes(target, anchor, heading)
-    normal = cross(ahead, left)
+    directions, starts = axes(target, anchor, heading), np.tile(anchor, (4, 1))
     net.points[i0, j0] = anchor
-    arms = (
-        (net.points[i0 + 1 :, j0], np.diff(net.u[i0:]), ahead),
-        (net.points[:i0, j0][::-1], np.diff(-net.u[i0::-1]), back),
-        (net.points[i0, j0 + 1 :], np.diff(net.v[j0:]), left),
-        (net.points[i0, :j0][::-1], np.diff(-net.v[j0::-1]), right),
-    )
-    points = np.concatenate([arm for arm, _, _ in arms])
-    steps = np.concatenate([step for _, step, _ in arms])
-    stops = np.cumsum([0, *(len(arm) for arm, _, _ in arms)])
-    layers = _layers_of_axes(target, net.heights, stops[2], stops[4]) if net.heights != ON_SURFACE else ()
-    starts = [anchor] * 4
-    if layers and np.isfinite(points).all():
-        starts = [layer.of(anchor[None])[0] for layer, _ in layers for _ in range(2)]
+    points, steps, stops = _arms(net.points, net.u, net.v, i0, j0)
+    if not np.isfinite(points).all():
+        return False
+    layers = list[tuple[Layer, slice]]()
+    if net.heights != ON_SURFACE:  # each axis on its own
+        parts = slice(0, stops[2]), slice(stops[2], stops[4])
+        layers = [(Layer(target, height), part) for height, part in zip(net.heights, parts, strict=True)]
+        starts = np.concatenate([np.tile(layer.of(anchor[None]), (2, 1)) for layer, _ in layers])
         points = np.concatenate([layer.of(points[part]) for layer, part in layers])
-    moved = np.inf if np.isfinite(points).all() else np.nan
+    moved = np.inf
     for _ in range(ROUNDS):
-        if not moved >= CONVERGED * target.size:
-            break
         if layers:
-            parts = [layer.implicit(points[part]) for layer, part in layers]
-            model = Implicit(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+            models = [layer.implicit(points[part]) for layer, part in layers]
+            model = Implicit(*(np.concatenate(values) for values in zip(*models, strict=True)))
         else:
             model = target.implicit(points)
-        moved = 0.0
-        for k, (_, _, direction) in enumerate(arms):
-            here = slice(stops[k], stops[k + 1])
-            moved += _geodesic(starts[k], direction, normal, steps[here], points[here], *(part[here] for part in model))
+        moved = _straighten(starts, directions, steps, stops, points, *model)
+        if not moved >= CONVERGED * target.size:
+            break
     if not moved < CONVERGED * target.size:
         return False
     if layers:
         points = np.concatenate([layer.below(points[part]) for layer, part in layers])
-    for k, (arm, _, _) in enumerate(arms):
-        arm[:] = points[stops[k] : stops[k + 1]]
+    _put_arms(points, stops, i0, j0, net.points)
     return True
 
 
-def _layers_of_axes(target: Target, heights: Heights, middle: int, stop: int) -> tuple[tuple[Layer, slice], ...]:
-    """The layer of each axis, and the range of its nodes among those of both axes."""
-    return (Layer(target, heights[0]), slice(0, middle)), (Layer(target, heights[1]), slice(middle, stop))
+@njit()
+def _arms(points, u, v, i0, j0):  # type: ignore[no-untyped-def]
+    """The nodes (n, 3) of the axes but the anchor, one arm after the other, in the order of `axes` and outwards; the
+    steps (n,) that lead to them; and where each arm begins, with the end of the last (5,)."""
+    stops = np.zeros(5, dtype=np.intp)
+    for arm in range(4):
+        lines, origin = (u, i0) if arm < 2 else (v, j0)
+        stops[arm + 1] = stops[arm] + (len(lines) - 1 - origin if arm % 2 == 0 else origin)
+    x, steps = np.empty((stops[4], 3)), np.empty(stops[4])
+    for arm in range(4):
+        side = 1 - 2 * (arm % 2)
+        for n in range(stops[arm], stops[arm + 1]):
+            k = side * (n - stops[arm] + 1)
+            i, j = (i0 + k, j0) if arm < 2 else (i0, j0 + k)
+            steps[n] = side * ((u[i] - u[i - side]) if arm < 2 else (v[j] - v[j - side]))
+            for d in range(3):
+                x[n, d] = points[i, j, d]
+    return x, steps, stops
+
+
+@njit()
+def _put_arms(x, stops, i0, j0, points):  # type: ignore[no-untyped-def]
+    for arm in range(4):
+        for n in range(stops[arm], stops[arm + 1]):
+            k = (1 - 2 * (arm % 2)) * (n - stops[arm] + 1)
+            for d in range(3):
+                if arm < 2:
+                    points[i0 + k, j0, d] = x[n, d]
+                else:
+                    points[i0, j0 + k, d] = x[n, d]
 
 
 @njit(error_model="numpy")
-def _geodesic(start, direction, normal, steps, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
-    """Move the `points` of one arm of `compass.geodesics`, on second order models there; return by how much, or NaN."""
-    point, tangent, normal, moved = start.copy(), direction.copy(), normal.copy(), 0.0
-    flat, chord, swing, away, slope = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for s in range(len(steps)):
-        h = steps[s]
-        out = tangent[0] * normal[0] + tangent[1] * normal[1] + tangent[2] * normal[2]
+def _straighten(starts, directions, steps, stops, points, value, gradient, hessian):  # type: ignore[no-untyped-def]
+    """Move the `points` (n, 3) of the arms to the geodesics that begin at `starts` (4, 3) in `directions` (4, 3), see
+    `compass.geodesics`, on second order models at the points; return by how much, or NaN."""
+    moved = 0.0
+    point, tangent, normal, slope = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    flat, chord, swing, away = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for arm in range(4):
         for k in range(3):
-            flat[k] = tangent[k] - out * normal[k]
-        flat /= np.sqrt(flat[0] ** 2 + flat[1] ** 2 + flat[2] ** 2)
-        turn, change = 0.0, np.inf
-        for _ in range(NEWTON_STEPS):
-            cos, sin = np.cos(turn), np.sin(turn)
+            m, p = (k + 1) % 3, (k + 2) % 3
+            point[k], tangent[k] = starts[arm, k], directions[arm, k]
+            normal[k] = directions[0, m] * directions[2, p] - directions[0, p] * directions[2, m]
+        for s in range(stops[arm], stops[arm + 1]):
+            h, square = steps[s], 0.0
+            out = tangent[0] * normal[0] + tangent[1] * normal[1] + tangent[2] * normal[2]
             for k in range(3):
-                chord[k] = cos * flat[k] + sin * normal[k]
-                swing[k] = cos * normal[k] - sin * flat[k]
-                away[k] = point[k] + h * chord[k] - points[s, k]
-            level, rate = value[s], 0.0
+                flat[k] = tangent[k] - out * normal[k]
+                square += flat[k] * flat[k]
             for k in range(3):
-                bent = hessian[s, k, 0] * away[0] + hessian[s, k, 1] * away[1] + hessian[s, k, 2] * away[2]
-                level += (gradient[s, k] + 0.5 * bent) * away[k]
-                slope[k] = gradient[s, k] + bent
-                rate += slope[k] * swing[k]
-            change = level / (h * rate)
-            if not abs(change) >= EXACT:
-                break
-            turn -= change
-        if not (abs(turn) < 1.2 and abs(change) < 1e-9):
-            return np.nan
-        for k in range(3):
-            moved = max(moved, abs(away[k]))
-            points[s, k] = point[k] = point[k] + h * chord[k]
-            tangent[k] = chord[k]
-        normal = slope / np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+                flat[k] /= np.sqrt(square)
+            turn, change = 0.0, np.inf
+            for _ in range(NEWTON_STEPS):
+                cos, sin = np.cos(turn), np.sin(turn)
+                for k in range(3):
+                    chord[k] = cos * flat[k] + sin * normal[k]
+                    swing[k] = cos * normal[k] - sin * flat[k]
+                    away[k] = point[k] + h * chord[k] - points[s, k]
+                level, rate = value[s], 0.0
+                for k in range(3):
+                    bent = hessian[s, k, 0] * away[0] + hessian[s, k, 1] * away[1] + hessian[s, k, 2] * away[2]
+                    level += (gradient[s, k] + 0.5 * bent) * away[k]
+                    slope[k] = gradient[s, k] + bent
+                    rate += slope[k] * swing[k]
+                change = level / (h * rate)
+                if not abs(change) >= EXACT:
+                    break
+                turn -= change
+            if not (abs(turn) < 1.2 and abs(change) < 1e-9):
+                return np.nan
+            steep = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+            for k in range(3):
+                moved = max(moved, abs(away[k]))
+                points[s, k] = point[k] = point[k] + h * chord[k]
+                tangent[k], normal[k] = chord[k], slope[k] / steep
     return moved
 
 
@@ -184,10 +210,10 @@ def _refine(target: Target, net: Net, wanted: Bools) -> None:
     """Move the guess of all `wanted` (nu, nv) nodes but those of the axes to the net; NaN for nodes that do not
     converge. A round evaluates the target only where the last one moved a node: elsewhere its model is still good."""
     i0, j0 = net.origin
-    models, row = np.empty_like(net.points), np.empty(wanted.shape, dtype=np.intp)
-    value, gradient, hessian = target.implicit(_chosen(net.points, wanted, i0, j0, models, row))
-    moved, new = np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
-    layered = net.heights != ON_SURFACE
+    row, moved, new = np.empty(wanted.shape, dtype=np.intp), np.zeros(wanted.shape), np.ones(wanted.shape, dtype=bool)
+    models = _chosen(net.points, wanted, i0, j0, row)
+    value, gradient, hessian = target.implicit(models)
+    layered, limit = net.heights != ON_SURFACE, CONVERGED * target.size
     normals = np.zeros_like(net.points) if layered else np.empty((0, 0, 3))
     if layered:
         normals[row >= 0] = unit(gradient[row[row >= 0]])  # exact on the axes, which stay; others follow in order
@@ -195,38 +221,62 @@ def _refine(target: Target, net: Net, wanted: Bools) -> None:
         _sweep(
             net.points, models, row, value, gradient, hessian, net.u, net.v, i0, j0, net.heights, normals, new, moved
         )
-        new = moved >= CONVERGED * target.size
-        if not new.any():
+        rows, unconverged = _rows_to_renew(net.points, row, moved, limit, new, models)
+        if not unconverged:
             return
-        models[new], rows = net.points[new], row[new]
-        value[rows], gradient[rows], hessian[rows] = target.implicit(models[new])
-    _forget(net.points, moved >= CONVERGED * target.size, i0, j0)
+        value[rows], gradient[rows], hessian[rows] = target.implicit(models[rows])
+    _forget(net.points, moved >= limit, i0, j0)
 
 
 @njit()
-def _chosen(points, wanted, i0, j0, models, row):  # type: ignore[no-untyped-def]
+def _chosen(points, wanted, i0, j0, row):  # type: ignore[no-untyped-def]
     """The guesses (n, 3) among `points` (nu, nv, 3) of `wanted` nodes and of those on the axes; the others become NaN.
-    `row` (nu, nv) is the index of each in the result, -1 for the others; `models` (nu, nv, 3) is a copy of all."""
-    chosen, count = np.empty((row.size, 3)), 0
+    `row` (nu, nv) is the index of each in the result, -1 for the others."""
+    count = 0
     for i in range(row.shape[0]):
         for j in range(row.shape[1]):
-            guessed = (wanted[i, j] or i == i0 or j == j0) and not np.isnan(points[i, j, 0])
-            row[i, j] = count if guessed else -1
+            row[i, j] = -1
+            if (wanted[i, j] or i == i0 or j == j0) and not np.isnan(points[i, j, 0]):
+                row[i, j] = count
+                count += 1
+    chosen = np.empty((count, 3))
+    for i in range(row.shape[0]):
+        for j in range(row.shape[1]):
             for k in range(3):
-                if not guessed:
+                if row[i, j] < 0:
                     points[i, j, k] = np.nan
-                models[i, j, k] = chosen[count, k] = points[i, j, k]
-            count += guessed
-    return chosen[:count]
+                else:
+                    chosen[row[i, j], k] = points[i, j, k]
+    return chosen
+
+
+@njit()
+def _rows_to_renew(points, row, moved, limit, new, models):  # type: ignore[no-untyped-def]
+    """The rows (n,) of nodes that have `moved` by more than the `limit`, whose `models` are put where they are now and
+    which alone are `new`; and whether there are any."""
+    count = 0
+    for i in range(row.shape[0]):
+        for j in range(row.shape[1]):
+            new[i, j] = moved[i, j] >= limit
+            count += new[i, j]
+    rows, filled = np.empty(count, dtype=np.intp), 0
+    for i in range(row.shape[0] if count > 0 else 0):
+        for j in range(row.shape[1]):
+            if new[i, j]:
+                rows[filled] = row[i, j]
+                filled += 1
+                for k in range(3):
+                    models[row[i, j], k] = points[i, j, k]
+    return rows, count > 0
 
 
 @njit(error_model="numpy")
 def _sweep(  # type: ignore[no-untyped-def]
     points, models, row, value, gradient, hessian, u, v, i0, j0, heights, normals, new, moved
 ):
-    """March the `points` (nu, nv, 3) on second order models at `models` (nu, nv, 3), whose values, gradients and
-    Hessians are in the rows `row` (nu, nv), -1 where there is none; `moved` (nu, nv) returns the distance from them.
-    Nodes whose models and neighbours are not `new` (nu, nv) do not move.
+    """March the `points` (nu, nv, 3) on second order models at `models` (n, 3); `row` (nu, nv) is the model of each, -1
+    where there is none, and `moved` (nu, nv) returns the distance from it. Nodes whose models and neighbours are not
+    `new` (nu, nv) do not move.
 
     `normals` (nu, nv, 3) of the surface at the points are updated if rods are at `heights` above it; empty otherwise.
     """
@@ -244,9 +294,13 @@ def _sweep(  # type: ignore[no-untyped-def]
                 moved[i, j], r = np.nan, row[i, j]
                 if r < 0:
                     continue
-                a, b, d, here = _at(points, i, q), _at(points, p, j), _at(points, p, q), _at(models, i, j)
-                away = less(d, _at(models, p, q))  # guess: as far from its model as its neighbours are from theirs
-                away = less(_plus(less(a, _at(models, i, q)), less(b, _at(models, p, j))), away)
+                if min(row[i, q], row[p, j], row[p, q]) < 0:
+                    points[i, j, 0] = points[i, j, 1] = points[i, j, 2] = np.nan
+                    continue
+                a, b, d = _at(points, i, q), _at(points, p, j), _at(points, p, q)
+                here = _of(models, r)
+                away = less(d, _of(models, row[p, q]))  # guess: as far from its model as its neighbours are from theirs
+                away = less(_plus(less(a, _of(models, row[i, q])), less(b, _of(models, row[p, j]))), away)
                 from_a, from_b = abs(v[j] - v[q]), abs(u[i] - u[p])
                 if layered:
                     a, b = _raised(a, heights[1], normals, i, q), _raised(b, heights[0], normals, p, j)
@@ -298,6 +352,11 @@ def _raised(point, height, normals, i, j):  # type: ignore[no-untyped-def]
 @njit()
 def _at(points, i, j):  # type: ignore[no-untyped-def]
     return points[i, j, 0], points[i, j, 1], points[i, j, 2]
+
+
+@njit()
+def _of(models, row):  # type: ignore[no-untyped-def]
+    return models[row, 0], models[row, 1], models[row, 2]
 
 
 @njit()

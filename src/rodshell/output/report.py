@@ -16,11 +16,12 @@ from rodshell.output.pictures import picture_svg
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
 from rodshell.output.schedules import joints_table as joints
 from rodshell.output.schedules import supports_table as supports
+from rodshell.output.section_profiles import profiles_svg
 from rodshell.output.svg import drawing_svg, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import SHELLS, shown_case
-from rodshell.results.records import Agreement, Drape, Ends, PopUp, Record
+from rodshell.results.records import Agreement, Drape, Ends, Gate, PopUp, Record
 from rodshell.results.results import Clearance, Reactions, Stock
 from rodshell.results.verdict import ENDS, facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
@@ -68,6 +69,8 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         facts=facts(results),
         dropped=results.dropped,
         view=_view(archive),
+        refinement=refinement_table(results),
+        profiles=None if (picture := profiles_svg(results.rods)) is None else Markup(picture),
         supports=supports_table(results),
         checks=checks_table(results),
         pictures=[(CAPTIONS[state], shown(picture_svg(archive, state))) for state in states],
@@ -229,6 +232,33 @@ def supports_table(results: Results) -> dict[str, Any] | None:
     rows += _weight_rows(results, ends, rounding)
     rows += _side_by_side(_POP_UP, [results.pop_up.get(end) or PopUp() for end in ends], rounding)
     return {"ends": ends, "rows": rows} if rows else None
+
+
+GATE_WORDS: dict[Gate, str] = {
+    "flat": "the rods fit together in a plane",
+    "from_flat": "pushed up from flat it comes to this shape",
+    "remeshed": "meshed again it is as near to the target",
+    "tolerance": "built with errors it stays stable and nearly as near",
+    "stable": "it is a stable equilibrium",
+}
+
+
+def refinement_table(results: Results) -> dict[str, Any] | None:
+    """What the refinement gained: `rows` of (title, before and after), `gates` of (what, yes or no), and `said`."""
+    found = results.refinement
+    if found is None or found.before is None or found.after is None:
+        return None
+    both = (found.before, found.after)
+    entries = (
+        ("Root mean square of the gap, over the target's size", "rms_relative", wording.percent),
+        ("Largest gap, over the target's size", "max_relative", wording.percent),
+    )
+    said = f"Varied: {', '.join(found.vary)}; {found.ends} ends; {found.factorizations} factorisations"
+    said += f", and {found.gate_factorizations} for the gates."
+    if found.refused:
+        said += f" The best design was refused, {found.refused}."
+    gates = [(GATE_WORDS[gate], wording.yes_or_no(passed)) for gate, passed in (found.gates or {}).items()]
+    return {"rows": _side_by_side(entries, both, rounding_of(results)), "gates": gates, "said": said}
 
 
 def checks_table(results: Results) -> dict[str, Any] | None:

@@ -11,11 +11,14 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, unit
 from rodshell.model.shell import last_edges
 from rodshell.refining.change import Change
+from rodshell.refining.length_families import FIRST, MOST, usual_span
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
 
 MOST_TURN, FIRST_TURN = radians(15.0), radians(1.0)
+PROBE = 1e-5  # of the target's size: differences of points on it are then exact to 1e-8
+CORRECTIONS = 4  # of a support's place
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,8 @@ class Directions:
     axes: Floats
     box: Box
     image: Callable[[Operation], Image]
+
+    stock = None
 
     def tangents(self, values: Floats) -> Floats:
         """(2m, 3) directions of the clamps.
@@ -108,3 +113,106 @@ class Clamps:
             return Image(index, np.tile([1.0, by.handed], len(by.ends)))
 
         return Directions(structure, axes, box, image)
+
+
+@dataclass(frozen=True, eq=False)
+class Slides:
+    """How far each rod end is moved along the target's end, with its clamp; on the target it stays as near to its end.
+
+    Parameters
+    ----------
+    structure : the shell.
+    along, inwards : (2m, 3) unit vectors in the surface, along its end and across it.
+    box : of the variables [m].
+    image : where an operation maps the variables.
+    """
+
+    structure: Structure
+    along: Floats
+    inwards: Floats
+    box: Box
+    image: Callable[[Operation], Image]
+
+    stock = None
+
+    def moved(self, values: Floats) -> Floats:
+        """(2m, 3) displacements of the rod ends [m].
+
+        Each end goes along a straight line, and from there back to the surface and to its distance from the end. What
+        that does to an end that is not moved at all is taken away: so no variable has an effect at zero.
+
+        Parameters
+        ----------
+        values : (2m,) of the variables [m].
+        """
+        return np.asarray(self._placed(values) - self._placed(0.0 * values))
+
+    def change(self, values: Floats) -> Change:
+        """What a design does.
+
+        Parameters
+        ----------
+        values : (2m,) the design [m].
+        """
+        structure, count = self.structure, len(values)
+        held = len(structure.held)
+        none = Change.none(len(structure.mesh.edges), held, count)
+        step = PROBE * structure.target.size
+        ahead, behind = (self._placed(values + sign * step) for sign in (1.0, -1.0))
+        moved, slopes = none.held, none.held_slopes
+        every = np.arange(count)
+        for first in range(0, held, count):  # the ends, and the ghost nodes of clamps
+            moved[first : first + count] = self.moved(values)
+            slopes[every, first + every] = (ahead - behind) / (2.0 * step)
+        return replace(none, held=moved, held_slopes=slopes)
+
+    def applied(self, grid: Grid, values: Floats) -> Grid:
+        """The grid with these supports.
+
+        Parameters
+        ----------
+        grid : before.
+        values : (2m,) the design [m].
+        """
+        return replace(grid, boundary=replace(grid.boundary, points=grid.boundary.points + self.moved(values)))
+
+    def _placed(self, values: Floats) -> Floats:
+        target, points = self.structure.target, self.structure.popped.boundary.points
+        height, margin = target.distance(points), target.margin(points)
+        x, step = points + values[:, None] * self.along, PROBE * target.size
+        for _ in range(CORRECTIONS):
+            gap = target.gap(x)
+            x = x - (gap.distance - height)[:, None] * gap.normal
+            steep = (target.margin(x + step * self.inwards) - target.margin(x - step * self.inwards)) / (2.0 * step)
+            x = x + ((margin - target.margin(x)) / steep)[:, None] * self.inwards
+        return x
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Positions of the supports along the end of the target."""
+
+    name = "supports"
+
+    def on(self, structure: Structure) -> Slides:
+        """How far each rod end is moved.
+
+        Parameters
+        ----------
+        structure : the shell.
+        """
+        target, points = structure.target, structure.popped.boundary.points
+        normals, step = target.gap(points).normal, PROBE * target.size
+        steep = np.stack(
+            [
+                (target.margin(points + step * axis) - target.margin(points - step * axis)) / (2 * step)
+                for axis in np.eye(3)
+            ],
+            axis=1,
+        )
+        inwards = unit(steep - np.einsum("ex,ex->e", steep, normals)[:, None] * normals)
+        span, zero = usual_span(structure.mesh), np.zeros(len(points))
+        box = Box(zero, zero - MOST * span, zero + MOST * span, zero + FIRST * span)
+        return Slides(
+            structure, cross(normals, inwards), inwards, box, lambda by: Image(by.ends, np.full(len(points), by.handed))
+        )

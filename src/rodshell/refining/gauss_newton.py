@@ -17,8 +17,9 @@ from rodshell.refining.structure import Point
 from rodshell.refining.variables import Variables
 
 ENOUGH = 0.01  # relative decrease of the root of the sum of squares below which a foreseen step is not worth taking
+NEAR_ENOUGH = 1e-5  # relative gap, of which the mesh knows no more
 POOR, GOOD = 0.25, 0.75  # actual over foreseen decrease
-LEAST_RADIUS = 1e-3
+FIRM, LEAST_RADIUS = 0.1, 1e-3  # radius that must not bound a step which says that there is no more to gain; the least
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,9 @@ def gauss_newton(
     here, accepted, steps, factorizations = first, [first], list[Step](), 1
     converged, fresh = False, True
     while len(steps) < most and radius >= LEAST_RADIUS:
+        if here.rms < NEAR_ENOUGH:
+            converged = True
+            break
         if fresh:
             r, jacobian = residuals(objectives, here), slopes(objectives, here) * box.scale
             reduced, right = _reduced(jacobian, r)
@@ -95,7 +99,8 @@ def gauss_newton(
         high = np.minimum((box.upper - here.values) / box.scale, radius)
         step = _least_squares(reduced, right, low, high)
         foreseen = float(np.sum((r + jacobian @ step) ** 2))
-        if np.sqrt(foreseen) > (1.0 - ENOUGH) * np.sqrt(cost):
+        reached = float(np.abs(step).max()) > 0.99 * radius
+        if np.sqrt(foreseen) > (1.0 - ENOUGH) * np.sqrt(cost) and not (reached and radius < FIRM):
             converged = True
             break
         values = np.clip(here.values + box.scale * step, box.lower, box.upper)
@@ -113,7 +118,6 @@ def gauss_newton(
             good = allows(there)
         steps.append(Step(len(steps) + 1, None if there is None else there.rms, lowest, radius, good))
         progress(steps[-1])
-        reached = float(np.abs(step).max()) > 0.99 * radius
         if not good or gain < POOR:
             radius *= 0.3 if there is None else 0.5
         elif gain > GOOD and reached:

@@ -42,6 +42,8 @@ class Stations:
     image: Callable[[Operation], Image]
     across: csr_array
 
+    stock = None
+
     def change(self, values: Floats) -> Change:
         """What a design does.
 

@@ -132,8 +132,8 @@ class LowestEigenvalue:
 
     least: float
     before: float
-    margin: float = 0.2
-    weight: float = 0.01
+    margin: float = 0.5
+    weight: float = 0.03
 
     def residuals(self, here: Point) -> Floats:
         return np.asarray(self.weight * np.maximum(self._wanted - here.modes.values / self.before, 0.0))

@@ -8,17 +8,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
+from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
 from rodshell.formfinding.popup import Ends, PopUp
 from rodshell.formfinding.trim import Footprint
 from rodshell.model import Shell
-from rodshell.refining.end_families import Clamps
+from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
-from rodshell.refining.stiffness_families import DoubleLaths, Taper
-from rodshell.refining.structure import Point, Structure
+from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
+from rodshell.refining.stock import rounded
+from rodshell.refining.structure import Point, Structure, under_load
 from rodshell.refining.variables import Design, Family, Grid, design_of
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import find_equilibrium
@@ -26,11 +31,12 @@ from rodshell.solve.problem import Problem
 from rodshell.validation import choice
 
 FAMILIES: dict[str, Family] = {
-    family.name: family for family in (Taper(), DoubleLaths(), Tails(), Clamps(), Holes(), Offsets())
+    family.name: family
+    for family in (Taper(), DoubleLaths(), Sections(), Tails(), Clamps(), Supports(), Holes(), Offsets())
 }
 """The families of variables by the names that users write."""
 
-LENGTHS = ("tails", "holes", "offsets")  # work by compressing rods
+STIFFNESSES = ("taper", "double", "sections")  # the others work by compressing rods, too
 LEAST_EIGENVALUE = 0.5  # of the lowest one before
 Progress = Callable[[Step], None]
 
@@ -62,6 +68,7 @@ class Refinement:
     converged : whether no further step would gain much.
     factorizations : of the search.
     steps : its evaluations.
+    loaded : gaps before and after under the loads, where it was refined under loads; else None.
     """
 
     vary: tuple[str, ...]
@@ -72,6 +79,7 @@ class Refinement:
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
+    loaded: tuple[Agreement, Agreement] | None = None
 
     @property
     def gap_before(self) -> Agreement:
@@ -91,6 +99,8 @@ def refine(
     ends: Ends | None = None,
     objectives: Sequence[Objective] | None = None,
     least_eigenvalue: float = LEAST_EIGENVALUE,
+    under_weight: bool = False,
+    dead_loads: Floats | None = None,
     most_evaluations: int = 30,
     progress: Progress = lambda step: None,
 ) -> Refinement:
@@ -101,35 +111,47 @@ def refine(
     stages : of one shell, with a stable pop-up.
     vary : what is varied: names of `FAMILIES`, or families with settings of their own.
     ends : how the rods' ends are held; None: as first asked for.
-    objectives : what is made small; None: the mean square of the gap and, where lengths vary, compression.
+    objectives : what is made small; None: the mean square of the gap and, where not only stiffness varies, compression.
     least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
+    under_weight : bring the shell that carries its own weight to the target; unloaded it then stands above.
+    dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
     most_evaluations : designs that are tried.
     progress : called after each; what it raises ends the search.
 
     Raises
     ------
-    InputError : no such family; the shell has no target, no pop-up with these ends, or is not stable.
+    InputError : no such family; the shell has no target, no pop-up with these ends, is not stable, or falls under the
+        loads.
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
-    structure = structure_of(stages, ends)
+    structure = replace(structure_of(stages, ends), weighs=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
     here, spent = first_point(structure, variables)
     before = float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
-    stressed = [Prestress()] if any(family.name in LENGTHS for family in families) else []
+    stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
     goals = [Gap(), *stressed] if objectives is None else list(objectives)
     found = gauss_newton(
         variables, here, [*goals, floor],
         allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
     )  # fmt: skip
+    accepted = found.accepted
+    if any(sizes is not None for sizes in variables.stock):
+        chosen, more = rounded(variables, accepted[-1], [*goals, floor], floor.allows)
+        spent += more
+        nearer = chosen is not None and chosen.rms < here.rms
+        accepted = (here, chosen) if chosen is not None and nearer else (here,)
     grid = Grid(structure.mesh, stages.boundary)
-    designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in found.accepted)
+    designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in accepted)
     after, made = popped_up(stages, designs[-1], ends)
+    loaded = None
+    if here.equilibrium.problem.load is not None:
+        loaded = loaded_gap(stages, designs[0], ends), loaded_gap(after, designs[-1], ends)
     held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
     names = tuple(family.name for family in families)
     return Refinement(
-        names, ends, held, after, designs, found.converged, spent + found.factorizations + made, found.steps
+        names, ends, held, after, designs, found.converged, spent + found.factorizations + made, found.steps, loaded
     )
 
 
@@ -151,6 +173,9 @@ def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family
     names = [family.name for family in families]
     if not names or len(set(names)) < len(names):
         raise InputError(f"vary must name one family or several, each once, not {names}")
+    stiff = [name for name in names if name in STIFFNESSES]
+    if len(stiff) > 1:
+        raise InputError(f"{' and '.join(stiff)} both decide the sections along a rod: vary one of them")
     return families
 
 
@@ -193,15 +218,21 @@ def first_point(structure: Structure, variables: Design) -> tuple[Point, int]:
     """
     values = variables.box.start
     change = variables.change(values)
-    popped = structure.popped.equilibrium
-    if not (change.stiffness.any() or change.lengths.any() or change.held.any()):
-        return Point(structure, values, change, structure.edges, popped), 0
-    edges = structure.edges.varied(change.table(structure.edges.table))
-    problem = replace(popped.problem, elements=edges.shell.elements, stretch=edges.shell.stretch)
-    found = find_equilibrium(problem, popped.state, popped.forces)
-    if not found.report.stable:
-        raise InputError("the first design has no stable equilibrium near the shell's own: vary something else")
-    return Point(structure, values, change, edges.at(found.elements), found), found.report.factorizations
+    here, edges, made = structure.popped.equilibrium, structure.edges, 0
+    if change.stiffness.any() or change.lengths.any() or change.held.any():
+        edges = edges.varied(change.table(edges.table))
+        problem = replace(here.problem, elements=edges.shell.elements, stretch=edges.shell.stretch)
+        here = find_equilibrium(problem, here.state, here.forces)
+        made = here.report.factorizations
+        if not here.report.stable:
+            raise InputError("the first design has no stable equilibrium near the shell's own: vary something else")
+    load = structure.load(edges)
+    if load is not None:
+        loaded, more = under_load(here, load)
+        if loaded is None:
+            raise InputError("the shell falls under these loads: clamp its ends, or choose stiffer rods")
+        here, made = loaded, made + more
+    return Point(structure, values, change, edges.at(here.elements), here), made
 
 
 def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchForm, int]:
@@ -221,7 +252,12 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     shell = Shell.of(grid.mesh, stages.rod, clamped=ends == "clamped", joint=stages.joint)
     shell = shell.with_elements(tuple(map(_with_frames, shell.elements, here.elements)))
     problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
-    found = find_equilibrium(problem, here.state, here.forces)
+    if here.problem.load is None:
+        found = find_equilibrium(problem, here.state, here.forces)
+    else:
+        found = find_equilibrium(replace(problem, load=here.problem.load), here.state, here.forces)
+        unloaded, _ = under_load(found, np.zeros_like(here.state))
+        found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
     shell = shell.with_elements(found.elements)
     footprint = Footprint(grid.mesh)
     popped = PopUp(ends, "draped", footprint, grid.boundary, shell, found)
@@ -230,6 +266,27 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
     )  # fmt: skip
     return result, found.report.factorizations
+
+
+def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
+    """Distance to the target of a shell under the loads that it was refined for.
+
+    Parameters
+    ----------
+    stages : with the shell's pop-up.
+    design : of which it is built, with its loaded equilibrium.
+    ends : how the rods' ends are held.
+    """
+    popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
+    load = np.zeros_like(popped.state)
+    nodes = slice(0, popped.shell.first_angle)
+    if structure.weighs:
+        load[nodes, 2] = -STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
+    if structure.dead_loads is not None:
+        load[: len(structure.dead_loads)] += structure.dead_loads
+    shell = popped.shell.with_elements(tuple(map(_with_frames, popped.shell.elements, here.elements)))
+    problem = replace(popped.equilibrium.problem, elements=shell.elements, load=load)
+    return agreement(replace(popped, equilibrium=find_equilibrium(problem, here.state, here.forces)), stages.target)
 
 
 def _with_frames(element: Elements, like: Elements) -> Elements:

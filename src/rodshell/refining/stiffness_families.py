@@ -1,4 +1,4 @@
-"""Families of variables that change the stiffness along rods: a taper, and double laths over a share of each rod.
+"""Families of variables that change the stiffness of rods: a taper, double laths over a share of each rod, stock sizes.
 
 Every rod has a profile of a few numbers, each of which is one of the variables; rods whose numbers are the same
 variables have the same profile. The stiffness of the edges by these numbers is an explicit formula
@@ -7,6 +7,7 @@ variables have the same profile. The stiffness of the edges by these numbers is 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Literal, get_args
 
 import numpy as np
@@ -14,12 +15,15 @@ from scipy.sparse import csc_array
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
+from rodshell.joints.joint import Elastic
 from rodshell.layout import Profile
 from rodshell.layout.profile import Varies
 from rodshell.refining.change import STIFFNESSES, Change
 from rodshell.refining.structure import Structure
 from rodshell.refining.symmetry import Image, Operation
 from rodshell.refining.variables import Box, Grid
+from rodshell.rods.section import Rod
+from rodshell.rods.varied import sizes
 from rodshell.validation import choice
 
 Per = Literal["shell", "family", "rod"]
@@ -36,12 +40,14 @@ class Profiles:
     variable_of : (m, r) variable that is number r of each rod's profile.
     profile : of r numbers.
     box : of the variables.
+    stock : the only values that can be built, ascending; None: all within the box.
     """
 
     structure: Structure
     variable_of: Ints
     profile: Callable[[Floats], Profile]
     box: Box
+    stock: Floats | None = None
 
     def image(self, by: Operation) -> Image:
         """Where an operation maps the variables.
@@ -55,14 +61,23 @@ class Profiles:
         return Image(index, np.ones(len(index)))
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid whose rods have these profiles.
+        """The grid whose rods have these profiles; a taper such that its thickest place has the section itself.
+
+        A common factor on all stiffnesses changes no unloaded shape, unless joints are springs: it is free.
 
         Parameters
         ----------
         grid : before.
         values : (n,) the design.
         """
-        return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
+        profiles = self.of_rods(values)
+        joint = self.structure.joint
+        given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
+        springs = any(0.0 < stiffness < inf for stiffness in given)
+        if profiles[0].varies != "laths" and not springs:
+            most = max(max(profile.factors) for profile in profiles)
+            profiles = tuple(replace(p, factors=tuple(factor / most for factor in p.factors)) for p in profiles)
+        return replace(grid, mesh=grid.mesh.with_profiles(profiles))
 
     def of_rods(self, values: Floats) -> tuple[Profile, ...]:
         """The profile of each rod.
@@ -185,3 +200,59 @@ class DoubleLaths:
         zero = np.zeros((len(structure.mesh.grid.rods), 1), dtype=np.intp)
         box = Box(*np.array([[0.5], [self.least], [self.most], [0.3]]))
         return Profiles(structure, zero, lambda share: Profile.double(float(share[0])), box)
+
+
+RENARD = (0.63, 0.71, 0.8, 0.9, 1.0, 1.12, 1.25, 1.4, 1.6)  # preferred numbers, series R20 [ISO 3]
+
+
+@dataclass(frozen=True)
+class Sections:
+    """One of several sizes in stock for each rod, which is the same from end to end.
+
+    Parameters
+    ----------
+    stock : sizes that are available, of the length of the section that varies: of a round rod its diameter [m]; None:
+        those of the rod's own size times preferred numbers from 0.63 to 1.6.
+    varies : what of the section is changed, see `Profile`.
+    """
+
+    stock: tuple[float, ...] | None = None
+    varies: Varies = "size"
+
+    name = "sections"
+
+    def on(self, structure: Structure) -> Profiles:
+        """The logarithm of the factor on EI of each rod.
+
+        Parameters
+        ----------
+        structure : the shell.
+
+        Raises
+        ------
+        InputError : fewer than two sizes; the section has no such size.
+        """
+        given = sizes(structure.rod, self.varies, np.ones(1))
+        if given is None:
+            raise InputError("sections of stock vary the size of a section: this rod has none; use taper")
+        wanted = given[0] * np.array(RENARD) if self.stock is None else np.array(sorted(self.stock))
+        if len(wanted) < 2 or wanted[0] <= 0:
+            raise InputError(f"sections of stock are two positive sizes or more in m, not {self.stock}")
+        table = np.linspace(-6.0, 6.0, 601)  # of log EI; a size is a power of EI, and so are the values in between
+        stock = np.interp(np.log(wanted), np.log(_sizes(structure.rod, self.varies, table)), table)
+        count = len(structure.mesh.grid.rods)
+        zero = np.zeros(count)
+        box = Box(zero + np.clip(0.0, stock[0], stock[-1]), zero + stock[0], zero + stock[-1], zero + 1.0)
+
+        def uniform(log: Floats) -> Profile:
+            factor = float(np.exp(log[0]))
+            return Profile((0.0, 1.0), (factor, factor), self.varies)
+
+        return Profiles(structure, np.arange(count)[:, None], uniform, box, stock)
+
+
+def _sizes(rod: Rod, varies: Varies, logarithms: Floats) -> Floats:
+    """(n,) sizes [m] by the logarithm of the factor on EI."""
+    found = sizes(rod, varies, np.exp(logarithms))
+    assert found is not None
+    return found

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from rodshell.arrays import Floats, Ints
+from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.popup import PopUp
 from rodshell.geometry.curves import on_curve
 from rodshell.joints import Joint
@@ -22,6 +23,7 @@ from rodshell.targets import Target
 
 MOST_ITERATIONS = 10  # from a predicted state
 STRAYED = 0.05  # of the length: an equilibrium further from the prediction may be another one
+SMALLEST_STEP = 0.01  # of a load
 MODES = 3  # of which the lowest may become the lowest of all
 
 
@@ -35,12 +37,16 @@ class Structure:
     rod : section and material of its rods, which have no profiles.
     joint : where they cross.
     target : the shape wanted.
+    weighs : whether the shell is wanted there under its own weight.
+    dead_loads : (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
     """
 
     popped: PopUp
     rod: Rod
     joint: Joint
     target: Target
+    weighs: bool = False
+    dead_loads: Floats | None = None
 
     @property
     def mesh(self) -> GridMesh:
@@ -50,7 +56,32 @@ class Structure:
     def edges(self) -> EdgeProperties:
         """The edges before any design."""
         table = np.column_stack([self.stiffness(self.mesh), self.mesh.edge_lengths])
-        return EdgeProperties.of(self.popped.shell, self.joint, table)
+        edges = EdgeProperties.of(self.popped.shell, self.joint, table)
+        weight = np.full(len(table), STANDARD_GRAVITY * self.rod.mass_per_length / self.rod.stretch_stiffness)
+        return replace(edges, weight=weight) if self.weighs else edges
+
+    @cached_property
+    def constant_load(self) -> Floats:
+        """(N, 3) the load that does not change with a design: the weight of joints, and the dead loads [N]."""
+        shell, edges = self.popped.shell, self.edges
+        result = np.zeros((len(shell.like), 3))
+        nodes = slice(0, shell.first_angle)
+        if self.weighs:
+            result[nodes, 2] = -STANDARD_GRAVITY * shell.mass[nodes, 2] - edges.load(len(result))[nodes, 2]
+        if self.dead_loads is not None:
+            result[: len(self.dead_loads)] += self.dead_loads
+        return result
+
+    def load(self, edges: EdgeProperties) -> Floats | None:
+        """(N, 3) the load on a design [N]; None: none.
+
+        Parameters
+        ----------
+        edges : of the design.
+        """
+        if not self.weighs and self.dead_loads is None:
+            return None
+        return edges.load(len(self.popped.shell.like)) + self.constant_load
 
     def stiffness(self, mesh: GridMesh) -> Floats:
         """(e, 4) EA [N], EI1, EI2 and GJ [N m2] of the edges of a mesh.
@@ -196,7 +227,8 @@ class Point:
         state = here.state + np.einsum("p,pnx->nx", step, response.motions)
         state[held] = here.state[held] + change.held - self.change.held
         edges = self.edges.at(here.elements).varied(change.table(self.structure.edges.table))
-        problem = replace(here.problem, elements=edges.shell.elements, stretch=edges.shell.stretch)
+        load = self.structure.load(edges)
+        problem = replace(here.problem, elements=edges.shell.elements, stretch=edges.shell.stretch, load=load)
         forces = here.forces + step @ response.forces
         found = find_equilibrium(problem.refreshed(state), state, forces, most_iterations=MOST_ITERATIONS)
         nodes = self.structure.mesh.node_count
@@ -204,3 +236,29 @@ class Point:
         if strayed or not found.report.stable:
             return None, found.report.factorizations
         return Point(self.structure, values, change, edges.at(found.elements), found), found.report.factorizations
+
+
+def under_load(unloaded: Equilibrium, load: Floats) -> tuple[Equilibrium | None, int]:
+    """The equilibrium under a load that grows from that of the problem, by stable equilibria.
+
+    Parameters
+    ----------
+    unloaded : a stable equilibrium, with or without a load.
+    load : (N, 3) in the end [N].
+
+    Returns
+    -------
+    The equilibrium, None where the shell falls before; and the number of factorisations.
+    """
+    first = np.zeros_like(load) if unloaded.problem.load is None else unloaded.problem.load
+    here, t, step, made = unloaded, 0.0, 1.0, 0
+    while t < 1.0 and step > SMALLEST_STEP:
+        there = min(1.0, t + step)
+        problem = replace(here.problem, load=(1.0 - there) * first + there * load)
+        found = find_equilibrium(problem, here.state, here.forces, most_iterations=2 * MOST_ITERATIONS)
+        made += found.report.factorizations
+        if found.report.stable:
+            here, t = found, there
+        else:
+            step *= 0.4
+    return (here if t >= 1.0 else None), made

@@ -73,7 +73,12 @@ class Variables(Protocol):
 
 
 class Untied(Variables, Protocol):
-    """The variables of a family, which know their symmetric images."""
+    """The variables of a family, which know their symmetric images, and what of them is available."""
+
+    @property
+    def stock(self) -> Floats | None:
+        """The only values that can be built, ascending; None: all within the bounds."""
+        ...
 
     def image(self, by: Operation) -> Image:
         """Where a symmetry maps the variables.
@@ -159,6 +164,11 @@ class Design:
         return Box(
             *(np.concatenate([getattr(box, name) for box in boxes]) for name in ("start", "lower", "upper", "scale"))
         )
+
+    @property
+    def stock(self) -> list[Floats | None]:
+        """Of each variable the only values that can be built, ascending, or None."""
+        return [part.whole.stock for part in self.parts for _ in part.box.start]
 
     def change(self, values: Floats) -> Change:
         return Change.together([part.change(some) for part, some in self._split(values)])

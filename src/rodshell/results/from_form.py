@@ -8,7 +8,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from math import degrees
 from platform import python_version
-from typing import Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import scipy
@@ -31,6 +31,8 @@ from rodshell.results.records import (
     Agreement,
     Drape,
     Dropped,
+    GapBefore,
+    Gate,
     Joint,
     Layout,
     Meeting,
@@ -38,6 +40,7 @@ from rodshell.results.records import (
     NetDeviation,
     Patch,
     PopUp,
+    Refinement,
     Rest,
     Rod,
     RodJoint,
@@ -57,6 +60,9 @@ from rodshell.rods.varied import sizes
 from rodshell.solve.equilibrium import SolveReport
 from rodshell.targets import Target as TargetSurface
 from rodshell.targets.surface_mesh import surface_mesh
+
+if TYPE_CHECKING:
+    from rodshell.refining.acceptance import Refined
 
 States = dict[str, NDArray[Any]]
 
@@ -194,6 +200,35 @@ def with_seam_forces(results: Results, form: PatchedForm, checks: Checks) -> Res
         forces = {support: _seam_forces(held.forces[index].sum(axis=1)) for support, held in checks.reactions.items()}
         seams.append(seam.changed(forces=forces))
     return results.changed(seams=tuple(seams))
+
+
+def with_refinement(results: Results, found: "Refined") -> Results:
+    """The same results, with how their form was refined; a refusal is a warning.
+
+    Parameters
+    ----------
+    results : of the form after it.
+    found : the refinement.
+    """
+    gates: tuple[Gate, ...] = get_args(Gate)
+    before, after = (
+        GapBefore(rms_relative=gap.rms_relative, max_relative=gap.max_relative)
+        for gap in (found.gap_before, found.gap_after)
+    )
+    refusal = () if found.changed else (f"the form is not refined: {found.refused}",)
+    return results.changed(
+        warnings=(*results.warnings, *refusal),
+        refinement=Refinement(
+            vary=found.vary,
+            ends=found.ends,
+            before=before,
+            after=after,
+            factorizations=found.factorizations,
+            gate_factorizations=found.gate_factorizations,
+            gates={gate: found.gates[gate] for gate in gates},
+            refused=found.refused or None,
+        ),
+    )
 
 
 def rod_type(rod: RodModel) -> RodType:

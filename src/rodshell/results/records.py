@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 Ends = Literal["pinned", "clamped"]
+Gate = Literal["flat", "from_flat", "remeshed", "tolerance", "stable"]
 FEWEST_STATIONS = 2
 
 
@@ -315,6 +316,26 @@ class Agreement(Record):
     max_relative: Number = key("largest gap over the target's reference_size")
     rms_relative: Number = key("root mean square over the target's reference_size")
     where: Point | None = key("place of the largest gap", "m")
+
+
+class GapBefore(Record):
+    """Gap of a form before or after it was refined."""
+
+    rms_relative: Number = key("root mean square over the target's reference_size")
+    max_relative: Number = key("largest gap over the target's reference_size")
+
+
+class Refinement(Record):
+    """How the form was refined: its rods, joints, ends and states are the refined ones."""
+
+    vary: Rows[Text] = rows("families of variables")
+    ends: Ends | None = key("the only end condition of the refined form")
+    before: GapBefore | None = key("gap to the target before")
+    after: GapBefore | None = key("gap to the target after; that before where nothing was accepted")
+    factorizations: Whole | None = key("factorisations of the search")
+    gate_factorizations: Whole | None = key("factorisations of all gates")
+    gates: dict[Gate, Flag] | None = key("which gates the design passes: the accepted one, else the best one refused")
+    refused: Text | None = key("why the best design was refused, the gate first; null: it was accepted")
 
 
 class RodJoint(Record):

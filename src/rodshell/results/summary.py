@@ -38,9 +38,11 @@ def summary_text(results: Results) -> str:
         lines += _rod(results.rod, results.bending)
     lines += _patches(results, length)
     lines += _net_and_drape(results, length)
+    lines += _refinement(results)
     lines += _pop_up(results, length)
     lines += _bending(results, length)
     lines += _weight_and_reactions(results, length)
+    lines += _loads(results, length)
     lines += _deployment(results)
     lines += [f"  dropped   {rod.id}: {rod.reason}" for rod in results.dropped[:MOST_DROPPED]]
     if len(results.dropped) > MOST_DROPPED:
@@ -104,6 +106,23 @@ def _reached(bending: Bending | None) -> str:
     known = [used for used in final if used is not None]
     reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
     return f", aiming at half of the bending strength at most by an estimate of the bends; {reached}"
+
+
+def _refinement(results: Results) -> Iterator[str]:
+    """What the refinement gained, or why it was refused."""
+    found = results.refinement
+    if found is None or found.before is None or found.after is None:
+        return
+    gain = f"gap rms {percent(found.before.rms_relative)} -> {percent(found.after.rms_relative)}"
+    if found.before == found.after:
+        gain = f"gap rms {percent(found.before.rms_relative)} as before"
+    yield (
+        f"  refined   {found.ends}  {', '.join(found.vary)}: {gain}; "
+        f"{found.factorizations} factorisations and {found.gate_factorizations} for its gates"
+    )
+    if found.refused:
+        what = "the design" if found.before == found.after else "a nearer design"
+        yield f"            {what} was refused, {found.refused}"
 
 
 def _patches(results: Results, length: Length) -> Iterator[str]:
@@ -188,6 +207,23 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
         yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N unloaded; sums of {sums}"
+
+
+def _loads(results: Results, length: Length) -> Iterator[str]:
+    """What each combination of loads does, a line for each end condition."""
+    for name, by_ends in results.loads.items():
+        for ends, found in by_ends.items():
+            limit = "over 100" if found.limit_factor is None else rounded(found.limit_factor)
+            line = f"  {name:<9} {ends:<8}stable up to {limit} times the loads ({found.limit_kind})"
+            if found.linear_factor is not None:
+                line += f", linear {rounded(found.linear_factor)}"
+            if found.imperfect_factor is not None:
+                line += f", with imperfections {rounded(found.imperfect_factor)}"
+            at = "" if found.at_factor == 1 else f" at {rounded(found.at_factor or 0.0)} times"
+            line += f"; deflection{at} {length(found.max_deflection)}"
+            if found.utilisation is not None:
+                line += f", {percent(found.utilisation)} of the strength"
+            yield line
 
 
 def _deployment(results: Results) -> Iterator[str]:

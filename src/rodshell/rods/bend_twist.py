@@ -170,6 +170,22 @@ class BendTwist:
             )
         )
 
+    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+        """Of the change of the moments: see `Stressed.stress_stiffness`.
+
+        The energy is quadratic in the strains, so that natural strains less by their change add just these moments.
+        """
+        strains = strain_rates(self, state, motion)
+        less = replace(
+            self,
+            natural_curvature=self.natural_curvature - strains[:, :2],
+            natural_twist=self.natural_twist - strains[:, 2],
+        )
+        scrap, before = np.zeros_like(state), np.zeros_like(hessians)
+        self.evaluate(state, scrap, before)
+        less.evaluate(state, scrap, hessians)
+        hessians -= before
+
     def refreshed(self, state: Floats) -> Self:
         """The same elements with their source frames at `state` (N, 3): strains and angles do not change."""
         source = self.source_tangents, self.source_directors, self.source_twist
@@ -177,6 +193,26 @@ class BendTwist:
         _transported(state, self.blocks, *source, tangents, directors, twist)
         same = self.blocks, self.bend_stiffness, self.twist_stiffness, self.natural_curvature, self.natural_twist
         return type(self)(*same, tangents, directors, twist)  # not `replace`, which is slow at each step of a motion
+
+
+PROBE = 1e-5  # of the shortest edge: displacement over which the change of strains is taken; good to 1e-9
+
+
+def strain_rates(elements: BendTwist, state: Floats, motion: Floats) -> Floats:
+    """(b, 3) derivative of the strains along a motion, by central differences.
+
+    Parameters
+    ----------
+    elements : their source frames being at, or near, the state.
+    state, motion : (N, 3) [m, rad].
+    """
+    largest = float(np.abs(motion[elements.blocks]).max(initial=0.0))
+    if largest == 0:
+        return np.zeros((len(elements.blocks), 3))
+    apart = state[elements.blocks[:, 2:5:2]] - state[elements.blocks[:, 0:3:2]]
+    step = PROBE * float(np.linalg.norm(apart, axis=2).min()) / largest
+    ahead, behind = (elements.strains(state + side * step * motion) for side in (1.0, -1.0))
+    return np.asarray((ahead - behind) / (2 * step))
 
 
 def _tangents(state: Floats, blocks: Ints) -> Floats:
@@ -206,7 +242,8 @@ def _transported(x, stencils, sources, source_directors, source_twist, tangents,
         for s in range(2):
             t, d = tangents[b, s], directors[b, s]
             if s == 0 and _shares_edge(stencils, b):
-                t[:], d[:] = tangents[b - 1, 1], directors[b - 1, 1]
+                for k in range(3):
+                    t[k], d[k] = tangents[b - 1, 1, k], directors[b - 1, 1, k]
                 continue
             i0, i1 = stencils[b, 2 * s], stencils[b, 2 * s + 2]
             square, along, both = 0.0, 0.0, 1.0
@@ -241,7 +278,7 @@ def _transported(x, stencils, sources, source_directors, source_twist, tangents,
         twist[b] = angle + 2.0 * np.pi * np.floor((source_twist[b] - angle) / (2.0 * np.pi) + 0.5)
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", nogil=True, fastmath={"contract"})
 def _bend_twist(  # type: ignore[no-untyped-def]
     x, stencils, bend, twist, natural, natural_twist, tangents, directors, source_twist, gradient, hessians
 ):

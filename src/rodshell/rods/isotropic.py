@@ -22,7 +22,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import unit
 from rodshell.kernels import njit
-from rodshell.rods.bend_twist import BendTwist, spread
+from rodshell.rods.bend_twist import BendTwist, spread, strain_rates
 from rodshell.rods.elements import NO_HESSIANS
 from rodshell.validation import brief
 
@@ -78,6 +78,17 @@ class IsotropicBendTwist(BendTwist):
         """The same elements with the twist of `state` as their natural twist: these rods are naturally straight."""
         return replace(self, natural_twist=self.strains(state)[:, 2].copy())
 
+    def stress_stiffness(self, state: Floats, motion: Floats, hessians: Floats) -> None:
+        """Of the change of the torsional moments: see `Stressed.stress_stiffness`.
+
+        Bending knows no frames, and no strains that could stay while its moments change: it keeps its stiffness.
+        """
+        twist = strain_rates(self, state, motion)[:, 2]
+        scrap, before = np.zeros_like(state), np.zeros_like(hessians)
+        self.evaluate(state, scrap, before)
+        replace(self, natural_twist=self.natural_twist - twist).evaluate(state, scrap, hessians)
+        hessians -= before
+
     @property
     def parts(self) -> tuple[Self, ...]:
         """The bending and the twist."""
@@ -101,7 +112,7 @@ class IsotropicBendTwist(BendTwist):
         )
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, x_1, x_2) [m]; energies [J]. e = x_1 - x_0, f = x_2 - x_1; s, t their unit vectors."""
     wanted = hessians.shape[0] > 0
@@ -161,7 +172,7 @@ def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no
     return energy
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", nogil=True, fastmath={"contract"})
 def _isotropic_bend_twist(x, stencils, bend, twist, natural_twist, sources, source_twist, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, theta_e, x_1, theta_f, x_2) [m, rad]; energies [J].
 

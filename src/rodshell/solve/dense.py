@@ -226,14 +226,16 @@ def forward(panel, values, aside):  # type: ignore[no-untyped-def]
         value, row = values[k], panel[k]
         for i in range(k + 1, width):
             values[i] -= row[i] * value
-    aside[:width] = values[:width]
+    for k in range(width):
+        aside[k] = values[k]
     begin = width // LANES * LANES
     for j in range(begin, stride, _WIDE):
         _subtract(
             1, min(REGISTERS, (stride - j) // LANES), values.ctypes.data + j * BYTES, stride, aside.ctypes.data, 1,
             _place(panel, 0, j), stride, width, 1,
         )  # fmt: skip
-    values[begin:width] = aside[begin:width]
+    for k in range(begin, width):
+        values[k] = aside[k]
 
 
 @njit(error_model="numpy")
@@ -252,7 +254,8 @@ def backward(panel, pivots, values, aside):  # type: ignore[no-untyped-def]
     begin = width // LANES * LANES
     for k in range(width):
         aside[k] = values[k] / pivots[k]
-    values[begin:width] = 0.0
+    for k in range(begin, width):
+        values[k] = 0.0
     x, count = values.ctypes.data + begin * BYTES, stride - begin
     whole = width // ROWS * ROWS
     for k in range(0, whole, ROWS):

@@ -30,6 +30,7 @@ from rodshell.solve.problem import Problem, Supports, linear_solver
 EASY = 5  # a step that needs no more iterations may be followed by a longer one
 MOST = 25
 SMALLEST_STEP = 1e-3
+SNAP = 0.01  # step over which a structure may snap
 MOST_OF_ALL = 400  # iterations of the whole path; the paths that arrive take 30 to 100
 UNACCOUNTED = 0.02  # of the energy: more than the trapezoidal rule leaves of a short step along one branch
 MOST_A_STEP = 8  # iterations of a step along a branch
@@ -43,9 +44,10 @@ def follow(
     forces: Floats,
     *,
     first_step: float,
+    snap: bool = False,
     progress: Callable[[float, int, float], None] | None = None,
 ) -> Equilibrium:
-    """Move from t = 0 to t = 1 by steps that halve on failure and grow back.
+    """Move from t = 0 to t = 1 by steps that shrink on failure and grow back.
 
     Parameters
     ----------
@@ -53,6 +55,8 @@ def follow(
         same at all t, and their source frames are carried along the path. The first
         iteration of each step carries them there with the tangent stiffness: it is the tangent predictor.
     state, forces : equilibrium, or a guess of it, at t = 0.
+    snap : where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
+        structure itself would; its constraint must be `Supports`.
 
     Returns
     -------
@@ -82,6 +86,12 @@ def follow(
             step = 0.4 * min(step, there - t)
         if found.report.status is Status.OUT_OF_TIME:
             break
+        if snap and last is not None and step < SNAP and not found.report.converged:
+            there = min(1.0, t + SNAP)
+            found = _fallen(going_on(problem_at(there), last), last, found)
+            reports.append(found.report)
+            if found.report.stable:
+                t, state, forces, last, step = there, found.state, found.forces, found, 4 * SNAP
         if t < 1.0 and (step < SMALLEST_STEP or sum(report.iterations for report in reports) > MOST_OF_ALL):
             break
     ended = last or found

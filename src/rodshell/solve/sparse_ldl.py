@@ -11,8 +11,7 @@ eliminated, what remains is the update matrix for its parent (Duff and Reid 1983
 once per pattern (`symbolic`).
 """
 
-import os
-from threading import Thread
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -23,9 +22,12 @@ from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
 from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
+from rodshell.threads import in_threads, threads
 
 ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
-MOST_THREADS = 4  # the last part is one thread's work
+
+
+NONE_ABOVE, NOTHING = np.empty(0, dtype=np.int64), np.empty(0)
 
 
 class SingularError(ArithmeticError):
@@ -139,6 +141,7 @@ class Multifrontal:
         blocks = blocks_of(indptr, indices, begin)
         order = _minimum_degree(indptr, indices) if coordinates is None else _dissected(coordinates, blocks)
         self.plan = plan_of(indptr, indices, blocks, order)
+        self.parts = self.plan.each
         self._spare = list[_Scratch]()  # scratch memory that no factorisation is using
 
     @property
@@ -158,6 +161,17 @@ class Multifrontal:
         if not regular:
             raise SingularError("a pivot of the factorisation vanishes")
         return MultifrontalFactors(self, data, panels, pivots)
+
+    @cached_property
+    def above(self) -> tuple[Longs, Longs]:
+        """Permuted unknowns (m,) of the plan's last part, if it is not the only one; and the place (n,) of each unknown
+        among them, or -1."""
+        plan, place = self.plan, np.full(len(self.indptr) - 1, -1)
+        *separate, last = self.parts
+        columns = [np.arange(plan.first[s], plan.first[s + 1]) for s in last.tolist()] if separate else []
+        unknowns = np.concatenate([*columns, np.arange(0)])
+        place[unknowns] = np.arange(len(unknowns))
+        return unknowns, place
 
     def _new_scratch(self) -> _Scratch:
         plan = self.plan
@@ -187,10 +201,25 @@ class MultifrontalFactors:
 
     def _substitute(self, right: Floats) -> Floats:
         assert self._memory is not None, GIVEN_AWAY
-        plan = self._solver.plan
-        x = right[plan.order]
-        row, aside = room(plan.largest_front), room(2 * plan.largest_front)
-        _solve(x, plan.first, plan.row_start, plan.rows, plan.panel_start, *self._memory, row, aside)
+        plan, (panels, pivots) = self._solver.plan, self._memory
+        x, parts = right[plan.order], self._solver.parts
+        fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
+        memory = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in range(threads() if last else 1)]
+        above, place = self._solver.above
+        sums = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
+
+        def rise(part: int, thread: int) -> None:
+            _forward(parts[part], x, place, sums[part], *fronts, *memory[thread])
+
+        def descend(part: int, thread: int) -> None:
+            _backward(parts[part], x, *fronts, pivots, *memory[thread])
+
+        if last:
+            in_threads(rise, last, most=len(memory))
+            x[above] += sums.sum(axis=0)
+        _forward(parts[last], x, NONE_ABOVE, NOTHING, *fronts, *memory[0])
+        descend(last, 0)
+        in_threads(descend, last, most=len(memory))
         result = np.empty_like(x)
         result[plan.order] = x
         return result
@@ -199,37 +228,22 @@ class MultifrontalFactors:
 def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats) -> bool:
     """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on the
     threads. False where a pivot vanishes or is not finite."""
-    starts = plan.part_start
-    separate, regular = iter(range(len(starts) - 2)), [True]
+    regular, last = list[bool](), len(plan.each) - 1
 
-    def run(part: int, memory: tuple[Floats, Floats]) -> bool:
-        return bool(
+    def run(part: int, thread: int) -> None:
+        regular.append(
             _numeric(
-                plan.parts[starts[part] : starts[part + 1]], data, plan.first, plan.row_start,
+                plan.each[part], data, plan.first, plan.row_start,
                 plan.child_start, plan.children, plan.run_start, plan.runs,
                 plan.entry_start, plan.entry_source, plan.entry_place,
-                plan.panel_start, plan.update_start, scratch.stacks, *memory, panels, pivots,
+                plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
             )
         )  # fmt: skip
 
-    def work(memory: tuple[Floats, Floats]) -> None:
-        for part in separate:
-            regular.append(run(part, memory))
-
-    others = [Thread(target=work, args=(memory,)) for memory in scratch.threads[1 : len(starts) - 2]]
-    for thread in others:
-        thread.start()
-    work(scratch.threads[0])
-    for thread in others:
-        thread.join()
-    return all(regular) and run(len(starts) - 2, scratch.threads[0])
-
-
-def threads() -> int:
-    """Threads of a factorisation: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
-    asked = os.environ.get("NUMBA_NUM_THREADS", "")
-    processors = os.cpu_count() or 1
-    return min(int(asked) if asked.isdigit() else processors, processors, MOST_THREADS)
+    in_threads(run, last, most=len(scratch.threads))
+    if all(regular):
+        run(last, 0)
+    return all(regular)
 
 
 def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:
@@ -294,7 +308,9 @@ def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyp
 @njit(error_model="numpy")
 def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     """right - A x of a matrix stored by its upper triangle, and the largest entry of |A| |x|."""
-    residual, size = right.copy(), np.zeros(len(x))
+    residual, size, largest = np.empty(len(x)), np.zeros(len(x)), 0.0
+    for j in range(len(x)):
+        residual[j] = right[j]
     for j in range(len(x)):
         for e in range(indptr[j], indptr[j + 1]):
             i = indices[e]
@@ -305,30 +321,45 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
                 product = data[e] * x[i]
                 residual[j] -= product
                 size[j] += abs(product)
-    return residual, size.max() if len(x) else 0.0
+    for j in range(len(x)):
+        largest = max(largest, size[j])
+    return residual, largest
 
 
-@njit(error_model="numpy")
-def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
-    """Forward and backward substitution in place, supernode by supernode."""
-    supers = len(first) - 1
-    for s in range(supers):
+@njit(error_model="numpy", nogil=True)
+def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
+    """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
+    added to `sums` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
+    for s in part:
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
-        values[:width], values[width:] = x[first[s] : first[s + 1]], 0.0
+        for i in range(len(values)):
+            values[i] = x[first[s] + i] if i < width else 0.0
         forward(panel, values, aside)
-        x[first[s] : first[s + 1]] = values[:width]
+        for i in range(width):
+            x[first[s] + i] = values[i]
         for i in range(width, size):
-            x[rows[row_start[s] + i]] += values[i]
-    for s in range(supers - 1, -1, -1):
+            row = rows[row_start[s] + i]
+            if len(above) > 0 and above[row] >= 0:
+                sums[above[row]] += values[i]
+            else:
+                x[row] += values[i]
+
+
+@njit(error_model="numpy", nogil=True)
+def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
+    """Backward substitution in place, supernode by supernode of a `part`."""
+    for k in range(len(part) - 1, -1, -1):
+        s = part[k]
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
         for i in range(size):
             values[i] = x[rows[row_start[s] + i]]
         backward(panel, pivots[first[s] : first[s + 1]], values, aside)
-        x[first[s] : first[s + 1]] = values[:width]
+        for i in range(width):
+            x[first[s] + i] = values[i]
 
 
 LEAF = 12  # blocks that are not divided further
@@ -358,39 +389,50 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
     n = len(coordinates)
     segment = np.zeros(n, dtype=np.int64)
     rank, crossing, part = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int8)
-    kept, size = np.empty((3, n), dtype=np.int64), np.zeros(3, dtype=np.int64)
-    begins, ends = [0], [n]
+    kept, size, sorted_blocks = (
+        np.empty((3, n), dtype=np.int64),
+        np.zeros(3, dtype=np.int64),
+        np.empty(n, dtype=np.int64),
+    )
+    begins, ends = np.empty(n + 2, dtype=np.int64), np.empty(n + 2, dtype=np.int64)  # a stack of segments
+    begins[0], ends[0], height = 0, n, 1
     newest = 0
-    while len(begins) > 0:
-        begin, end = begins.pop(), ends.pop()
+    while height > 0:
+        height -= 1
+        begin, end = begins[height], ends[height]
         if end - begin <= LEAF:
             continue
         here = segment[along[0, begin]]
-        blocks = along[_longest(coordinates, along, begin, end), begin:end].copy()
+        longest, blocks = _longest(coordinates, along, begin, end), sorted_blocks[: end - begin]
         for k in range(len(blocks)):
+            blocks[k] = along[longest, begin + k]
             rank[blocks[k]] = k
         best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing)
         _separate(blocks, segment, here, rank, best, start, neighbours, part)
-        for row in along:
-            size[:] = 0
-            for b in row[begin:end]:
+        for d in range(len(along)):
+            row = along[d]
+            for side in range(3):
+                size[side] = 0
+            for k in range(begin, end):
+                b = row[k]
                 side = part[b]
                 kept[side, size[side]] = b
                 size[side] += 1
             at = begin
             for side in range(3):
-                row[at : at + size[side]] = kept[side, : size[side]]
+                for k in range(size[side]):
+                    row[at + k] = kept[side, k]
                 at += size[side]
         newest += 2
         at = begin
         for side in range(3):
-            for b in along[0, at : at + size[side]]:
-                segment[b] = newest - side if side < 2 else -1
+            for k in range(at, at + size[side]):
+                segment[along[0, k]] = newest - side if side < 2 else -1
             if side < 2 and size[side] > 0:
-                begins.append(at)
-                ends.append(at + size[side])
+                begins[height], ends[height] = at, at + size[side]
+                height += 1
             at += size[side]
-    return along[0].copy()
+    return along[0]
 
 
 @njit()
@@ -408,7 +450,8 @@ def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
 def _best_cut(blocks, segment, here, rank, start, neighbours, crossing):  # type: ignore[no-untyped-def]
     """Rank of the last block before the straight cut that few couplings cross, near the middle."""
     n = len(blocks)
-    crossing[: n + 1] = 0
+    for k in range(n + 1):
+        crossing[k] = 0
     for b in blocks:
         for e in range(start[b], start[b + 1]):
             other = neighbours[e]

@@ -5,6 +5,7 @@ of motion. Tree, supernodes and fronts are found from a graph some ten times sma
 how the fronts share threads and memory.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,12 @@ class Plan(NamedTuple):
     stack_size: int
     largest_front: int
     largest_panel: int
+
+    @property
+    def each(self) -> list[Longs]:
+        """The supernodes of each part."""
+        starts = self.part_start.tolist()
+        return [self.parts[begin:stop] for begin, stop in pairwise(starts)]
 
 
 class Blocks(NamedTuple):
@@ -78,16 +85,26 @@ def plan_of(indptr: Longs, indices: Longs, blocks: Blocks, order: Longs) -> Plan
 
 
 @njit()
+def start_after(count, start):  # type: ignore[no-untyped-def]
+    """Where each of some runs starts, `start` (n + 1,), that lie one after the other and have `count` (n,) entries."""
+    start[0] = 0
+    for k in range(len(count)):
+        start[k + 1] = start[k] + count[k]
+
+
+@njit()
 def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
     """The other blocks to which each block of unknowns is coupled, as start and neighbours."""
     n = len(begin) - 1
     block = np.empty(begin[n], dtype=np.int64)
     for b in range(n):
-        block[begin[b] : begin[b + 1]] = b
-    mark, count = np.full(n, -1, dtype=np.int64), np.zeros(n + 1, dtype=np.int64)
-    start, neighbours, place = count, np.empty(0, dtype=np.int64), count
+        for k in range(begin[b], begin[b + 1]):
+            block[k] = b
+    mark, count, start = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
+    neighbours, place = np.empty(0, dtype=np.int64), count
     for sweep in range(2):  # count, then fill
-        mark[:] = -1
+        for b in range(n):
+            mark[b] = -1
         for b in range(n):
             for j in range(begin[b], begin[b + 1]):
                 for e in range(indptr[j], indptr[j + 1]):
@@ -95,15 +112,16 @@ def _coupled(indptr, indices, begin):  # type: ignore[no-untyped-def]
                     if a != b and mark[a] != b:
                         mark[a] = b
                         if sweep == 0:
-                            count[a + 1] += 1
-                            count[b + 1] += 1
+                            count[a] += 1
+                            count[b] += 1
                         else:
                             neighbours[place[a]], neighbours[place[b]] = b, a
                             place[a] += 1
                             place[b] += 1
         if sweep == 0:
-            start = np.cumsum(count)
-            place = start.copy()
+            start_after(count, start)
+            for b in range(n):
+                place[b] = start[b]
             neighbours = np.empty(start[n], dtype=np.int64)
     return start, neighbours
 
@@ -118,13 +136,16 @@ def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
     parent = _elimination_tree(start, neighbours, order, place)
     post = _postorder(parent)
     back = np.empty(n, dtype=np.int64)
-    back[post] = np.arange(n)
-    order, above = order[post], parent[post]
     for k in range(n):
-        place[order[k]] = k
-        parent[k] = back[above[k]] if above[k] >= 0 else -1
-    weight = begin[order + 1] - begin[order]
-    count, mark = weight.copy(), np.full(n, -1, dtype=np.int64)
+        back[post[k]] = k
+    sorted_order, above, weight = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    count, mark = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for k in range(n):
+        b = order[post[k]]
+        sorted_order[k], place[b], mark[k] = b, k, -1
+        above[k] = back[parent[post[k]]] if parent[post[k]] >= 0 else -1
+        weight[k] = count[k] = begin[b + 1] - begin[b]
+    order, parent = sorted_order, above
     for k in range(n):  # every nonzero of row k of the factor once
         mark[k] = k
         for e in range(start[order[k]], start[order[k] + 1]):
@@ -140,7 +161,9 @@ def _tree(begin, start, neighbours, order):  # type: ignore[no-untyped-def]
 def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyped-def]
     """Parent of each permuted block (Liu 1990), -1 for roots."""
     n = len(order)
-    parent, ancestor = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    parent, ancestor = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for k in range(n):
+        parent[k] = ancestor[k] = -1
     for k in range(n):
         for e in range(start[order[k]], start[order[k] + 1]):
             j = place[neighbours[e]]
@@ -157,7 +180,9 @@ def _elimination_tree(start, neighbours, order, place):  # type: ignore[no-untyp
 def _postorder(parent):  # type: ignore[no-untyped-def]
     """Nodes of the forest, children before parents and every subtree in a row."""
     n = len(parent)
-    head, following = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    head, following = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for j in range(n):
+        head[j] = following[j] = -1
     for j in range(n - 1, -1, -1):
         if parent[j] >= 0:
             following[j] = head[parent[j]]
@@ -214,7 +239,7 @@ def _supernodes(parent, count, weight):  # type: ignore[no-untyped-def]
         first[kept], size[kept], width[kept], zeros[kept] = begin, rows, wide, empty
         kept += 1
     first[kept] = n
-    return first[: kept + 1].copy()
+    return first[: kept + 1]
 
 
 @njit()
@@ -222,16 +247,19 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
     """Parent of each supernode, -1 for roots; and the children of each, ascending."""
     supers = len(first) - 1
     owner, up = np.empty(len(parent), dtype=np.int64), np.empty(supers, dtype=np.int64)
-    start = np.zeros(supers + 1, dtype=np.int64)
+    start, filled = np.empty(supers + 1, dtype=np.int64), np.zeros(supers, dtype=np.int64)
     for s in range(supers):
-        owner[first[s] : first[s + 1]] = s
+        for k in range(first[s], first[s + 1]):
+            owner[k] = s
     for s in range(supers):
         p = parent[first[s + 1] - 1]
         up[s] = owner[p] if p >= 0 else -1
         if p >= 0:
-            start[owner[p] + 1] += 1
-    start = np.cumsum(start)
-    filled, children = start[:-1].copy(), np.empty(start[supers], dtype=np.int64)
+            filled[owner[p]] += 1
+    start_after(filled, start)
+    children = np.empty(start[supers], dtype=np.int64)
+    for s in range(supers):
+        filled[s] = start[s]
     for s in range(supers):
         if up[s] >= 0:
             children[filled[up[s]]] = s
@@ -250,10 +278,12 @@ def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def
     for k in range(n):
         place[order[k]] = k
     for s in range(supers):
-        owner[first[s] : first[s + 1]] = s
-    row_start, rows, used = np.zeros(supers + 1, dtype=np.int64), np.empty(0, dtype=np.int64), mark.copy()
+        for k in range(first[s], first[s + 1]):
+            owner[k] = s
+    row_start, used, rows = np.zeros(supers + 1, dtype=np.int64), np.empty(supers, dtype=np.int64), owner
     for sweep in range(2):  # count, then fill
-        used[:], mark[:] = row_start[:-1], -1
+        for s in range(supers):
+            used[s], mark[s] = row_start[s], -1
         for i in range(n):
             s = owner[i]
             mark[s] = i
@@ -270,7 +300,7 @@ def _fronts(first, order, start, neighbours, up):  # type: ignore[no-untyped-def
                     used[s] += 1
                     s = up[s]
         if sweep == 0:
-            row_start[1:] = np.cumsum(used)
+            start_after(used, row_start)
             rows = np.empty(row_start[supers], dtype=np.int64)
     return row_start, rows
 
@@ -281,8 +311,9 @@ def _maps(  # type: ignore[no-untyped-def]
 ):
     """From blocks to unknowns: all that `Plan` holds."""
     supers, n, unknowns = len(first) - 1, len(order), begin[len(begin) - 1]
-    column = np.zeros(n + 1, dtype=np.int64)  # first permuted unknown of each block
-    column[1:] = np.cumsum(weight)
+    column = np.empty(n + 1, dtype=np.int64)  # first permuted unknown of each block
+    start_after(weight, column)
+    first_column, width_of = np.empty(supers + 1, dtype=np.int64), np.empty(supers, dtype=np.int64)
     original, place = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
     block, owner = np.empty(unknowns, dtype=np.int64), np.empty(unknowns, dtype=np.int64)
     for s in range(supers):
@@ -297,7 +328,8 @@ def _maps(  # type: ignore[no-untyped-def]
         total += weight[k]
     all_rows = np.empty(total, dtype=np.int64)
     all_start, panel_start = np.zeros(supers + 1, dtype=np.int64), np.zeros(supers + 1, dtype=np.int64)
-    entry_place, local = np.empty(len(indices), dtype=np.int64), np.empty(n, dtype=np.int64)
+    entry_source, entry_place = np.empty(len(indices), dtype=np.int64), np.empty(len(indices), dtype=np.int64)
+    local = np.empty(n, dtype=np.int64)
     below = np.empty(supers, dtype=np.int64)
     run_start, runs = np.zeros(len(children) + 1, dtype=np.int64), np.empty((len(rows), 2), dtype=np.int64)
     used, largest, widest = 0, 0, 0
@@ -310,7 +342,7 @@ def _maps(  # type: ignore[no-untyped-def]
                 used += 1
         all_start[s + 1] = used
         size, width = used - all_start[s], column[first[s + 1]] - column[first[s]]
-        below[s] = size - width
+        first_column[s], width_of[s], below[s] = column[first[s]], width, size - width
         stride = padded(size)
         panel_start[s + 1] = panel_start[s] + width * stride
         largest, widest = max(largest, size), max(widest, width * stride)
@@ -324,24 +356,28 @@ def _maps(  # type: ignore[no-untyped-def]
             run_start[e + 1] = count
         for e in range(entry_start[s], entry_start[s + 1]):
             low, high = by_front[e, 1], by_front[e, 2]
+            entry_source[e] = by_front[e, 0]
             entry_place[e] = (low - column[first[s]]) * stride + local[block[high]] + high - column[block[high]]
-    part_start, parts = parts_of(up, np.diff(column[first]), below)
+    first_column[supers] = column[n]
+    part_start, parts = parts_of(up, width_of, below)
     update_start, deepest = stacks_of(up, below, child_start, children, part_start, parts)
     return (
-        original, column[first], all_start, all_rows, child_start, children, run_start, runs, entry_start,
-        by_front[:, 0].copy(), entry_place, panel_start, update_start, part_start, parts, deepest, largest, widest,
+        original, first_column, all_start, all_rows, child_start, children, run_start, runs, entry_start,
+        entry_source, entry_place, panel_start, update_start, part_start, parts, deepest, largest, widest,
     )  # fmt: skip
 
 
 @njit()
 def _by_front(indptr, indices, place, owner, supers):  # type: ignore[no-untyped-def]
     """The values of the matrix front by front: which value, and its permuted column and row, column <= row."""
-    start = np.zeros(supers + 1, dtype=np.int64)
+    start, filled = np.empty(supers + 1, dtype=np.int64), np.zeros(supers, dtype=np.int64)
     for j in range(len(indptr) - 1):
         for e in range(indptr[j], indptr[j + 1]):
-            start[owner[min(place[j], place[indices[e]])] + 1] += 1
-    start = np.cumsum(start)
-    filled, sorted_values = start[:-1].copy(), np.empty((len(indices), 3), dtype=np.int64)
+            filled[owner[min(place[j], place[indices[e]])]] += 1
+    start_after(filled, start)
+    for s in range(supers):
+        filled[s] = start[s]
+    sorted_values = np.empty((len(indices), 3), dtype=np.int64)
     for j in range(len(indptr) - 1):
         for e in range(indptr[j], indptr[j + 1]):
             a, b = place[j], place[indices[e]]
@@ -367,15 +403,16 @@ def parts_of(up, width, below):  # type: ignore[no-untyped-def]
     below : (n_s,) number of rows of each update matrix.
     """
     supers = len(up)
-    lowest, work = np.arange(supers), np.empty(supers)
+    lowest, work, total = np.empty(supers, dtype=np.int64), np.empty(supers), 0.0
     for s in range(supers):
-        work[s] = width[s] * float(width[s] + below[s]) ** 2
-    total = work.sum()
+        lowest[s], work[s] = s, width[s] * float(width[s] + below[s]) ** 2
+        total += work[s]
     for s in range(supers):  # children come before their parents, and a subtree is a run that ends with its root
         if up[s] >= 0:
             work[up[s]] += work[s]
             lowest[up[s]] = min(lowest[up[s]], lowest[s])
-    start, parts, used = [0], np.empty(supers, dtype=np.int64), 0
+    start, parts = np.zeros(supers + 2, dtype=np.int64), np.empty(supers, dtype=np.int64)
+    count, used = 0, 0
     above = np.zeros(supers, dtype=np.bool_)
     for s in range(supers):
         above[s] = total > WORTHWHILE and work[s] > SHARE * total
@@ -384,13 +421,15 @@ def parts_of(up, width, below):  # type: ignore[no-untyped-def]
             for c in range(lowest[s], s + 1):
                 parts[used] = c
                 used += 1
-            start.append(used)
+            count += 1
+            start[count] = used
     for s in range(supers):
         if above[s] or total <= WORTHWHILE:
             parts[used] = s
             used += 1
-    start.append(used)
-    return np.array(start), parts
+    count += 1
+    start[count] = used
+    return start[: count + 1], parts
 
 
 @njit()
@@ -414,7 +453,8 @@ def stacks_of(up, below, child_start, children, part_start, parts):  # type: ign
     start, room = np.empty(supers, dtype=np.int64), 0
     for p in range(len(part_start) - 1):
         here = parts[part_start[p] : part_start[p + 1]]
-        part[here] = p
+        for s in here:
+            part[s] = p
         height, deepest = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
         for s in here:
             for e in range(child_start[s], child_start[s + 1]):

@@ -14,7 +14,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.model import Freedom
-from rodshell.rods.elements import Elements
+from rodshell.rods.elements import Elements, Stressed, Stretch
 from rodshell.solve.problem import Pattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
@@ -30,10 +30,16 @@ class Modes:
     """Modes K x = s W x, ascending: values s (k,), and shapes x (k, N, 3) with x' W x = 1.
 
     W is the lumped mass [kg], s then a squared angular frequency [1/s2]; or the identity, and s a stiffness [N/m].
+
+    Parameters
+    ----------
+    settled : whether the values did; if not, they are too large, and the shapes span no more than a space that is rich
+        in the lowest modes.
     """
 
     values: Floats
     shapes: Floats
+    settled: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +104,7 @@ class Tangent:
         """The `count` lowest modes, or as many as there are; negative ones first where the state is not stable.
 
         By subspace iteration with the inverse [Bathe 2014, section 11.6], shifted where K is not positive definite.
+        `Modes.settled` says whether it converged. Certified modes of a stable state are those of `solve.modes`.
 
         Parameters
         ----------
@@ -123,13 +130,13 @@ class Tangent:
             return root * factors.solve(root * vector)
 
         start = np.random.default_rng(0).standard_normal((size, min(count + guards, int(np.count_nonzero(root))))).T
-        values, rows = subspace_iteration(
+        values, rows, settled = subspace_iteration(
             inverse, start, settled=count, tolerance=tolerance, most_sweeps=most_sweeps, orthonormalise=by_reflections
         )
         shapes = np.array([factors.solve(root * row) for row in rows[:count]]).reshape(count, size)
         shapes /= np.sqrt(np.einsum("ki,i,ki->k", shapes, weight, shapes))[:, None]
         expanded = np.array([self.freedom.expand(shape) for shape in shapes]).reshape(count, *self.state.shape)
-        return Modes(1.0 / values[:count] - shift, expanded)
+        return Modes(1.0 / values[:count] - shift, expanded, settled)
 
     def _each(self, what: str, fields: Floats, apply: Callable[[Floats], Floats]) -> Floats:
         """A function of reduced vectors applied to one field (N, 3) or to many (k, N, 3)."""
@@ -161,7 +168,7 @@ class Tangent:
             raise SingularError("the state is not stable along a motion without mass: give mass to all that moves")
         root = np.sqrt(weight)
         start = np.random.default_rng(0).standard_normal((1, len(weight)))
-        value, _ = subspace_iteration(
+        value, *_ = subspace_iteration(
             lambda x: root * factors.solve(root * x),
             start,
             settled=1,
@@ -213,26 +220,49 @@ class TangentAssembly:
         self._problem.stretch.add_axial(state, forces, gradient)
         return gradient
 
-    def values(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> tuple[Freedom, Floats]:
+    def values(
+        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
+    ) -> tuple[Freedom, Floats]:
         """The free directions, and the values (nnz,) of K in the order of the pattern.
 
         Parameters
         ----------
         elements : with their source frames at, or near, the state.
         state, forces : (N, 3) [m, rad], and axial forces (e,) [N].
+        stretch : the edges with other lengths at rest; None: those of the problem.
         """
         problem, unused = self._problem, np.zeros_like(state)
+        stretch = problem.stretch if stretch is None else stretch
         gradient = np.zeros_like(state) if problem.load is None else -problem.load
         for element, hessians in zip(elements, self._hessians, strict=False):
             element.evaluate(state, gradient, hessians)
-        problem.stretch.add_axial(state, forces, gradient)
-        problem.stretch.with_forces(forces).evaluate(state, unused, self._hessians[-2])
+        stretch.add_axial(state, forces, gradient)
+        stretch.with_forces(forces).evaluate(state, unused, self._hessians[-2])
         curvature = problem.constraint.curvature(state, gradient)
         self._hessians[-1][:] = curvature if len(curvature) else 0.0
         free = problem.constraint.freedom(state)
         return free, self.pattern.assembly.assemble(self._hessians, self._blocks, free)
 
-    def tangent(self, elements: Sequence[Elements], state: Floats, forces: Floats) -> Tangent:
+    def stress_values(self, elements: Sequence[Elements], state: Floats, change: Floats, motion: Floats) -> Floats:
+        """(nnz,) values of the change of K with the internal forces alone, the geometry being frozen.
+
+        Parameters
+        ----------
+        elements : with their source frames at, or near, the state.
+        state : (N, 3) node positions [m] and twist angles [rad].
+        change : (e,) of the axial forces [N].
+        motion : (N, 3) along which moments change, of the elements that are `Stressed` [m, rad].
+        """
+        hessians = [np.zeros_like(values) for values in self._hessians]
+        for element, values in zip(elements, hessians, strict=False):
+            if isinstance(element, Stressed):
+                element.stress_stiffness(state, motion, values)
+        self._problem.stretch.axial_stiffness(state, change, hessians[-2])
+        return self.pattern.assembly.assemble(hessians, self._blocks, self._problem.constraint.freedom(state))
+
+    def tangent(
+        self, elements: Sequence[Elements], state: Floats, forces: Floats, stretch: Stretch | None = None
+    ) -> Tangent:
         """The tangent at a state; parameters as for `values`.
 
         Parameters
@@ -240,12 +270,13 @@ class TangentAssembly:
         elements : with their source frames at, or near, the state.
         state : (N, 3) node positions [m] and twist angles [rad].
         forces : (e,) axial forces of the edges [N].
+        stretch : the edges with other lengths at rest; None: those of the problem.
 
         Raises
         ------
         SingularError : a pivot vanishes.
         """
-        free, values = self.values(elements, state, forces)
+        free, values = self.values(elements, state, forces, stretch)
         state, forces = state.copy(), forces.copy()
         for array in (state, forces, values):
             array.flags.writeable = False
@@ -260,7 +291,7 @@ def subspace_iteration(
     tolerance: float,
     most_sweeps: int,
     orthonormalise: Callable[[Floats], Floats],
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats, bool]:
     """The largest eigenvalues of a symmetric positive operator, and their directions, by subspace iteration with
     Rayleigh and Ritz's values, which are a little too small, never too large [Golub and Van Loan 2013, 8.2.4].
 
@@ -275,19 +306,20 @@ def subspace_iteration(
 
     Returns
     -------
-    Values (m,) descending, and directions (m, n), orthogonal but not of unit length.
+    Values (m,) descending, directions (m, n), orthogonal but not of unit length, and whether the values settled.
     """
-    rows, before = start, np.full(len(start), np.inf)
+    rows, before, done = start, np.full(len(start), np.inf), False
     values = before
     for _ in range(most_sweeps):
         rows = orthonormalise(rows)
         images = np.array([apply(row) for row in rows])
         values, turn = np.linalg.eigh(np.einsum("ik,jk->ij", rows, images))
         values, rows = values[::-1], np.einsum("ji,jk->ik", turn[:, ::-1], images)
-        if (np.abs(before - values)[:settled] <= tolerance * values[:settled]).all():
+        done = bool((np.abs(before - values)[:settled] <= tolerance * values[:settled]).all())
+        if done:
             break
         before = values
-    return values, rows
+    return values, rows, done
 
 
 def by_reflections(rows: Floats) -> Floats:

@@ -265,7 +265,24 @@ def _fit(centres, frames, spacing, start, near, points, normals, areas, coeffici
             for q in range(p):
                 system[q, p] = system[p, q]
             system[p, p] += RIDGE * weights * (stiff if p >= 6 else 1.0 if p >= 3 else 1e-6)
-        coefficients[m] = np.linalg.solve(system, right)
+        _solve(system, right)
+        for p in range(TERMS):
+            coefficients[m, p] = right[p]
+
+
+@njit(error_model="numpy")
+def _solve(a, b):  # type: ignore[no-untyped-def]
+    """Solve a x = b in place, x in b; a is symmetric and positive definite, and is overwritten."""
+    for k in range(len(b)):
+        for i in range(k + 1, len(b)):
+            factor = a[i, k] / a[k, k]
+            for j in range(k + 1, len(b)):
+                a[i, j] -= factor * a[k, j]
+            b[i] -= factor * b[k]
+    for k in range(len(b) - 1, -1, -1):
+        for j in range(k + 1, len(b)):
+            b[k] -= a[k, j] * b[j]
+        b[k] /= a[k, k]
 
 
 @njit()
@@ -341,7 +358,8 @@ def _means(sites, distance, index, centres, frames, coefficients, spacing, mean,
     """Weighted means (n, 3) of the points above `sites` (n, 3) on the cubics nearby, and of their normals."""
     for n in range(len(sites)):
         weight = _weight(distance[n], index[n], frames, spacing)
-        mean[n], normals[n] = sites[n], 0.0
+        for i in range(3):
+            mean[n, i], normals[n, i] = sites[n, i], 0.0
         for k in range(len(weight)):
             e, c = frames[index[n, k]], coefficients[index[n, k]]
             a, b, h = _local(sites[n], centres[index[n, k]], e, spacing)

@@ -132,10 +132,10 @@ class Target(ABC):
         x : (n, 3) points [m].
         steps : of Newton's method, at most.
         """
+        x = np.ascontiguousarray(x)
         for _ in range(steps):
-            value, gradient = self.level(x)
-            x = x - (value / np.einsum("ij,ij->i", gradient, gradient))[:, None] * gradient
-            if np.max(np.abs(value), initial=0.0) <= NEARLY * self.size:
+            x, furthest = along_gradient(x, *self.level(x))
+            if furthest <= NEARLY * self.size:
                 break
         return x
 
@@ -327,6 +327,24 @@ def newton_to_closest(x, y, value, gradient, hessian, damping, step, convex):  #
         step[m, 0] = out * nx + along_p * px + along_q * qx
         step[m, 1] = out * ny + along_p * py + along_q * qy
         step[m, 2] = out * nz + along_p * pz + along_q * qz
+
+
+@njit(error_model="numpy")
+def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
+    """One step of Newton from points x (n, 3) to F = 0 along the gradient, and the largest |F| before it.
+
+    Parameters
+    ----------
+    x : (n, 3) [m].
+    value, gradient : (n,), (n, 3) F there, see `Implicit`.
+    """
+    result, furthest = np.empty((len(x), 3)), 0.0
+    for m in range(len(x)):
+        gx, gy, gz = gradient[m, 0], gradient[m, 1], gradient[m, 2]
+        step = value[m] / (gx * gx + gy * gy + gz * gz)
+        result[m, 0], result[m, 1], result[m, 2] = x[m, 0] - step * gx, x[m, 1] - step * gy, x[m, 2] - step * gz
+        furthest = max(furthest, abs(value[m]))
+    return result, furthest
 
 
 @njit()

@@ -1,0 +1,52 @@
+"""`rodshell refine`: a form that is brought nearer to its target. Its options are those of `rodshell form`."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from rodshell.case import load_case
+from rodshell.cli.form import run_case
+from rodshell.cli.options import CaseCommand, case_options, output_options, overrides_of, read_output_options
+from rodshell.errors import InputError
+from rodshell.validation import choice
+
+VARY = "taper"  # where neither the command nor the case says
+
+
+@click.command(
+    cls=CaseCommand,
+    params=case_options(),
+    epilog='Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.',
+)
+@click.argument("name", metavar="NAME|CASE.toml|SURFACE|DIR")
+@click.option(
+    "--ends", metavar="pinned|clamped", help="Supports of the refined shell; default: as the case says, or pinned."
+)
+@output_options("Folder for the results; default out/NAME-refined.")
+def command(name: str, ends: str | None, **values: Any) -> int:
+    """Bring a form nearer to its target: vary its rods, and accept only what can be built.
+
+    NAME, CASE.toml and SURFACE are those of rodshell form; DIR is an earlier result, whose case is run again. --vary
+    names what is varied: taper, the bending stiffness along the rods, or double, laths that are double over a share
+    of each rod. A design is accepted if it lies flat, pops up from flat to the same shape, does not depend on the
+    mesh, and stays stable and near its target when it is built with errors; else the form stays as it was.
+    """
+    output = read_output_options(values)
+    overrides = overrides_of(values)
+    path = Path(name)
+    if path.is_dir():
+        if not (path / "case.toml").is_file():
+            raise InputError(f"{path} holds no result with a case.toml: give a case, or the folder of a form")
+        name, stem = str(path / "case.toml"), path.resolve().name
+    else:
+        stem = path.stem
+    if ends is not None:
+        overrides |= {"pop_up.ends": choice("--ends", ends, ("pinned", "clamped"))}
+    case = load_case(name, overrides)
+    only = ends or case.refine.ends or (case.ends or ("pinned",))[0]
+    vary = case.refine.vary or VARY
+    return run_case(
+        load_case(name, overrides | {"refine.vary": vary, "refine.ends": only, "pop_up.ends": only}),
+        f"{stem}-refined", output,
+    )  # fmt: skip

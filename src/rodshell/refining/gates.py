@@ -1,0 +1,260 @@
+"""Gates: what a refined design must pass before it is accepted, because an optimiser finds what cannot be built.
+
+    stable      the shell is a stable equilibrium
+    flat        its rods, straight and with their joints where they are drilled, fit together in a plane
+    remeshed    meshed again with the same edge length it is as near to its target
+    tolerance   it stays stable, and nearly as near, when it is built with errors
+    from_flat   pushed up from flat it comes to the same shape
+
+All sizes are relative to the target's.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array, eye_array
+from scipy.sparse.linalg import spsolve
+
+from rodshell.arrays import Floats, Ints
+from rodshell.formfinding.pipeline import PatchForm, agreement, popped_again
+from rodshell.formfinding.popup import PopUp, pop_up
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.formfinding.trim import Footprint
+from rodshell.layout import GridMesh, mesh_grid
+from rodshell.model.edge_properties import EI1, LENGTH, EdgeProperties
+from rodshell.model.rod_sections import RodSections
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.units import percent_text
+
+GATES = ("stable", "flat", "remeshed", "tolerance", "from_flat")
+"""In the order in which they are tried: those that take the least work first."""
+
+SAME_SHAPE = 1e-6  # largest distance of the shape reached from flat
+MISFIT = 5e-4  # largest distance of a joint's two holes in the plane: the workshop's error, see SPAN_ERROR
+REMESHED, REMESHED_LEAST = 0.05, 2e-5  # change of the rms gap: a share of it, or so much
+SAMPLES = 8
+SPAN_ERROR = 0.1e-3 / 0.2  # largest, of each span's length: 0.1 mm where the target's size is 0.2 m
+STIFFNESS_ERROR = 0.05  # largest, of each rod's EI and GJ
+WORSE, WORSE_BY = 1.5, 0.0015  # with errors the rms gap may be so many times its value, and so much more
+FITS = 20  # steps of the fit of rods in a plane
+
+
+@dataclass(frozen=True)
+class Gates:
+    """Which gates a design passes.
+
+    Parameters
+    ----------
+    passed : by name, in the order of `GATES`; a gate that was not reached is not among them.
+    reason : why the first one refuses it, beginning with the gate's name; "" where none does.
+    factorizations : that all of them took.
+    """
+
+    passed: dict[str, bool]
+    reason: str
+    factorizations: int
+
+    @property
+    def open(self) -> bool:
+        """Whether a design passes all of them."""
+        return not self.reason
+
+
+def gates(form: PatchForm, *, all_of_them: bool = True, progress: Progress = silent) -> Gates:
+    """Try a design at every gate.
+
+    Parameters
+    ----------
+    form : the design, popped up with one end condition.
+    all_of_them : try the others too after a gate has refused it.
+    progress : called as progress(stage, detail, residual).
+    """
+    passed, first, factorizations = dict[str, bool](), "", 0
+    for name in GATES:
+        progress("refine", f"gate {name}", 0.0)
+        reason, made = _TRIALS[name](form, progress)
+        passed[name], factorizations = not reason, factorizations + made
+        if reason and not first:
+            first = f"{name}: {reason}"
+        if first and (not all_of_them or name == "stable"):
+            break
+    if all_of_them:
+        passed |= {
+            name: False for name in GATES if name not in passed
+        }  # without a stable shell there is nothing to try
+    return Gates(passed, first, factorizations)
+
+
+def _stable(form: PatchForm, progress: Progress) -> tuple[str, int]:
+    report = _popped(form).report
+    if not report.converged:
+        return f"the pop-up {report.sentence}", 0
+    count = report.negative_modes
+    return (f"the shell is not stable, with {count} negative mode{'s' if count > 1 else ''}" if count else ""), 0
+
+
+def _flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
+    worst = misfit(form.footprint.mesh) / form.target.size
+    if worst <= MISFIT:
+        return "", 0
+    return (
+        f"straight rods with these holes do not fit together in a plane: at a joint they miss each other by "
+        f"{percent_text(worst)} of the size, more than {percent_text(MISFIT)}"
+    ), 0
+
+
+def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
+    """The shape found before is the first guess on the new mesh."""
+    (ends,) = form.popped
+    old, positions = form.footprint.mesh, _popped(form).positions
+    mesh = mesh_grid(old.grid, form.layout.edge)
+    normals = None
+    if old.layered:
+        mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
+        assert form.boundary.normals is not None
+        normals = old.prolong(form.boundary.normals, mesh)
+    boundary = replace(form.boundary, draped=old.prolong(positions, mesh), normals=normals)
+    again = popped_again(form, Footprint(mesh), boundary, ends)
+    made = _popped(again).report.factorizations
+    if not _popped(again).report.stable:
+        return "meshed again, the shell is not stable", made
+    before, after = _rms(form), _rms(again)
+    if abs(after - before) <= max(REMESHED * before, REMESHED_LEAST):
+        return "", made
+    return f"meshed again, its gap is {percent_text(after)} rms and not {percent_text(before)}", made
+
+
+def _tolerance(form: PatchForm, progress: Progress) -> tuple[str, int]:
+    most, worst, made = WORSE * _rms(form) + WORSE_BY, 0.0, 0
+    for sample, popped in enumerate(with_errors(form), start=1):
+        progress("refine", f"gate tolerance, sample {sample} of {SAMPLES}", 0.0)
+        made += popped.report.factorizations
+        if not popped.report.stable:
+            return "built with errors, the shell is not stable", made
+        worst = max(worst, agreement(popped, form.target).rms_relative)
+    if worst <= most:
+        return "", made
+    return f"built with errors, its gap is up to {percent_text(worst)} rms, more than {percent_text(most)}", made
+
+
+def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
+    (ends,) = form.popped
+    found = pop_up(
+        form.footprint, form.boundary, form.rod, ends=ends, start="flat", joint=form.joint, progress=progress
+    )
+    made = found.report.factorizations
+    if not found.report.converged:
+        return "pushed up from flat, the shell is lost on the way", made
+    last = found.equilibrium
+    settled = find_equilibrium(last.problem, last.state, last.forces)  # steps end at a looser tolerance
+    found, made = replace(found, equilibrium=settled), made + settled.report.factorizations
+    apart = float(np.linalg.norm(found.positions - _popped(form).positions, axis=1).max()) / form.target.size
+    if apart <= SAME_SHAPE:
+        return "", made
+    return f"pushed up from flat, it comes to another shape, {percent_text(apart)} of the size away", made
+
+
+_TRIALS = {
+    "stable": _stable, "flat": _flat, "remeshed": _remeshed, "tolerance": _tolerance, "from_flat": _from_flat,
+}  # fmt: skip
+
+
+def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
+    """The shell built with errors: each span is too long or too short, each rod too stiff or too soft, by chance.
+
+    Parameters
+    ----------
+    form : the design, popped up with one end condition.
+    samples : of a random generator with the seeds 0, 1, ...
+    """
+    popped = _popped(form)
+    mesh, shell, found = popped.shell.mesh, popped.shell, popped.equilibrium
+    sections = RodSections.of(mesh, [form.rod] * len(mesh.grid.rods))
+    table = np.column_stack([sections.stretch, sections.edges, mesh.edge_lengths])
+    span = spans(mesh)
+    edges, lengths = int(span[-1]) + 1, np.bincount(span, mesh.edge_lengths)
+    for seed in range(samples):
+        random = np.random.default_rng(seed)
+        varied = table.copy()
+        errors = SPAN_ERROR * form.target.size * random.uniform(-1.0, 1.0, edges)
+        varied[:, LENGTH] *= 1.0 + (errors / lengths)[span]
+        softer = 1.0 + STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))
+        varied[:, EI1:LENGTH] *= softer[mesh.edge_rods, None]
+        other = EdgeProperties.of(shell, form.joint, table).varied(varied).shell
+        problem = replace(found.problem, elements=other.elements, stretch=other.stretch)
+        there = find_equilibrium(problem, found.state, found.forces)
+        yield replace(popped, shell=other.with_elements(there.elements), equilibrium=there)
+
+
+def spans(mesh: GridMesh) -> Ints:
+    """(e,) number of the span, between two joints or from a joint to an end, that each edge belongs to.
+
+    Parameters
+    ----------
+    mesh : the rods.
+    """
+    joint = np.zeros(mesh.node_count, dtype=bool)
+    joint[mesh.joint_pairs.ravel()] = True
+    rods = mesh.edge_rods
+    begins = np.append(True, (rods[1:] != rods[:-1]) | joint[mesh.edges[1:, 0]])
+    return np.cumsum(begins) - 1
+
+
+def misfit(mesh: GridMesh) -> float:
+    """Largest distance between the two holes of a joint where straight rods lie in a plane as well as they can [m].
+
+    Each rod is turned and moved until the sum of the squares of all distances is smallest.
+
+    Parameters
+    ----------
+    mesh : the rods, with the distances of their joints along them.
+    """
+    rods, at = mesh.grid.crossings.rods, _joint_stations(mesh)
+    lines = mesh.grid.rods
+    origin = np.array([rod.origin for rod in lines])
+    direction = np.array([rod.direction for rod in lines])
+    angle = np.arctan2(direction[:, 1], direction[:, 0])
+    m, c = len(lines), len(rods)
+    size = max(rod.length for rod in lines)
+    rows, sign = np.arange(c), (1.0, -1.0)
+    for _ in range(FITS):
+        along = np.column_stack([np.cos(angle), np.sin(angle)])
+        across = np.column_stack([-along[:, 1], along[:, 0]])
+        a, b = (origin[rods[:, k]] + at[:, k, None] * along[rods[:, k]] for k in range(2))
+        apart = a - b
+        worst = float(np.linalg.norm(apart, axis=1).max(initial=0.0))
+        entries = []
+        for k in range(2):
+            for axis in range(2):
+                entries.append((2 * rows + axis, 3 * rods[:, k] + axis, np.full(c, sign[k])))
+                turn = sign[k] * at[:, k] * across[rods[:, k], axis] / size
+                entries.append((2 * rows + axis, 3 * rods[:, k] + 2, turn))
+        row, column, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+        jacobian = coo_array((value, (row, column)), shape=(2 * c, 3 * m)).tocsc()
+        square = (jacobian.T @ jacobian + 1e-9 * eye_array(3 * m)).tocsc()  # the grid as a whole may move
+        step = -spsolve(square, jacobian.T @ apart.ravel()).reshape(m, 3)
+        origin, angle = origin + step[:, :2], angle + step[:, 2] / size
+        if np.abs(step).max() < 1e-9 * size:
+            break
+    return worst
+
+
+def _joint_stations(mesh: GridMesh) -> Floats:
+    """(c, 2) distance of each crossing's node along its two rods [m], from the points that `FlatRod.origin` names."""
+    rod_of = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start)
+    key = rod_of * mesh.node_count + mesh.rod_nodes
+    order = np.argsort(key, kind="stable")
+    wanted = mesh.grid.crossings.rods * mesh.node_count + mesh.joint_pairs
+    return np.asarray(mesh.stations[order[np.searchsorted(key[order], wanted)]])
+
+
+def _popped(form: PatchForm) -> PopUp:
+    """Of a form with one end condition."""
+    (popped,) = form.popped.values()
+    return popped
+
+
+def _rms(form: PatchForm) -> float:
+    (gap,) = form.agreement.values()
+    return gap.rms_relative

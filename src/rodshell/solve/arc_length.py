@@ -1,0 +1,390 @@
+"""Points on the path of equilibria under a load that grows, each found from the last one by its arc length.
+
+The arc length s is the root mean square displacement of the nodes, and of the factor as much as serves where nothing
+moves. Each point lies on a plane across the last tangent [Riks 1979; Crisfield 1991, section 9.3]. The unknowns are
+state, axial forces and factor; the bordered system
+
+    K dx - W dt = -g,   c.dx = 0
+
+is solved by two right-hand sides of one factorisation of K [Keller 1977], which is symmetric and whose pivots count
+its negative eigenvalues. The tangent is dx/ds = v/|v|, dt/ds = 1/|v| with v = dx/dt: on a stable path t grows, and it
+turns back at a limit point, where K is singular but the bordered system is not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
+
+import numpy as np
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from rodshell.arrays import Floats
+from rodshell.errors import InputError
+from rodshell.rods.elements import Elements
+from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
+from rodshell.solve.load import Load, LoadedAssembly
+from rodshell.solve.sparse_ldl import SingularError
+from rodshell.solve.tangent import Tangent, by_projections, subspace_iteration
+
+MODES = 4  # lowest ones that are looked at
+MODES_CLOSE, MOST_SWEEPS = 1e-3, 20  # relative change of the lowest eigenvalue: modes only say how far to go
+RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
+SMALL = 24  # unknowns up to which LAPACK finds a mode
+MOST_STEPS = 12  # of Newton's method for a point
+STRAYED = 0.3  # of a step: a point so far off its prediction may be on another path. Half of it is aimed at
+NEGLIGIBLE = 1e-6  # of the length: a path no farther off than this is the same
+SETTLED, SETTLED_FORCE = 1e-10, 1e-8  # of the length and of the largest axial force: last change of a point
+CHORD, SLOW = 5e-3, 0.2  # as in `newton_step`
+SAME_STIFFNESS = 1e-5, 1e-4  # of length and force: factors from this near are those of the point
+PROBE, PROBE_FACTOR = 1e-5, 0.1  # of the length; at most, of the factor: over which the stiffness's change is taken
+PER_FACTOR = 1e-8  # of the length: what a unit of the factor counts as, so that a load may grow where nothing moves
+TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An equilibrium on the path, at `arc` [m].
+
+    Parameters
+    ----------
+    motion (n, 3), change (e,), rate : derivatives by the arc of state, forces and factor.
+    strayed : how far it lies off its prediction, over the step.
+    ahead, behind : arc to the nearest singular stiffness on either side, as the stiffness of the `modes` changes here.
+    """
+
+    factor: float
+    arc: float
+    state: Floats
+    forces: Floats
+    elements: tuple[Elements, ...]
+    negative_modes: int
+    motion: Floats
+    change: Floats
+    rate: float
+    strayed: float = 0.0
+    modes: Floats | None = None
+    ahead: float = np.inf
+    behind: float = -np.inf
+
+
+class ArcLength:
+    """Finds points on the path of a structure under t times a load.
+
+    Parameters
+    ----------
+    unloaded : the equilibrium at t = 0, its edges elastic.
+    load : what grows.
+    """
+
+    def __init__(self, unloaded: Equilibrium, load: Load) -> None:
+        self._unloaded = unloaded
+        self._loaded = LoadedAssembly(unloaded.problem, load, unloaded.state)
+        problem = self._loaded.problem
+        self.length = problem.length
+        self.is_node = np.isin(np.arange(len(unloaded.state)), problem.stretch.blocks)
+        edge = float(problem.stretch.rest_lengths.mean()) if len(problem.stretch.blocks) else 1.0
+        self._unit = np.where(self.is_node, 1.0, edge)[:, None]  # other blocks are angles: they count as small lengths
+        self._per_factor = PER_FACTOR * self.length
+        self._scale = np.empty(0)
+        self._least_force = 1e-6 * float(problem.stretch.stiffness.max(initial=0.0))
+        self._unstable: tuple[Floats, Tangent]  # the last one that was found, with its tangent
+        self.factorizations = 0
+
+    def begin(self) -> Point | None:
+        """The structure at t = 0; None where its stiffness is singular.
+
+        Raises
+        ------
+        InputError : the load moves nothing.
+        """
+        start = self._unloaded
+        elements = self._loaded.load.elements(start.elements, start.state, 0.0)
+        try:
+            tangent, rate = self._tangent(elements, start.state, start.forces, 0.0)
+        except SingularError:
+            return None
+        if not (rate.any() or self._loaded.change(start.state, rate, 0.0, 1.0).any()):
+            raise InputError("the load moves nothing: give one that acts in free directions")
+        # modes are measured by the first stiffness's diagonal: metres and radians alike
+        self._scale = 1.0 / np.sqrt(np.abs(tangent.values[tangent.pattern.assembly.diagonal]))
+        return self._on_path(0.0, start.state, start.forces, elements, tangent, rate)
+
+    def point(self, here: Point, other: Point | None, step: float, *, near: float = NEGLIGIBLE) -> Point | None:
+        """The point a step further; None where Newton's method does not find it, or strays from the prediction.
+
+        Parameters
+        ----------
+        here : the last point.
+        other : a point that shows the curvature of the path, or None.
+        step : arc [m].
+        near : of the length: how far it may stray in any case. The tangent foresees no jump of the stiffness.
+        """
+        state, forces = here.state + step * here.motion, here.forces + step * here.change
+        factor = here.factor + step * here.rate
+        if other is not None:
+            half = 0.5 * step**2 / (other.arc - here.arc)
+            state, forces = state + half * (other.motion - here.motion), forces + half * (other.change - here.change)
+            if self._loaded.load.motions is not None:  # supports move as the factor says
+                factor += half * (other.rate - here.rate)
+        reach = max(self.reach(state - here.state), near * self.length / STRAYED)
+        found = self._correct(state, forces, factor, here.elements, across=here, near=STRAYED * reach)
+        if found is None:
+            return None
+        point = self._on_path(*found, here, step)
+        return replace(point, strayed=self.reach(point.state - state) / reach)
+
+    def unstable_next(self, here: Point, step: float) -> Point | None:
+        """What lies a step along the tangent, if the stiffness is unstable there, as it is where it has jumped.
+
+        None where it is stable, or singular.
+
+        Parameters
+        ----------
+        here : the last point.
+        step : arc [m], so short that its end is as good as the equilibrium.
+        """
+        state, forces = here.state + step * here.motion, here.forces + step * here.change
+        factor = here.factor + step * here.rate
+        elements = self._loaded.load.elements(here.elements, state, factor)
+        try:
+            tangent, _ = self._tangent(elements, state, forces, factor)
+        except SingularError:
+            return None
+        if not tangent.negative_modes:
+            return None
+        self._unstable = state, tangent
+        return replace(
+            here, factor=factor, arc=here.arc + step, state=state, forces=forces, elements=elements, rate=-here.rate,
+            negative_modes=tangent.negative_modes, modes=None, ahead=np.inf, behind=-np.inf,
+        )  # fmt: skip
+
+    def at_factor(self, factor: float, here: Point, there: Point) -> Point | None:
+        """The point at a factor between those of two neighbours on a stable path; None where it is not found.
+
+        Parameters
+        ----------
+        factor : t.
+        here, there : points on either side of it.
+        """
+        span = there.arc - here.arc
+        share = (factor - here.factor) / (there.factor - here.factor)
+        bend = 0.5 * share * (share - 1) * span
+        state = (1 - share) * here.state + share * there.state + bend * (there.motion - here.motion)
+        forces = (1 - share) * here.forces + share * there.forces + bend * (there.change - here.change)
+        near = STRAYED * self.reach(there.state - here.state)
+        found = self._correct(state, forces, factor, here.elements, near=near)
+        return None if found is None else self._on_path(*found, here, share * span, ahead=False)
+
+    def displaced(self, motion: Floats) -> Point | None:
+        """The point whose state lies on the plane across a motion (n, 3) [m, rad] through its end, near factor 1.
+
+        Parameters
+        ----------
+        motion : from the state at t = 0.
+        """
+        for parts in RAMPS:
+            point = self._displaced_by_parts(motion, parts)
+            if point is not None:
+                return point
+        return None
+
+    def _displaced_by_parts(self, motion: Floats, parts: int) -> Point | None:
+        """As `displaced`, in so many equal parts."""
+        start, stretch, part = self._unloaded, self._loaded.problem.stretch, motion / parts
+        point: Point | None = None
+        state, forces, elements, factor = start.state, start.forces, start.elements, 0.0
+        for _ in range(parts):
+            forces = forces + stretch.stiffness * stretch.elongation(state, part)
+            found = self._correct(state + part, forces, factor + 1 / parts, elements, across=motion)
+            if found is None:
+                return None
+            point = self._on_path(*found, ahead=False)
+            state, forces, elements, factor = point.state, point.forces, point.elements, point.factor
+        return point
+
+    def _correct(
+        self, state: Floats, forces: Floats, factor: float, elements: tuple[Elements, ...], *,
+        across: Point | Floats | None = None, near: float = np.inf,
+    ) -> tuple[float, Floats, Floats, tuple[Elements, ...], Tangent, Floats] | None:  # fmt: skip
+        """Newton's method to the equilibrium at this factor, or on the plane through the state `across` a motion.
+
+        Parameters
+        ----------
+        state, forces, factor : to begin with, what is held being where it is under the factor.
+        elements : of structure and load, their source frames near the state.
+        across : normal of the plane, (n, 3), or the tangent at a point, factor and all; None: the factor stays.
+        near : the farthest that a node may move [m].
+
+        Returns
+        -------
+        Factor, state, forces and elements at the equilibrium, and the tangent and the rate of the state next to it;
+        None where it is not found.
+        """
+        loaded, stretch, length, first = self._loaded, self._loaded.problem.stretch, self.length, state
+        last, chord, begin = np.inf, False, factor
+        normal, rise = (across.motion, across.rate) if isinstance(across, Point) else (across, 0.0)
+        rise *= self._per_factor**2
+        elements = loaded.load.elements(elements, state, factor)
+        try:
+            for _ in range(MOST_STEPS):
+                if not chord:
+                    tangent, along = self._tangent(elements, state, forces, factor)
+                    at, axial, taken = state, forces, factor
+                strains = loaded.strains(state, factor)
+                gradient = loaded.gradient(elements, state, forces, factor)
+                stretch.add_axial(at, stretch.stiffness * strains - forces, gradient)
+                motion, more = tangent.solve(-gradient), 0.0
+                if normal is not None:
+                    off = self.inner(normal, first - state - motion) + rise * (begin - factor)
+                    more = off / (self.inner(normal, along) + rise)
+                    motion = motion + more * along
+                moved = float(np.abs(motion).max()) / length
+                if not self.reach(state + motion - first) <= near:
+                    return None
+                if chord and moved > SLOW * last:
+                    chord = False
+                    continue
+                after = stretch.stiffness * strains + loaded.change(at, motion, taken, more)
+                size = max(float(np.abs(after).max(initial=0.0)), self._least_force)
+                changed = float(np.abs(after - forces).max(initial=0.0)) / size
+                state, forces, factor = state + motion, after, factor + more
+                elements = loaded.load.elements(elements, state, factor)
+                last, chord = moved, moved < CHORD
+                if moved < SETTLED and changed < SETTLED_FORCE:
+                    since = float(np.abs(state - at).max()) / length, float(np.abs(forces - axial).max()) / size
+                    if since[0] > SAME_STIFFNESS[0] or since[1] > SAME_STIFFNESS[1]:
+                        tangent, along = self._tangent(elements, state, forces, factor)
+                    return factor, state, forces, elements, tangent, along
+        except SingularError:
+            pass
+        return None
+
+    def equilibrium(self, point: Point) -> Equilibrium:
+        """A point as an equilibrium of the structure under its factor.
+
+        Parameters
+        ----------
+        point : on this path.
+        """
+        problem, load, structure = self._loaded.problem, self._loaded.load, self._unloaded.problem
+        dead = problem.load
+        if load.forces is not None:
+            dead = point.factor * load.forces + (0.0 if dead is None else dead)
+        gradient = self._loaded.gradient(point.elements, point.state, point.forces, point.factor)
+        stretch = load.stretch(problem.stretch, point.factor)
+        residual = problem.constraint.freedom(point.state).reduce(gradient)
+        report = SolveReport(
+            Status.CONVERGED, len(residual), 0, 0, 0.0, float(np.abs(residual).max(initial=0.0)),
+            float(np.abs(stretch.strains(point.state)).max(initial=0.0)), point.negative_modes,
+        )  # fmt: skip
+        pattern = structure.pattern if load.potentials else problem.pattern
+        loaded = replace(problem, elements=point.elements, stretch=stretch, load=dead, pattern=pattern)
+        return Equilibrium(loaded, point.state, point.forces, gradient, report)
+
+    def losing_mode(self, point: Point) -> Floats:
+        """(n, 3) the mode of the negative stiffness that is nearest to zero at an unstable point, its largest
+        displacement of a node being 1.
+
+        Parameters
+        ----------
+        point : with negative modes.
+        """
+        state, tangent = self._unstable
+        if state is not point.state:
+            tangent, _ = self._tangent(point.elements, point.state, point.forces, point.factor)
+        size, scale = tangent.freedom.size, self._scale
+
+        def inverse(row: Floats) -> Floats:
+            return tangent.factors.solve(row / scale) / scale
+
+        if size <= SMALL:
+            row = np.linalg.eigh(np.array([inverse(unit) for unit in np.eye(size)]))[1][:, 0]
+        else:
+            start = np.sin(1.0 + np.arange(size) ** 2)
+            operator = LinearOperator((size, size), matvec=inverse, dtype=float)
+            row = eigsh(operator, k=1, which="SA", v0=start, tol=MODES_CLOSE)[1][:, 0]
+        mode = tangent.freedom.expand(row * scale)
+        return np.asarray(mode / self.reach(mode))
+
+    def alignment(self, a: Floats, b: Floats) -> float:
+        """Cosine of the angle between motions (n, 3), in the metric of the modes."""
+        free = self._unloaded.problem.constraint.freedom(self._unloaded.state)
+        x, y = (free.reduce(motion) / self._scale for motion in (a, b))
+        return abs(float(x @ y)) / sqrt(max(float(x @ x) * float(y @ y), TINY))
+
+    def reach(self, motion: Floats) -> float:
+        """Largest displacement of a node, or of a twist times an edge [m]; motion (n, 3) [m, rad]."""
+        return float(np.abs(self._unit * motion).max())
+
+    def inner(self, a: Floats, b: Floats) -> float:
+        """Inner product of displacements (n, 3) over the number of nodes, measured as by `reach` [m2]."""
+        return float(np.einsum("ij,ij,ij->", self._unit**2, a, b)) / max(1, int(self.is_node.sum()))
+
+    def _tangent(
+        self, elements: tuple[Elements, ...], state: Floats, forces: Floats, factor: float
+    ) -> tuple[Tangent, Floats]:
+        self.factorizations += 1
+        return self._loaded.tangent(elements, state, forces, factor)
+
+    def _on_path(
+        self, factor: float, state: Floats, forces: Floats, elements: tuple[Elements, ...], tangent: Tangent,
+        along: Floats, last: Point | None = None, step: float = 0.0, *, ahead: bool = True,
+    ) -> Point:  # fmt: skip
+        """The point at a state with its tangent, a step after the last point."""
+        rate = 1.0 / sqrt(self.inner(along, along) + self._per_factor**2)
+        if last is not None and self.inner(along, last.motion) + self._per_factor**2 * last.rate < 0:
+            rate = -rate
+        motion = rate * along
+        change = self._loaded.change(state, motion, factor, rate)
+        arc, modes = (0.0, None) if last is None else (last.arc + step, last.modes)
+        point = Point(factor, arc, state, forces, elements, tangent.negative_modes, motion, change, rate, modes=modes)
+        if tangent.negative_modes:
+            self._unstable = state, tangent
+        return point if tangent.negative_modes or not ahead else self._looking_ahead(point, tangent, modes)
+
+    def _looking_ahead(self, here: Point, tangent: Tangent, start: Floats | None) -> Point:
+        """With its modes and the nearest singular stiffness, as the stiffness of the lowest modes changes here."""
+        values, modes = self._lowest_modes(tangent, start)
+        step = min(PROBE * self.length / max(self.reach(here.motion), TINY), PROBE_FACTOR / abs(here.rate))
+        behind, ahead = (self._values_near(here, side * step) for side in (-1.0, 1.0))
+        change = _between(modes, tangent.pattern.upper((ahead - behind) / (2 * step)))
+        root = 1.0 / np.sqrt(values)
+        loss = np.linalg.eigvalsh(-change * root[:, None] * root)  # 1/m: the modes' stiffness vanishes at 1/loss
+        return replace(
+            here, modes=modes,
+            ahead=1.0 / float(loss[-1]) if loss[-1] > 0 else np.inf,
+            behind=1.0 / float(loss[0]) if loss[0] < 0 else -np.inf,
+        )  # fmt: skip
+
+    def _values_near(self, here: Point, step: float) -> Floats:
+        """(nnz,) values of the stiffness a step along the tangent from a point, to first order."""
+        factor = here.factor + step * here.rate
+        elements = self._loaded.load.elements(here.elements, here.state, factor)
+        return self._loaded.values(elements, here.state + step * here.motion, here.forces + step * here.change, factor)
+
+    def _lowest_modes(self, tangent: Tangent, start: Floats | None) -> tuple[Floats, Floats]:
+        """The `MODES` lowest modes of a stable tangent: values (k,) ascending and modes (k, dofs), whose square sum
+        over the scale is 1.
+
+        start : (k, dofs) modes of a state nearby, or None.
+        """
+        scale, size = self._scale, tangent.freedom.size
+        if start is None:  # no symmetry of the shell is one of this start
+            start = np.sin(1.0 + np.arange(size) ** 2 * np.arange(1, 1 + min(MODES, size))[:, None]) * scale
+        inverse, rows, _ = subspace_iteration(
+            lambda row: tangent.factors.solve(row / scale) / scale,
+            start / scale, settled=1, tolerance=MODES_CLOSE, most_sweeps=MOST_SWEEPS, orthonormalise=by_projections,
+        )  # fmt: skip
+        return 1.0 / inverse, by_projections(rows) * scale
+
+
+def _between(modes: Floats, upper: csc_matrix) -> Floats:
+    """(k, k) x' A y between modes (k, dofs), of a symmetric matrix given by its upper triangle."""
+    half = _products(modes, np.array([upper @ mode for mode in modes]))
+    return half + half.T - _products(modes, upper.diagonal() * modes)
+
+
+def _products(a: Sequence[Floats] | Floats, b: Floats) -> Floats:
+    """(k, k) inner products of rows."""
+    return np.asarray(np.einsum("ik,jk->ij", a, b))

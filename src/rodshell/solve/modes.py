@@ -1,0 +1,217 @@
+"""Linear buckling and natural frequencies of a stable structure.
+
+Both are problems A x = mu K x with the stiffness K, which is positive definite, and a symmetric A of any kind: its
+largest mu are wanted. For buckling about a permanent state under t times a load A = -Ks and t = 1/mu, for vibrations
+A = M and omega^2 = 1/mu. SciPy's ARPACK finds them by Lanczos' method with the inverse of K, whose factors are at hand
+[Lehoucq, Sorensen and Yang 1998]. That none is missed is certified: K - A / m has as many negative eigenvalues as
+there are mu above m, and the pivots of its factorisation count them [Parlett 1998, section 3.3].
+
+Ks is the change of the stiffness with the internal forces alone, at frozen geometry (`rods.elements.Stressed`): what
+the load adds to axial forces, to torsional moments and to the bending moments of anisotropic rods, and the stiffness of
+the load's own potential. A linear factor takes the state for straight on: it misses what a shell sinks before it
+buckles, and it may lie on either side of what the path says.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import csc_matrix, diags
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+from rodshell.arrays import Floats
+from rodshell.errors import ConvergenceError, InputError, StabilityError
+from rodshell.solve.equilibrium import Equilibrium
+from rodshell.solve.load import Load, LoadedAssembly
+from rodshell.solve.tangent import Tangent
+
+DENSE = 24  # unknowns up to which LAPACK solves the whole problem
+SPARE = 2  # modes that are computed beyond those asked for, so that the count has a gap to stand in
+GAP = 1e-6  # relative, between two eigenvalues that are not the same
+TRIES = 3  # with twice as many modes each, until the count agrees
+ACCURACY = 1e-10  # of eigenvalues
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBuckling:
+    """Factors on a load at which the linearised stiffness about a permanent state is singular.
+
+    Parameters
+    ----------
+    factors : (k,) ascending, all positive: no factor is missing below the last. Fewer than were asked for, or none,
+        where there are no more up to the largest looked for.
+    shapes : (k, N, 3) modes, the largest component of a node's displacement being 1.
+    rate : (N, 3) how the state moves per unit of the factor at first [m, rad].
+    """
+
+    factors: Floats
+    shapes: Floats
+    rate: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration:
+    """Natural frequencies of small vibrations about an equilibrium.
+
+    Parameters
+    ----------
+    frequencies : (k,) ascending [Hz]; none is missing below the last.
+    shapes : (k, N, 3) modes, the largest component of a node's displacement being 1.
+    """
+
+    frequencies: Floats
+    shapes: Floats
+
+
+def linear_buckling(
+    permanent: Equilibrium, load: Load | Floats, count: int = 1, *, most: float = 1e3
+) -> LinearBuckling:
+    """The lowest factors of linear buckling under a load on top of a permanent state.
+
+    Parameters
+    ----------
+    permanent : a stable equilibrium; what it carries stays as it is, and is not multiplied.
+    load : at factor 1: dead forces (N, 3) [N], or a `Load`.
+    count : so many of the lowest factors.
+    most : factors above this are not looked for.
+
+    Raises
+    ------
+    InputError : the load does not fit the structure.
+    StabilityError : the permanent state is not stable.
+    ConvergenceError : the factors that were found are not all there are.
+    """
+    state, applied = permanent.state, Load.of(load)
+    loaded = LoadedAssembly(permanent.problem, applied, state)
+    elements = applied.elements(permanent.elements, state, 0.0)
+    tangent, rate = loaded.tangent(elements, state, permanent.forces, 0.0)
+    stress = tangent.pattern.upper(-loaded.stress_values(elements, state, rate))
+    values, shapes = _largest(tangent, stress, count, 1.0 / most)
+    return LinearBuckling(1.0 / values, _unit_shapes(tangent, permanent, shapes), rate)
+
+
+def frequencies(
+    equilibrium: Equilibrium, mass: Floats, count: int = 1, *, edge_mass: Floats | None = None
+) -> Vibration:
+    """The lowest natural frequencies about an equilibrium, under the loads that it carries.
+
+    Parameters
+    ----------
+    equilibrium : a stable one.
+    mass : (N, 3) lumped mass of each component [kg, of a twist angle kg m2], some of which may be 0.
+    count : so many of the lowest, or as many as there are.
+    edge_mass : (e,) the part of the mass that is spread along each edge [kg]: it moves as the edge's points do between
+        its nodes (a consistent mass), so that frequencies of bending are of fourth order in the edges' length. Lumped
+        at the nodes, None, they are of second order: the k-th of a span of n edges is (k pi / n)^2 / 12 too low.
+
+    Raises
+    ------
+    InputError : the mass has another shape, is negative, or is zero everywhere.
+    StabilityError : the equilibrium is not stable.
+    ConvergenceError : the frequencies that were found are not all there are.
+    """
+    tangent = equilibrium.tangent
+    if mass.shape != equilibrium.state.shape:
+        raise InputError(f"the mass has the shape {mass.shape}: give {equilibrium.state.shape}")
+    weight = tangent.freedom.reduce_diagonal(mass)
+    if not (mass >= 0).all() or not weight.any():
+        raise InputError("the mass must not be negative, nor zero everywhere in the free directions")
+    inertia = _inertia(equilibrium, tangent, weight, edge_mass)
+    values, shapes = _largest(tangent, inertia, min(count, int(np.count_nonzero(weight))), 0.0)
+    return Vibration(1.0 / (2 * pi * np.sqrt(values)), _unit_shapes(tangent, equilibrium, shapes))
+
+
+def _inertia(equilibrium: Equilibrium, tangent: Tangent, weight: Floats, edge_mass: Floats | None) -> csc_matrix:
+    """Upper triangle of the mass in the pattern of K: lumped, less a sixth of what is spread along edges times the
+    squared difference of their nodes' motions."""
+    pattern, blocks = tangent.pattern, equilibrium.problem.stretch.blocks
+    values = np.zeros(len(tangent.values))
+    if edge_mass is not None:
+        if edge_mass.shape != (len(blocks),) or not (edge_mass >= 0).all():
+            raise InputError(
+                f"the mass of the edges has the shape {edge_mass.shape}: give {(len(blocks),)}, not negative"
+            )
+        apart = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3))
+        edges = -edge_mass[:, None, None] / 6.0 * apart
+        pattern.assembly.add(len(pattern.blocks) - 2, edges, blocks, tangent.freedom, values)
+    values[pattern.assembly.diagonal] += weight
+    return pattern.upper(values)
+
+
+def _unit_shapes(tangent: Tangent, equilibrium: Equilibrium, rows: Floats) -> Floats:
+    """(k, N, 3) of reduced modes (k, dofs)."""
+    nodes = np.unique(equilibrium.problem.stretch.blocks)
+    shapes = [tangent.freedom.expand(row) for row in rows]
+    return np.array([shape / np.abs(shape[nodes]).max() for shape in shapes]).reshape(-1, *equilibrium.state.shape)
+
+
+def _largest(tangent: Tangent, upper: csc_matrix, count: int, least: float) -> tuple[Floats, Floats]:
+    """The largest eigenvalues mu > `least` of A x = mu K x, descending, and their vectors (k, dofs), certified.
+
+    upper : upper triangle of A in the pattern of K.
+    """
+    if tangent.negative_modes:
+        raise StabilityError(
+            f"the permanent state is not stable ({tangent.negative_modes} negative modes): it has no buckling factor "
+            "and no natural frequencies"
+        )
+    size = tangent.freedom.size
+    matrix = _whole(upper)
+    stiffness = _whole(tangent.pattern.upper(tangent.values))
+    wanted = count + SPARE
+    for _ in range(TRIES):
+        wanted = min(wanted, size)
+        if size <= DENSE or wanted >= size - 1:
+            values, vectors = eigh(matrix.toarray(), stiffness.toarray())
+            order = np.argsort(values)[::-1]
+        else:
+            values, vectors = _lanczos(tangent, matrix, stiffness, wanted)
+            order = np.argsort(values)[::-1]
+        values, vectors = values[order], vectors.T[order]
+        positive = values > max(least, 1e-14 * float(np.abs(values).max(initial=0.0)))
+        values, vectors = values[positive], vectors[positive]
+        if not len(values) and least == 0.0:
+            return values, vectors
+        at, found = _between(values, count, least, complete=len(values) < wanted)
+        if _above(tangent, upper, at) == found:
+            kept = min(count, found)
+            return values[:kept], vectors[:kept]
+        wanted = 2 * wanted + SPARE
+    raise ConvergenceError(
+        f"{found} modes were found where the inertia of the stiffness counts {_above(tangent, upper, at)}: "
+        "ask for more or fewer modes"
+    )
+
+
+def _between(values: Floats, count: int, least: float, *, complete: bool) -> tuple[float, int]:
+    """A number in a gap below the `count`-th of the descending values, and how many are above it."""
+    rest = values[: len(values)]
+    if len(rest) <= count and complete:
+        last = float(rest[-1]) if len(rest) else np.inf
+        return (least if least > 0 else 0.5 * last), len(rest)
+    gaps = 1.0 - rest[count:] / rest[count - 1 : -1]
+    first = int(np.argmax(gaps > GAP)) if (gaps > GAP).any() else len(gaps) - 1
+    number = count + first
+    return 0.5 * float(rest[number - 1] + rest[number]), number
+
+
+def _above(tangent: Tangent, upper: csc_matrix, value: float) -> int:
+    """How many eigenvalues of A x = mu K x are above a value: negative ones of K - A / value."""
+    return tangent.pattern.solver.factor(tangent.values - upper.data / value).negative
+
+
+def _lanczos(tangent: Tangent, matrix: csc_matrix, stiffness: csc_matrix, count: int) -> tuple[Floats, Floats]:
+    size = tangent.freedom.size
+    inverse = LinearOperator((size, size), matvec=tangent.factors.solve, dtype=float)
+    start = np.sin(1.0 + np.arange(size) ** 2)  # the same at every run, and no symmetry of the structure is one of it
+    try:
+        values, vectors = eigsh(matrix, k=count, M=stiffness, Minv=inverse, which="LA", v0=start, tol=ACCURACY)
+    except ArpackError as error:
+        raise ConvergenceError(f"the modes were not found: {error}; ask for fewer") from None
+    return values, vectors
+
+
+def _whole(upper: csc_matrix) -> csc_matrix:
+    """Both triangles of a symmetric matrix."""
+    return csc_matrix(upper + upper.T - diags(upper.diagonal()))

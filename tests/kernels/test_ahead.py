@@ -1,0 +1,95 @@
+"""Kernels compiled by Numba before the first job: each by the types of its row, and by two processes."""
+
+import importlib
+import os
+import pkgutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rodshell
+from rodshell.kernels import COMPILED
+from rodshell.kernels.table import KERNELS
+
+jit_only = pytest.mark.skipif(
+    COMPILED is not None or bool(os.environ.get("NUMBA_DISABLE_JIT")), reason="kernels by Numba: RODSHELL_KERNELS=jit"
+)
+INLINED = {"spread", "subtract_product"}  # never compiled on their own
+PARENT = """
+import time
+from rodshell.kernels import ahead
+with ahead._helper(2) as helper:
+    print(helper.pid, flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.mark.slow
+@jit_only
+def test_jobs_call_every_kernel_with_the_types_of_its_row() -> None:
+    """With these alone: a second signature would be compiled again, and refused by a compiled kernel. Arrays that are
+    read only count as others."""
+    from numba.core.dispatcher import Dispatcher
+
+    from rodshell.kernels.jit import arguments_of
+    from tests.kernels.jobs import JOBS
+
+    for package in pkgutil.walk_packages(rodshell.__path__, "rodshell."):
+        importlib.import_module(package.name)
+    kernels = {
+        value.py_func: value
+        for name, module in list(sys.modules.items())
+        if name.startswith("rodshell.")
+        for value in vars(module).values()
+        if isinstance(value, Dispatcher)
+    }
+    for job in JOBS.values():
+        job()
+    for module, rows in KERNELS.items():
+        for name, row in rows.items():
+            kernel = getattr(sys.modules[f"rodshell.{module}"], name)
+            called = {tuple(_writable(kind) for kind in types) for types in kernel.signatures}
+            assert called <= {arguments_of(row)}, f"{module}.{name}"
+    assert not_reached(kernels) <= INLINED
+
+
+def _writable(kind: Any) -> Any:
+    return kind.copy(readonly=False) if hasattr(kind, "layout") else kind
+
+
+def not_reached(kernels: dict[Any, Any]) -> set[str]:
+    """Kernels that neither a job calls nor a kernel that is reached; Numba asks a function that is called from a kernel
+    for its types."""
+    reached = [function for function, kernel in kernels.items() if kernel.signatures]
+    while reached:
+        names = reached.pop().__code__.co_names
+        inner = [one for one in kernels if one.__name__ in names and not kernels[one].signatures]
+        for one in inner:
+            kernels.pop(one)
+        reached += inner
+    return {function.__name__ for function, kernel in kernels.items() if not kernel.signatures}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_the_helper_ends_when_its_process_is_killed(tmp_path: Path) -> None:
+    """At once: it would compile for more than the time that it is given."""
+    environment = os.environ | {"RODSHELL_KERNELS": "jit", "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(tmp_path)}
+    with subprocess.Popen([sys.executable, "-c", PARENT], env=environment, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        helper = int(parent.stdout.readline())
+        parent.send_signal(signal.SIGKILL)
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:
+        try:
+            os.kill(helper, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.1)
+    os.kill(helper, signal.SIGKILL)
+    pytest.fail("the helper outlives the process that it helps")
