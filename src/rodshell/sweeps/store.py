@@ -17,6 +17,7 @@ from rodshell.errors import OutputError
 
 STORE, LOCK = "sweep.sqlite", "sweep.lock"
 FORMAT = 1
+CACHE = 500  # kB of the coordinator's memory
 LOG = 200  # pages of SQLite's log, which is then merged into the file
 PAGE = 8192  # B: some rows fit on each, so that little of it is left empty
 TABLES = """
@@ -82,6 +83,7 @@ class Store:
                 self._connection.execute(f"PRAGMA page_size = {PAGE}")
                 self._connection.execute("PRAGMA journal_mode = WAL")
                 self._connection.execute("PRAGMA synchronous = NORMAL")
+                self._connection.execute(f"PRAGMA cache_size = -{CACHE}")
                 self._connection.execute(f"PRAGMA wal_autocheckpoint = {LOG}")
                 self._connection.executescript(TABLES)
                 self._connection.execute("INSERT OR IGNORE INTO notes VALUES ('format', ?)", (str(FORMAT),))
