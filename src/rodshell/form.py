@@ -412,12 +412,16 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
     """
     from rodshell.loads.check import check_shells  # most forms have no loads
     from rodshell.loads.combinations import Loads
-    from rodshell.loads.structure import Strength
+    from rodshell.loads.strength import Limits
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
     if isinstance(form.stages, PatchedForm):
         raise InputError("a form in patches cannot be checked under loads: leave out the seams, or the loads")
     judged_by = form.options.judged_by(form.rod)
-    strength = Strength(strength=judged_by.strength, shear_weight=judged_by.shear_weight)
-    return check_shells(form.stages, loads, strength=strength, progress=progress)
+    limits = Limits.of(
+        form.rod, loads.strength,
+        characteristic=judged_by.strength, of_preset=form.options.strength is None,
+        shear_weight=judged_by.shear_weight,
+    )  # fmt: skip
+    return check_shells(form.stages, loads, limits=limits, progress=progress)

@@ -6,7 +6,7 @@ Without a name every part is run. A further part is a module of rows and an entr
 import sys
 from collections.abc import Callable, Iterator
 
-from tests.acceptance import loads_shells, loads_stability
+from tests.acceptance import loads_creteil, loads_shells, loads_stability
 from tests.acceptance.rows import Row, print_table
 
 PARTS: dict[str, Callable[[], Iterator[Row]]] = {
@@ -14,6 +14,7 @@ PARTS: dict[str, Callable[[], Iterator[Row]]] = {
     "closed-forms": loads_stability.closed_form_rows,
     "vibration": loads_stability.vibration_rows,
     "shells": loads_shells.all_rows,
+    "creteil": loads_creteil.rows,
 }
 
 
