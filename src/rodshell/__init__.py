@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from rodshell.loads.combinations import Loads, Stability
     from rodshell.loads.kinds import LineLoad, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
     from rodshell.loads.laths import Laths
+    from rodshell.loads.strength import Strength
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -114,6 +115,7 @@ _HOMES = {
     "rodshell.loads.combinations": ("Loads", "Stability"),
     "rodshell.loads.kinds": ("LineLoad", "PointLoad", "SelfWeight", "Settlement", "Snow", "Temperature", "Wind"),
     "rodshell.loads.laths": ("Laths",),
+    "rodshell.loads.strength": ("Strength",),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
@@ -143,7 +145,8 @@ __all__ = [
     "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid",
     "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection",
     "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight",
-    "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Target", "Temperature",
+    "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Strength", "Target",
+    "Temperature",
     "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads",
     "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise",
     "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "simulate", "solve_rod",

@@ -374,6 +374,12 @@ class Form:
             met[ends] = contact_of_patches(self.footprint.mesh, states, self.rod)
         return merged_checks(each, met)
 
+    @property
+    def _design(self) -> dict[str, Floats]:
+        """The values of a refined design, from which `rodshell refine DIR` continues."""
+        design = () if self.refined is None else self.refined.design
+        return {"design": np.array(design)} if design else {}
+
     @cached_property
     def _archive(self) -> Archive:
         checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
@@ -389,7 +395,7 @@ class Form:
 
             results = loaded_results(results, self.footprint.mesh, self.loaded)
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
-        states = states_of(self.stages) | checked_states(checks, self.rod.stretch_stiffness)
+        states = states_of(self.stages) | self._design | checked_states(checks, self.rod.stretch_stiffness)
         if self.loaded is not None:
             from rodshell.results.from_loads import loaded_states
 
@@ -412,12 +418,16 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
     """
     from rodshell.loads.check import check_shells  # most forms have no loads
     from rodshell.loads.combinations import Loads
-    from rodshell.loads.structure import Strength
+    from rodshell.loads.strength import Limits
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
     if isinstance(form.stages, PatchedForm):
         raise InputError("a form in patches cannot be checked under loads: leave out the seams, or the loads")
     judged_by = form.options.judged_by(form.rod)
-    strength = Strength(strength=judged_by.strength, shear_weight=judged_by.shear_weight)
-    return check_shells(form.stages, loads, strength=strength, progress=progress)
+    limits = Limits.of(
+        form.rod, loads.strength,
+        characteristic=judged_by.strength, of_preset=form.options.strength is None,
+        shear_weight=judged_by.shear_weight,
+    )  # fmt: skip
+    return check_shells(form.stages, loads, limits=limits, progress=progress)

@@ -37,7 +37,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "refine": ("refine",),
     "checks": ("checks",),
     "fabrication": ("fabrication", "bracing"),
-    "loads": ("loads", "combinations", "stability"),
+    "loads": ("loads", "combinations", "stability", "strength"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
@@ -143,7 +143,11 @@ class Run:
             return earlier.refined
         from rodshell.refining.acceptance import refined  # it takes a tenth of a second to load, which few jobs need
 
-        return refined(stages, vary, ends=case.refine.ends, progress=self.progress)
+        table = case.refine
+        return refined(
+            stages, vary,
+            ends=table.ends, under_weight=table.under == "weight", start=table.start, progress=self.progress,
+        )  # fmt: skip
 
     def _decided(self, case: Case, found: Built) -> tuple[Case, Built, Search | None]:
         """The case with anchor and heading, and the search for them, if they are "auto"."""

@@ -365,3 +365,15 @@ def test_long_steps_are_cut_and_lead_to_the_same_shell_in_a_fraction_of_the_fact
     assert whole.report.stable
     assert whole.report.factorizations > cut.report.factorizations
     np.testing.assert_allclose(cut.positions, shell.positions(whole.state), rtol=0, atol=1e-9 * 5.0)
+
+
+@pytest.mark.slow
+def test_where_the_way_up_from_flat_has_a_limit_point_the_grid_snaps_on_to_its_shape():
+    """Newton's method stalls at a third of the way, whatever the step: the branch ends there."""
+    form = rs.Job.load("ellipsoid", pop_up__ends="pinned", layout__edge="10 mm").run(until="pop-up")
+    tapered = rs.Footprint(form.footprint.mesh.with_profiles(rs.Profile.symmetric((0.125, 0.1256, 0.525, 0.8076, 1.0))))
+    draped, flat = (
+        rs.pop_up(tapered, form.boundary, form.rod, ends="pinned", start=start) for start in ("draped", "flat")
+    )
+    assert flat.report.stable
+    np.testing.assert_allclose(flat.positions, draped.positions, atol=1e-9)

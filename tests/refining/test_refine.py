@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.errors import InputError
+from rodshell.errors import InputError, OutOfTimeError
 from rodshell.formfinding.pipeline import agreement
 from rodshell.formfinding.popup import pop_up
 from rodshell.formfinding.trim import Footprint
+from rodshell.refining.gauss_newton import Step
 from rodshell.refining.objectives import Gap, Small
-from rodshell.refining.refine import Refinement, refine
+from rodshell.refining.refine import Refinement, between, refine
 from rodshell.refining.stiffness_families import Taper
 from rodshell.solve.equilibrium import find_equilibrium
 
@@ -83,6 +84,14 @@ def test_progress_sees_every_evaluation_and_may_stop_the_search() -> None:
     found = refine(form().stages, "taper", progress=steps.append)  # type: ignore[arg-type]
     assert tuple(steps) == found.steps
     assert [step.number for step in steps] == list(range(1, len(steps) + 1))
+
+    def late(step: Step) -> None:
+        raise OutOfTimeError("stopped by a time limit of 1 s")
+
+    stopped = refine(form().stages, "taper", progress=late)  # type: ignore[arg-type]
+    assert len(stopped.steps) == 1
+    assert len(stopped.designs) == 2
+    assert not stopped.converged
     one = refine(form().stages, "taper", most_evaluations=1)  # type: ignore[arg-type]
     assert len(one.steps) == 1
     assert not one.converged
@@ -123,3 +132,14 @@ def test_a_shell_refined_under_its_weight_meets_the_target_when_it_bears_it() ->
     assert agreement(replace(popped, equilibrium=here), found.after.target).rms == pytest.approx(after.rms, rel=1e-3)
     assert found.gap_after.rms > 1.2 * after.rms
     assert found.after.popped["pinned"].report.stable
+
+
+def test_a_design_between_two_has_a_gap_between_theirs() -> None:
+    found = tapered()
+    first, last = found.designs[0], found.designs[-1]
+    middle, made = between(found, first, last, 0.4)
+    assert middle is not None
+    assert made <= 10
+    assert last.point.rms < middle.point.rms < first.point.rms
+    np.testing.assert_allclose(middle.point.values, 0.4 * last.point.values)
+    assert middle.grid.mesh.grid.rods[0].profile is not None

@@ -14,6 +14,7 @@ from rodshell.case.load_tables import (
     LoadKinds,
     NoBracingTable,
     StabilityTable,
+    StrengthTable,
 )
 from rodshell.case.rod_tables import BallTable, JointKinds, RodTable
 from rodshell.case.stage_tables import (
@@ -85,6 +86,7 @@ class Case(Table):
     )
     bracing: BracingKinds = Field(default_factory=NoBracingTable, discriminator="kind")
     stability: StabilityTable = Field(default_factory=StabilityTable)
+    strength: StrengthTable = Field(default_factory=StrengthTable)
 
     @property
     def held_objects(self) -> dict[str, Held]:
@@ -108,7 +110,7 @@ class Case(Table):
                     f"no case file can describe {held.what} ({name}): keep the Python that makes it, or save the form"
                 )
             notes += [f"# {held.note}\n"] if held.note else []
-        idle = {"stability"} if not self.loads else set[str]()
+        idle = {"stability", "strength"} if not self.loads else set[str]()
         idle |= {"bracing"} if self.bracing.kind == "none" else set()
         return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
 
@@ -260,6 +262,8 @@ class Case(Table):
             combinations={row.name: dict(row.factors) for row in self.combinations},
             bracing=self.bracing.build(),
             stability=self.stability.build(),
+            strength=self.strength.build(),
+            durations={load.name: load.duration for load in self.loads if load.duration is not None},
         )
 
     def output_options(self) -> "OutputOptions":

@@ -16,6 +16,8 @@ from rodshell.case.rod_tables import (
 from rodshell.case.values import (
     Angle,
     Distance,
+    Factor,
+    Force,
     ForcePerLength3,
     Forces3,
     KelvinChange,
@@ -24,6 +26,7 @@ from rodshell.case.values import (
     Point3,
     Pressure,
     Share,
+    Stress,
     Table,
     Whole,
     not_negative,
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
     from rodshell.loads.combinations import Stability
     from rodshell.loads.kinds import Load
     from rodshell.loads.laths import Laths
+    from rodshell.loads.strength import Strength
     from rodshell.rods.section import Rod
 
 
@@ -107,10 +111,16 @@ def _imperfection(value: object) -> str | float:
         raise ValueError(f'{reason}, or a part of the span such as "span/500"') from None
 
 
+LoadDuration = Literal["permanent", "long", "medium", "short", "instantaneous"]
+
+
 class LoadTable(Table):
     """Keys of every load."""
 
     name: str = Field(min_length=1, description="name of the load, for combinations")
+    duration: LoadDuration | None = Field(
+        default=None, description="how long it acts, for strengths; default: by the kind of load"
+    )
 
     def build(self) -> "Load":
         """The load.
@@ -125,7 +135,7 @@ class LoadTable(Table):
             "self_weight": kinds.SelfWeight, "snow": kinds.Snow, "wind": kinds.Wind, "point": kinds.PointLoad,
             "line": kinds.LineLoad, "settlement": kinds.Settlement, "temperature": kinds.Temperature,
         }  # fmt: skip
-        made: Load = classes[self.kind](**self.model_dump(exclude={"kind", "name"}))  # type: ignore[attr-defined]
+        made: Load = classes[self.kind](**self.model_dump(exclude={"kind", "name", "duration"}))  # type: ignore[attr-defined]
         return made
 
 
@@ -305,3 +315,42 @@ class StabilityTable(Table):
         from rodshell.loads.combinations import Stability
 
         return Stability(imperfection=self.imperfection, modes=self.modes)
+
+
+def _service_class(value: object) -> int | None:
+    """1, 2 or 3."""
+    if value is None:
+        return None
+    found = read_quantity(value, "number")
+    if found not in (1, 2, 3):
+        raise ValueError("must be 1 (inside), 2 (covered) or 3 (in the weather)")
+    return int(found)
+
+
+ServiceClass = Annotated[Literal[1, 2, 3], BeforeValidator(_service_class)]
+
+
+class StrengthTable(Table):
+    permanent: Stress | None = Field(
+        default=None,
+        description="design strength under permanent loads; default: a preset's",
+    )
+    long: Stress | None = Field(default=None, description="under loads of months; default: permanent")
+    medium: Stress | None = Field(default=None, description="the same under loads of weeks; default: the long one")
+    short: Stress | None = Field(default=None, description="the same under loads of days; default: the medium one")
+    instantaneous: Stress | None = Field(default=None, description="the same under gusts; default: the short one")
+    erection: Stress | None = Field(default=None, description="the same during deployment; default: the short one")
+    service_class: ServiceClass | None = Field(
+        default=None, description="of timber: 1 inside, 2 covered (default), 3 in the weather"
+    )
+    hole: Distance = Field(default=0.0, description="diameter of the bolts' holes through the rods at joints")
+    slip: Force | None = Field(default=None, description="axial force that a joint transfers before it slips")
+    effective_length: Factor = Field(
+        default=1.0, description="effective length of a span between joints, over its length"
+    )
+
+    def build(self) -> "Strength":
+        """What it says."""
+        from rodshell.loads.strength import Strength
+
+        return Strength(**self.model_dump())

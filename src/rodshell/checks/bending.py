@@ -262,7 +262,9 @@ class Bending:
         return None if self.strain is None else np.asarray(self.strain - np.abs(self.axial_strain))
 
 
-def bending_of(shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = VON_MISES) -> Bending:
+def bending_of(
+    shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = VON_MISES, edge_strains: Floats | None = None
+) -> Bending:
     """Bending of a shell of equal rods in a `state` (N, 3); laths are judged by how they bend about either axis.
 
     Parameters
@@ -271,6 +273,7 @@ def bending_of(shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = V
     state : (N, 3) node positions [m] and twist angles [rad].
     rod : the section and material of every rod.
     shear_weight : of the shear stress against the normal stress, see `checks.bending`.
+    edge_strains : (e,) axial strains that stress the edges; default: against their rest lengths.
     """
     mesh, positions = shell.mesh, shell.positions(state)
     normals = shell_normals(mesh, positions)
@@ -289,12 +292,14 @@ def bending_of(shell: Shell, state: Floats, rod: Rod, *, shear_weight: float = V
     return bending(
         mesh, positions, rod,
         clamps=clamps, components=components, twist_rate=twist, normals=normals, shear_weight=shear_weight,
+        edge_strains=edge_strains,
     )  # fmt: skip
 
 
 def bending(
     mesh: GridMesh, positions: Floats, rod: Rod, *, clamps: Floats | None = None, components: Floats | None = None,
     twist_rate: Floats | None = None, normals: Floats | None = None, shear_weight: float = VON_MISES,
+    edge_strains: Floats | None = None,
 ) -> Bending:  # fmt: skip
     """Bending of the rods of `mesh` with nodes at `positions` (n, 3) [m].
 
@@ -306,9 +311,11 @@ def bending(
     twist_rate : (k,) twist per length [rad/m]; without, none.
     normals : (k, 3) of the shell at each entry of `rod_nodes`, by which the curvature is parted without `components`.
     shear_weight : of the shear stress against the normal stress, see `checks.bending`.
+    edge_strains : (e,) as of `bending_of`.
     """
     turns, tangents = _turns(mesh, positions, clamps)
-    curvature, axial = np.linalg.norm(turns, axis=1), axial_strains(mesh, positions)
+    curvature = np.linalg.norm(turns, axis=1)
+    axial = axial_strains(mesh, positions) if edge_strains is None else _mean_of_edges(mesh, edge_strains)
     twist = np.zeros(len(curvature)) if twist_rate is None else twist_rate
     stress = strain = sheared = normal = geodesic = None
     if components is not None:

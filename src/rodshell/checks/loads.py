@@ -195,6 +195,37 @@ def _on_places(shell: Shell, state: Floats) -> Floats:
     return result
 
 
+def cut_forces(shell: Shell, state: Floats) -> Floats:
+    """(e, 3) force in each edge of the mesh, by which what lies after it pulls at what lies before it [N].
+
+    Its part along the edge is the axial force, the rest the shear force: what balances the rod's own energy up to the
+    cut. A moment that a joint transfers acts as a pair of forces on the nodes next to it, so that shear forces are
+    those of spans only away from joints.
+
+    Parameters
+    ----------
+    shell : its source frames being at the state.
+    state : (N, 3) node positions [m] and twist angles [rad] of an equilibrium.
+    """
+    mesh, start = shell.mesh, shell.mesh.rod_start
+    gradient = _on_places(shell, state)
+    if len(shell.ghosts):  # a clamp holds the ghost node before a rod's start, too
+        order = np.argsort(shell.ghosts)
+        at_ghosts = np.zeros((len(shell.ghosts), 3))
+        for element in shell.within:
+            rows = _rows(element, state)
+            for column in range(element.blocks.shape[1]):
+                held = np.isin(element.blocks[:, column], shell.ghosts)
+                found = order[np.searchsorted(shell.ghosts[order], element.blocks[held, column])]
+                np.add.at(at_ghosts, found, rows[held, column])
+        gradient[start] += at_ghosts[::2]
+    before = np.cumsum(gradient, axis=0)
+    before -= np.repeat(before[start] - gradient[start], mesh.rod_stop - start, axis=0)
+    inner = np.ones(len(gradient), dtype=bool)
+    inner[mesh.rod_stop - 1] = False
+    return np.asarray(-before[inner])
+
+
 def _between(shell: Shell, state: Floats, met: Ints) -> tuple[Floats, Floats]:
     """Of the joints' energies: minus their forces on the nodes next to each joint, by crossing and rod (c, 2, 3) [N],
     and their moment about the joint on the second rod (c, 3) [N m]."""

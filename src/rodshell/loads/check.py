@@ -14,17 +14,21 @@ from functools import partial
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks.bending import bending_of
+from rodshell.checks.bending import require_known_stress, rod_frames
 from rodshell.checks.loads import Reactions
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding import PatchForm, PopUp
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
+from rodshell.loads.bracing import Cables
 from rodshell.loads.combinations import Loads
 from rodshell.loads.kinds import Forces, LoadedNodes, Settlement, Temperature
 from rodshell.loads.laths import Laths
-from rodshell.loads.structure import Strength, Structure
+from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
+from rodshell.loads.structure import Structure
 from rodshell.loads.tributary import Tributary, tributary_areas
+from rodshell.rods.design_strength import Duration
+from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
@@ -33,6 +37,7 @@ from rodshell.solve.sparse_ldl import SingularError
 from rodshell.units import shown
 from rodshell.validation import brief
 
+PERMANENT: Duration = "permanent"
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -58,11 +63,12 @@ class LoadedShell:
     displacements : (n, 3) of the mesh's nodes against the unloaded shell [m].
     positions : (n, 3) of the mesh's nodes [m].
     stress : (k,) largest stress of bending, axial force and torsion at each entry of `rod_nodes` [Pa]; None: unknown.
-    utilisation : largest stress over the strength; None: one of them is not known.
-    governs : entry of `rod_nodes` with the largest stress.
+    duration : of the combination, by which strengths are chosen.
+    used : what rods and joints use of their strength, and the erected shell of its permanent strength.
     bracing_forces : (d,) axial force of each brace, tension positive, of slack cables exactly 0 [N].
-    bracing_utilisation : as `utilisation`, of the laths of a third layer; None: there are none, or their strength is
-        not known.
+    bracing_utilisation : of the laths of a third layer, or of the cables in tension; None: there are none, or their
+        strength is not known.
+    mode_factors : (j,) linear buckling factors of `modes`.
     modes : (j, n, 3) lowest linear buckling modes, the largest component being 1.
     mode : (n, 3) how the shell gives way at the limit, or None.
     factorizations : what it took.
@@ -80,15 +86,26 @@ class LoadedShell:
     displacements: Floats
     positions: Floats
     stress: Floats | None
-    utilisation: float | None
-    governs: int | None
+    duration: Duration
+    used: Utilisation
     bracing_forces: Floats
     bracing_utilisation: float | None
     modes: Floats
+    mode_factors: Floats
     mode: Floats | None
     factorizations: int
 
     __repr__ = brief
+
+    @property
+    def utilisation(self) -> float | None:
+        """Largest of all; None: nothing is known."""
+        return None if self.used.governs is None else self.used.largest[self.used.governs[0]]
+
+    @property
+    def governs(self) -> tuple[By, int] | None:
+        """What is used most, and at which entry of `rod_nodes`; None: nothing is known."""
+        return self.used.governs
 
     @property
     def max_deflection(self) -> float:
@@ -110,12 +127,14 @@ class LoadChecks:
     asked : the loads and combinations.
     shells : by combination and end condition; an end condition whose shell did not converge is left out.
     braced : (d, 2) crossings that each brace joins; without bracing there are none.
+    limits : what the rods are judged by.
     stopped, missing : when a time limit came, or "", and which combinations were not reached.
     """
 
     asked: Loads
     shells: Mapping[str, Mapping[Ends, LoadedShell]]
     braced: Ints
+    limits: Limits
     stopped: str = ""
     missing: tuple[str, ...] = ()
 
@@ -145,11 +164,25 @@ class LoadChecks:
             for ends, shell in by_ends.items()
             if shell.imperfect_kind == "lost"
         )
-        return (*late, *lost, *imperfect)
+        return (*late, *lost, *imperfect, *self._unjudged)
+
+    @property
+    def _unjudged(self) -> tuple[str, ...]:
+        """What strength was not judged by."""
+        known, wanted = self.limits.bending, {self.asked.duration(name) for name in self.asked.combinations}
+        if not known:
+            return (
+                "the design strength of the rods is not known, so that whether they break under the loads was not "
+                "judged: give strength.permanent and strength.short",
+            )
+        missing = [name for name in ("permanent", *sorted(wanted - {"permanent"})) if name not in known]
+        if missing:
+            return (f"the design strength for {' and '.join(missing)} loads is not known and was not judged",)
+        return ()
 
 
 def check_shells(
-    stages: PatchForm, loads: Loads, *, strength: Strength = Strength(), progress: Progress = silent
+    stages: PatchForm, loads: Loads, *, limits: Limits = Limits(bending={}), progress: Progress = silent
 ) -> LoadChecks:
     """Check every shell of a form in one piece that converged under each combination.
 
@@ -157,13 +190,13 @@ def check_shells(
     ----------
     stages : of the form.
     loads : with their combinations.
-    strength : what stresses are judged by.
+    limits : of the rods.
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found until
         then is returned.
 
     Raises
     ------
-    InputError : a load does not fit the form.
+    InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
     if stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
@@ -174,17 +207,21 @@ def check_shells(
     stopped, braced = "", np.empty((0, 2), dtype=np.intp)
     try:
         for ends, popped in done.items():
+            if limits.bending:
+                require_known_stress(stages.rod, twisted=rod_frames(popped.shell) is not None)
             structure = _locked(popped, ends, loads, stages)
             braced = structure.braced
             nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
                 said = partial(_said, progress, f"{name}, {ends} ends")
-                found[name][ends] = loaded_shell(structure, load, loads, strength=strength, progress=said)
+                found[name][ends] = loaded_shell(
+                    structure, load, loads, limits=limits, duration=loads.duration(name), progress=said
+                )
                 missing.pop(0)
     except OutOfTimeError as late:
         stopped = str(late)
-    return LoadChecks(loads, found, braced, stopped, tuple(missing) if stopped else ())
+    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else ())
 
 
 def _said(progress: Progress, where: str, what: str) -> None:
@@ -261,7 +298,8 @@ def _move(structure: Structure, load: Settlement, factor: float, motions: Floats
 
 def loaded_shell(
     structure: Structure, load: Load, loads: Loads, *,
-    strength: Strength = Strength(), progress: Callable[[str], None] = lambda what: None,
+    limits: Limits = Limits(bending={}), duration: Duration = "short",
+    progress: Callable[[str], None] = lambda what: None,
 ) -> LoadedShell:  # fmt: skip
     """A structure under one combination.
 
@@ -269,8 +307,9 @@ def loaded_shell(
     ----------
     structure : in equilibrium without the loads.
     load : what acts at the combination's factor 1.
-    loads : for how stability is looked at.
-    strength : what stresses are judged by.
+    loads : for how stability is looked at, and for holes and slip of joints.
+    limits : of the rods.
+    duration : of the combination.
     progress : called with what is being done.
     """
 
@@ -293,11 +332,12 @@ def loaded_shell(
     imperfect_factor, imperfect_kind, more = _with_imperfections(structure, load, loads, buckling, following)
     n = structure.shell.node_count
     positions, before = structure.shell.positions(found.state), structure.shell.positions(unloaded.state)
-    bent = bending_of(structure.shell_at(found), found.state, structure.rod, shear_weight=strength.shear_weight)
-    governs = None if bent.stress is None else int(np.argmax(bent.stress))
-    used = None
-    if bent.stress is not None and strength.strength is not None:
-        used = float(bent.stress.max()) / strength.strength
+    edges = len(structure.mesh.edges)
+    shell, forces = structure.shell_at(found), found.forces[:edges]
+    bent = bending_under(shell, found.state, structure.rod, forces, limits)
+    judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
+    used = judged(shell, found.state, forces=forces, duration=duration, bent=bent)
+    erected = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
     shapes = np.zeros((0, n, 3)) if buckling is None else buckling.shapes[:, :n]
     return LoadedShell(
@@ -313,14 +353,37 @@ def loaded_shell(
         displacements=positions - before,
         positions=positions,
         stress=bent.stress,
-        utilisation=used,
-        governs=governs,
+        duration=duration,
+        used=used.with_permanent(erected),
         bracing_forces=structure.bracing_forces(found),
-        bracing_utilisation=structure.bracing_utilisation(found, strength),
+        bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
         modes=shapes,
+        mode_factors=np.zeros(0) if buckling is None else buckling.factors,
         mode=None if path.mode is None else path.mode[:n],
         factorizations=path.factorizations + more,
     )
+
+
+def _of_bracing(
+    structure: Structure, found: Equilibrium, loads: Loads, limits: Limits, duration: Duration
+) -> float | None:
+    """Largest utilisation of the bracing; None: there is none, or its strength is not known."""
+    bracing = loads.bracing
+    if structure.cables is not None and isinstance(bracing, Cables):
+        known = preset_limits(bracing.rod, loads.strength.service_class).bending.get(duration)
+        force = float(structure.bracing_forces(found).max(initial=0.0))
+        return None if known is None else force / (known * area_of(bracing.rod))
+    if structure.laths is None:
+        return None
+    rod, edges, asked = structure.laths.rod, len(structure.mesh.edges), replace(loads.strength, slip=None)
+    of_laths = limits if rod == structure.rod else preset_limits(rod, loads.strength.service_class)
+    shares = list[float]()
+    for state, lasting in ((found, duration), (structure.equilibrium, PERMANENT)):  # laths stay bent, as rods do
+        alone = structure.laths_alone(state)
+        assert alone is not None
+        used = utilisation(*alone, rod, forces=state.forces[edges:], limits=of_laths, asked=asked, duration=lasting)
+        shares += used.largest.values()
+    return max(shares, default=None)
 
 
 def _with_imperfections(

@@ -4,12 +4,20 @@ from dataclasses import dataclass, field
 
 from rodshell.errors import InputError
 from rodshell.loads.bracing import Cables
-from rodshell.loads.kinds import Load
+from rodshell.loads.kinds import LineLoad, Load, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
 from rodshell.loads.laths import Laths
+from rodshell.loads.strength import Strength
+from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
-from rodshell.validation import brief, instance, not_negative, positive
+from rodshell.validation import brief, choice, instance, not_negative, positive
 
 Bracing = Cables | Laths
+LASTING: dict[type, Duration] = {
+    SelfWeight: "permanent", Settlement: "permanent", Snow: "short", Wind: "short",
+    PointLoad: "medium", LineLoad: "medium", Temperature: "medium",
+}  # fmt: skip
+"""How long a load acts where that is not given [EN 1995-1-1, table 2.2; imposed loads: medium]. Codes of some countries
+count snow as medium."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +66,8 @@ class Loads:
     combinations : by name, the factors of loads by their names.
     bracing : that is put in before the loads act; None: none.
     stability : how stability is looked at.
+    strength : what rods and joints withstand.
+    durations : by a load's name, how long it acts; default: by its kind, see `LASTING`.
 
     Raises
     ------
@@ -68,10 +78,30 @@ class Loads:
     combinations: dict[str, dict[str, float]]
     bracing: Bracing | None = None
     stability: Stability = field(default_factory=Stability)
+    strength: Strength = field(default_factory=Strength)
+    durations: dict[str, Duration] = field(default_factory=dict)
 
     __repr__ = brief
 
+    def duration(self, combination: str) -> Duration:
+        """How long a combination acts: as long as the load in it that acts for the shortest time.
+
+        Parameters
+        ----------
+        combination : its name.
+        """
+        acting = [name for name, factor in self.combinations[combination].items() if factor > 0]
+        each = [self.durations.get(name, LASTING[type(self.loads[name])]) for name in acting]
+        return max(each, key=DURATIONS.index, default="permanent")
+
     def __post_init__(self) -> None:
+        instance("strength", self.strength, Strength)
+        for name, duration in self.durations.items():
+            if name not in self.loads:
+                raise InputError(
+                    f"durations has {shown(name)}, which is not a load: the loads are {', '.join(self.loads)}"
+                )
+            choice(f"the duration of {shown(name)}", duration, DURATIONS)
         if not self.loads or not self.combinations:
             missing, example = "loads", 'name = "own", kind = "self_weight"'
             if self.loads:

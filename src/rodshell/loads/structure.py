@@ -12,7 +12,6 @@ from itertools import pairwise
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks.bending import VON_MISES, bending_of
 from rodshell.checks.loads import Reactions, reactions
 from rodshell.formfinding.popup import PopUp
 from rodshell.layout import GridMesh
@@ -20,20 +19,6 @@ from rodshell.model import Shell
 from rodshell.rods.cable import CableStretch
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium
-
-
-@dataclass(frozen=True, kw_only=True)
-class Strength:
-    """What stresses are judged by.
-
-    Parameters
-    ----------
-    strength : of the rods' material [Pa]; None: not known.
-    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
-    """
-
-    strength: float | None = None
-    shear_weight: float = VON_MISES
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,14 +124,12 @@ class Structure:
             return self.laths.forces(found.forces[len(self.mesh.edges) :])
         return np.zeros(0) if self.cables is None else self.cables.forces(found.state)
 
-    def bracing_utilisation(self, found: Equilibrium, strength: Strength) -> float | None:
-        """Largest stress of the laths of a third layer over the strength, in an equilibrium of the structure; None:
-        there are none, or one of both is not known.
+    def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
+        """The model of the laths of a third layer alone and its state; None: there are none.
 
         Parameters
         ----------
         found : an equilibrium of this structure.
-        strength : of the grid's rods; laths of another material are judged by its own.
         """
         if self.laths is None:
             return None
@@ -154,12 +137,7 @@ class Structure:
         of_laths = found.elements[count : count + len(layer.shell.elements)]
         blocks = [element.blocks for element in layer.shell.elements]
         alone = tuple(replace(element, blocks=at) for element, at in zip(of_laths, blocks, strict=True))  # type: ignore[type-var]
-        bent = bending_of(
-            layer.shell.with_elements(alone), found.state[layer.blocks], layer.rod, shear_weight=strength.shear_weight
-        )
-        material = layer.rod.material
-        limit = strength.strength if layer.rod == self.rod else None if material is None else material.bending_strength
-        return None if bent.stress is None or limit is None else float(bent.stress.max()) / limit
+        return layer.shell.with_elements(alone), found.state[layer.blocks]
 
     def shell_at(self, found: Equilibrium) -> Shell:
         """The grid's model with its source frames at an equilibrium of the structure.

@@ -205,6 +205,29 @@ def _laid_out(archive: Archive, state: str, colour: Colour) -> Drawing:
     return _on_paper(pencil.done(state, shape.caption, 12.5), width, height)
 
 
+MODE = 0.06  # of the shell's width: the largest displacement of a mode as it is drawn
+
+
+def mode_picture(archive: Archive, ends: str, state: str) -> Drawing:
+    """A mode, drawn as displacements of the shell over the shell as it stands.
+
+    Parameters
+    ----------
+    archive : one with the mode.
+    ends : end condition of the shell.
+    state : name of the mode's array (n, 3).
+    """
+    shape, pencil = shape_of(archive, f"popped_{ends}"), Pencil()
+    motion = archive.states[state]
+    size = MODE * float(np.ptp(shape.positions[:, 0]))
+    moved = replace(shape, positions=shape.positions + size * motion / max(float(np.abs(motion).max()), 1e-300))
+    view = View.of(np.concatenate([shape.positions, moved.positions]), WIDTH)
+    still = _Rods.of(archive, view, shape, None)
+    replace(still, palette=[mixed(SOFT, PAPER, 0.6)] * len(still.palette)).draw(pencil, range(DEPTHS), halos=False)
+    _Rods.of(archive, view, moved, None).draw(pencil, range(DEPTHS), halos=False)
+    return _on_paper(pencil.done(state, "Mode", 12.5), WIDTH + 2 * SIDE, float(view.size[1]) + TOP + BELOW)
+
+
 def deployment_picture(archive: Archive) -> Drawing:
     """The way from flat to popped up in FRAMES shapes side by side, coloured as of `picture`.
 

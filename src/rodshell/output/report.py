@@ -12,6 +12,7 @@ from rodshell.output.drawing import Drawing
 from rodshell.output.drawings.flat import FlatPlan
 from rodshell.output.drawings.sheets import NOTE, on_a_page
 from rodshell.output.grid import CAPTIONS
+from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
 from rodshell.output.schedules import Table, heading, rods_table, seams_table, stock_table
 from rodshell.output.schedules import joints_table as joints
@@ -75,6 +76,7 @@ def report_html(archive: Archive, plan: FlatPlan, drawings: Mapping[str, Drawing
         checks=checks_table(results),
         pictures=[(CAPTIONS[state], shown(picture_svg(archive, state))) for state in states],
         one_scale=sum(state in SHELLS for state in states) > 1,
+        loads=loads_page(archive),
         figures=key_figures(results, plan),
         levels=levels_table(results),
         plan=shown(_on_page(drawings["plan"])),

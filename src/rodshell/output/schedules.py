@@ -252,7 +252,7 @@ def bracing_table(archive: Archive, *, brief: bool = False) -> Table:
     if cables:
         columns.append("cut_mm")
         rows = [[*row, mm(brace.cut)] for row, brace in zip(rows, braces, strict=True)]
-    loaded = {(name, ends): shell.bracing for name, ends, shell in _loaded(results) if shell.bracing}
+    loaded = {(name, ends): shell.bracing for name, ends, shell in loaded_shells(results) if shell.bracing}
     if loaded and not brief:
         columns += [f"force_N_{ends}_{name}" for name, ends in loaded]
         rows = [[*row, *(_six(forces[k]) for forces in loaded.values())] for k, row in enumerate(rows)]
@@ -273,7 +273,7 @@ def foundations_table(archive: Archive) -> Table:
     columns = ["id", *(f"{axis}_mm" for axis in "xyz")]
     names = [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]
     rows = [[name, *map(mm, place)] for name, place in zip(names, results.boundary, strict=True)]
-    for name, ends, shell in _loaded(results):
+    for name, ends, shell in loaded_shells(results):
         held = {"force": ("N", shell.support_forces)}
         if any(value for moment in shell.support_moments for value in moment):
             held["moment"] = ("Nm", shell.support_moments)
@@ -282,8 +282,13 @@ def foundations_table(archive: Archive) -> Table:
     return columns, rows
 
 
-def _loaded(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
-    """Every combination of loads with each end condition, and the shell under it."""
+def loaded_shells(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
+    """Every combination of loads with each end condition, and the shell under it.
+
+    Parameters
+    ----------
+    results : of the form.
+    """
     for name, by_ends in results.loads.items():
         for ends, shell in by_ends.items():
             yield name, ends, shell

@@ -10,7 +10,7 @@ from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.check import LoadedShell as CheckedShell
 from rodshell.results.from_checks import joint_names
-from rodshell.results.loaded import Governs, LoadedShell
+from rodshell.results.loaded import DesignStrength, Governs, LoadedShell, Utilisations
 from rodshell.results.results import Results
 
 
@@ -24,6 +24,7 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
     checks : under loads.
     """
     found = results.changed(
+        strength=_strength(results, checks),
         loads={
             name: {
                 ends: _record(mesh, shell, _in_order(results, mesh, checks.braced, shell.bracing_forces))
@@ -37,8 +38,8 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
 
 
 def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
-    """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], and the mode at the limit (n, 3),
-    by end condition and combination, as "loaded_pinned_winter".
+    """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], the mode at the limit and the
+    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter".
 
     Parameters
     ----------
@@ -52,6 +53,8 @@ def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
                 states[f"loaded_stress_{ends}_{name}"] = shell.stress
             if shell.mode is not None:
                 states[f"loaded_mode_{ends}_{name}"] = shell.mode
+            for k, mode in enumerate(shell.modes):
+                states[f"loaded_buckling_{ends}_{name}_{k + 1}"] = mode
     return states
 
 
@@ -69,11 +72,7 @@ def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) ->
 
 
 def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ...]) -> LoadedShell:
-    governs = None
-    if shell.governs is not None:
-        rod = int(np.searchsorted(mesh.rod_start, shell.governs, side="right")) - 1
-        line = mesh.grid.rods[rod]
-        governs = Governs(rod=line.name, at=float(mesh.stations[shell.governs]) - line.start)
+    governs = None if shell.governs is None else _place(mesh, shell.governs[1], shell.governs[0])
     return LoadedShell(
         at_factor=shell.at_factor,
         load_sum=shell.load_sum.tolist(),
@@ -84,7 +83,11 @@ def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ..
         limit_kind=_KINDS.get(shell.limit_kind, shell.limit_kind),
         imperfect_factor=shell.imperfect_factor,
         imperfect_kind=None if shell.imperfect_kind is None else _KINDS.get(shell.imperfect_kind, shell.imperfect_kind),
+        duration=shell.duration,
         utilisation=shell.utilisation,
+        utilisations=Utilisations(**shell.used.largest),
+        euler=float(shell.used.euler.max()),
+        euler_at=_place(mesh, int(np.argmax(shell.used.euler))),
         max_stress=None if shell.stress is None else float(shell.stress.max()),
         governs=governs,
         uplift=float(max(0.0, -shell.support_forces.forces[:, 2].min())),
@@ -93,4 +96,27 @@ def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ..
         support_moments=shell.support_forces.moments.tolist(),
         bracing=bracing,
         bracing_utilisation=shell.bracing_utilisation,
+        mode_factors=tuple(shell.mode_factors.tolist()),
+    )
+
+
+def _place(mesh: GridMesh, entry: int, by: str | None = None) -> Governs:
+    """The place of an entry of the mesh's `rod_nodes`."""
+    line = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, entry, side="right")) - 1]
+    return Governs(rod=line.name, at=float(mesh.stations[entry]) - line.start, by=by)
+
+
+def _strength(results: Results, checks: LoadChecks) -> DesignStrength:
+    """What was judged by, and the deployment judged by it."""
+    limits, shapes = checks.limits, results.bending.shapes() if results.bending else {}
+    stress = shapes["deployment"].max_stress if "deployment" in shapes else None
+    used = None if stress is None or limits.erection is None else stress / limits.erection
+    return DesignStrength(
+        **limits.bending,
+        erection=limits.erection,
+        axial=limits.axial,
+        shear=1.0 / limits.shear_weight,
+        creep=limits.creep,
+        erection_utilisation=used,
+        source=limits.source,
     )

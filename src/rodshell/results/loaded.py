@@ -6,10 +6,36 @@ from rodshell.results.records import ByEnds, Number, Point, Real, Record, Rows, 
 
 
 class Governs(Record):
-    """The place with the largest stress."""
+    """Where strength is used most."""
 
     rod: Text = Field(description="id of the rod")
     at: Real = Field(description="distance from the rod's start [m]")
+    by: Text | None = key("bending, shear, slip, or permanent: the erected shell by its permanent strength")
+
+
+class Utilisations(Record):
+    """What is used of each strength at most; null: not known."""
+
+    bending: Number = key("of both bending moments and the axial force, with torsion")
+    shear: Number = key("of torsion and the shear force")
+    slip: Number = key("of the joints' slip")
+    permanent: Number = key("of the erected shell without loads, by the permanent strength")
+
+
+class DesignStrength(Record):
+    """What the rods are judged by under loads; null: not known."""
+
+    permanent: Number = key("design strength in bending under permanent loads", "Pa")
+    long: Number = key("under loads of months", "Pa")
+    medium: Number = key("under loads of weeks", "Pa")
+    short: Number = key("under loads of days", "Pa")
+    instantaneous: Number = key("under gusts", "Pa")
+    erection: Number = key("during deployment", "Pa")
+    axial: Number = key("axial strength over bending strength")
+    shear: Number = key("shear strength over bending strength")
+    creep: Number = key("by how much deflections under permanent loads grow, over what they are at first")
+    erection_utilisation: Number = key("largest stress of the deployment over its strength")
+    source: Text | None = key("where they are from")
 
 
 class LoadedShell(Record):
@@ -24,9 +50,13 @@ class LoadedShell(Record):
     limit_kind: Text | None = key("limit point, bifurcation, none, unstable unloaded, or not followed: unknown above")
     imperfect_factor: Number = key("the same with imperfections; null: above 100, not found, or not asked for")
     imperfect_kind: Text | None = key("what ends the path with imperfections, as limit_kind; null: not asked for")
-    utilisation: Number = key("largest stress over the strength; null: one of them is not known")
+    duration: Text | None = key("of the load that acts for the shortest time, which decides the strength")
+    utilisation: Number = key("the largest of the utilisations; null: none is known")
+    utilisations: Utilisations | None = key("what is used of each strength")
+    euler: Number = key("largest compression of a span between joints over its Euler load")
+    euler_at: Governs | None = key("where that is")
     max_stress: Number = key("largest stress of bending, axial force and torsion", "Pa")
-    governs: Governs | None = key("place with the largest stress")
+    governs: Governs | None = key("where strength is used most")
     uplift: Number = key("largest force by which the shell pulls at a support upwards; 0: at none", "N")
     reactions: Rows[Point] = rows("force of each support, in the order of boundary, without the unloaded shell's", "N")
     support_forces: Rows[Point] = rows("force of each support, with the unloaded shell's", "N")
@@ -34,7 +64,8 @@ class LoadedShell(Record):
     bracing: Rows[Number] = rows(
         "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
     )
-    bracing_utilisation: Number = key("utilisation of the laths of a third layer; null: none, or not known")
+    bracing_utilisation: Number = key("utilisation of laths of a third layer or of cables; null: none, or not known")
+    mode_factors: Rows[Number] = rows("linear buckling factors of the lowest modes")
 
 
 LoadCases = dict[str, ByEnds[LoadedShell]]

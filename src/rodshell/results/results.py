@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, ValidationError
 
 from rodshell.errors import OutputError
-from rodshell.results.loaded import LoadCases
+from rodshell.results.loaded import DesignStrength, LoadCases
 from rodshell.results.records import (
     Agreement,
     Bent,
@@ -290,6 +290,7 @@ class Results(Record):
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
+    strength: DesignStrength | None = key("design strengths, by which the shell under loads is judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
     deployment: Deployment | None = key("the shell from flat to popped up")
     contact: Contact | None = key("contact of rods with each other")
@@ -450,8 +451,9 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
     yield from ((f"bending.{shape}.rod", worst.rod) for shape, worst in bent.items() if worst.rod is not None)
     for name, supported in results.loads.items():
         for support, loaded in supported.items():
-            if loaded.governs is not None:
-                yield f"loads.{name}.{support}.governs.rod", loaded.governs.rod
+            for what, where in (("governs", loaded.governs), ("euler_at", loaded.euler_at)):
+                if where is not None:
+                    yield f"loads.{name}.{support}.{what}.rod", where.rod
     for shape in ("pinned", "clamped", "deployment"):
         nearest = results.contact.of(shape) if results.contact else None
         yield from ((f"contact.{shape}.rods", name) for name in (nearest.rods if nearest else None) or ())

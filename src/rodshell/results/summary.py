@@ -222,7 +222,8 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
             at = "" if found.at_factor == 1 else f" at {rounded(found.at_factor or 0.0)} times"
             line += f"; deflection{at} {length(found.max_deflection)}"
             if found.utilisation is not None:
-                line += f", {percent(found.utilisation)} of the strength"
+                by = f" ({found.governs.by}, {found.governs.rod})" if found.governs and found.governs.by else ""
+                line += f", {percent(found.utilisation)} of the design strength{by}"
             yield line
 
 

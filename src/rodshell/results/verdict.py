@@ -42,7 +42,11 @@ def verdict(results: Results) -> Verdict:
     shells = results.pop_up
     faults = {ends: [*_shell_faults(results, ends)] for ends in shells}
     usable = [ends for ends, found in faults.items() if not found]
-    deployment = [*_fibre_faults(results, "deployment"), *_contact_faults(results, "deployment")]
+    deployment = [
+        *_fibre_faults(results, "deployment"),
+        *_erection_faults(results),
+        *_contact_faults(results, "deployment"),
+    ]
     grave = [sentence for found in faults.values() for sentence in found] + deployment
     if results.target and results.target.flat:
         warned = [word for word in results.warnings if word.startswith(FLAT)]
@@ -113,6 +117,21 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
     yield from _load_faults(results, ends)
 
 
+def _erection_faults(results: Results) -> Iterator[str]:
+    """Stress of the deployment above its design strength."""
+    used = results.strength.erection_utilisation if results.strength else None
+    if used is not None and used > 1:
+        yield f"during deployment the rods use {max(101, round(100 * used))} % of their design strength for erection"
+
+
+BY_WORDS = {
+    "shear": "the rods use {} of their design strength in shear",
+    "slip": "a joint has to transfer {} of the force at which it slips",
+    "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength",
+}
+"""What is used too much, where it is not bending."""
+
+
 def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
     """Combinations of loads under which the shell falls or breaks."""
     for name, by_ends in results.loads.items():
@@ -129,8 +148,13 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
             place = found.governs
             where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
             at = "" if found.at_factor == 1 else f" already at {rounded(found.at_factor or 0.0)} times these loads"
-            share = f"{max(101, round(100 * used))} % of their strength"
-            yield f"with {ends} ends the rods would break under {name}{at}: {share}{where}"
+            share = f"{max(101, round(100 * used))} %"
+            by = BY_WORDS.get((place.by if place else None) or "", "the rods use {} of their design strength")
+            under = "" if place is not None and place.by == "permanent" else f" under {name}{at}"
+            yield f"with {ends} ends {by.format(share)}{under}{where}"
+        if (braced := found.bracing_utilisation) is not None and braced > 1:
+            share = f"{max(101, round(100 * braced))} %"
+            yield f"with {ends} ends the bracing uses {share} of its design strength under {name}"
 
 
 def _contact_faults(results: Results, shape: str) -> Iterator[str]:
@@ -250,7 +274,10 @@ def _weight(results: Results, usable: list[Ends]) -> Iterator[str]:
     weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
     if weak:
         each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
-        yield f"it carries only {each}: it does not stand unless it is supported, braced or made of stiffer rods"
+        if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
+            yield f"without its bracing it carries only {each}: support it until its bracing is in place"
+        else:
+            yield f"it carries only {each}: it does not stand unless it is supported, braced or made of stiffer rods"
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:

@@ -1,0 +1,389 @@
+"""Strength: what the rods, joints and bracing of a loaded shell use of what they can carry.
+
+At every node of a rod, with f the design strength for the duration of the loads (`rods.design_strength`):
+
+    bending    s / f_m + |sigma_N| (1/f_a - 1/f_m),   s = max over the section of sqrt(sigma^2 + (f_m/f_v tau_T)^2)
+    shear      (tau_T + tau_V) / f_v
+
+sigma is the normal stress of both bending moments and the axial force together, sigma_N that of the axial force alone,
+whose strength f_a is below that of bending in timber [EN 1995-1-1, 6.2.3; with k_m = 1]. tau_T is the stress of
+torsion, tau_V of the shear force: 3/2 of its mean in a rectangle, 4/3 in a circle or an ellipse, 2 in a tube. At a
+joint with a hole, stresses are those of the net section. A joint slips where the axial forces of a rod on both of its
+sides differ by more than it can transfer.
+
+Compression is also shown over the Euler load of each span between joints. It does not count as a utilisation: the path
+of the loaded shell has the buckling of spans in it.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import pi
+from typing import Literal
+
+import numpy as np
+
+from rodshell.arrays import Bools, Floats, Ints
+from rodshell.checks.bending import VON_MISES, Bending, bending_of
+from rodshell.checks.loads import cut_forces
+from rodshell.errors import InputError
+from rodshell.geometry.frames import dot, unit
+from rodshell.layout import GridMesh
+from rodshell.model import Shell
+from rodshell.model.rod_sections import varied_at_nodes
+from rodshell.rods.design_strength import DESIGN, DURATIONS, Duration
+from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Section, Tube
+from rodshell.validation import brief, not_negative, positive
+
+By = Literal["bending", "shear", "slip", "permanent"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strength:
+    """What rods and joints withstand, where it is not that of the material's preset.
+
+    Parameters
+    ----------
+    permanent, long, medium, short, instantaneous : design strength in bending for loads that act so long [Pa]. Given
+        ones stand in place of all of the preset's; one that is missing is that of the next longer duration.
+    erection : the same while the shell is erected [Pa]; None: the short one.
+    service_class : of timber: 1 inside, 2 covered, 3 in the weather; None: 2.
+    hole : diameter of the bolts' holes through the rods at joints [m].
+    slip : axial force that a joint can transfer between its rods [N]; None: not known.
+    effective_length : of a span between joints, over its length, for its Euler load [-].
+    """
+
+    permanent: float | None = None
+    long: float | None = None
+    medium: float | None = None
+    short: float | None = None
+    instantaneous: float | None = None
+    erection: float | None = None
+    service_class: int | None = None
+    hole: float = 0.0
+    slip: float | None = None
+    effective_length: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in (*DURATIONS, "erection", "slip"):
+            if (value := getattr(self, name)) is not None:
+                positive(f"the strength ({name})", value, "N" if name == "slip" else "Pa")
+        if self.service_class not in (None, 1, 2, 3):
+            raise InputError(f"the service class must be 1, 2 or 3, not {self.service_class!r}")
+        not_negative("the diameter of holes", self.hole, "m")
+        positive("the effective length", self.effective_length)
+
+    @property
+    def given(self) -> dict[Duration, float]:
+        """The given strengths by duration [Pa]."""
+        return {name: getattr(self, name) for name in DURATIONS if getattr(self, name) is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What a rod is judged by.
+
+    Parameters
+    ----------
+    bending : design strength by duration [Pa]; an unknown one is missing.
+    erection : while the shell is erected [Pa]; None: not known.
+    axial : axial strength over bending strength.
+    shear_weight : bending strength over shear strength, see `checks.bending`.
+    cracked : share of the section that carries shear forces.
+    creep : growth of deflections under permanent loads, k_def; None: not known.
+    source : of these figures, in words.
+    """
+
+    bending: dict[Duration, float]
+    erection: float | None = None
+    axial: float = 1.0
+    shear_weight: float = VON_MISES
+    cracked: float = 1.0
+    creep: float | None = None
+    source: str = "no strength is known"
+
+    @staticmethod
+    def of(
+        rod: Rod, asked: Strength, *,
+        characteristic: float | None = None, of_preset: bool = True, shear_weight: float = VON_MISES,
+    ) -> "Limits":  # fmt: skip
+        """The limits of a rod.
+
+        Parameters
+        ----------
+        rod : section and material.
+        asked : what was given for it.
+        characteristic : bending strength [Pa]; None: not known.
+        of_preset : whether it is the preset's; a given one is taken as it is, for every duration.
+        shear_weight : bending strength over shear strength.
+
+        Raises
+        ------
+        InputError : a service class is given, and nothing depends on it.
+        """
+        name = rod.material.name if rod.material is not None else None
+        factors = DESIGN.get(name) if name is not None else None
+        moist = factors is not None and len(factors.factors) > 1
+        judged = not asked.given and of_preset and factors is not None and characteristic is not None
+        if asked.service_class is not None and not (moist and (judged or not asked.given)):
+            raise InputError(
+                f"strength.service_class = {asked.service_class}: only the strengths of timber presets depend on it: "
+                "leave it out"
+            )
+        service = asked.service_class or 2
+        bending: dict[Duration, float] = {}
+        source = "no design strength is known"
+        if asked.given:
+            known: float | None = None
+            for duration in DURATIONS:
+                known = asked.given.get(duration, known)
+                if known is not None:
+                    bending[duration] = known
+            source = "design strengths as given"
+        elif not of_preset and characteristic is not None:
+            bending = dict.fromkeys(DURATIONS, characteristic)
+            source = "the strength as given, for every duration of load"
+        elif judged and factors is not None and characteristic is not None:
+            bending = {key: share * characteristic for key, share in factors.by_duration(service).items()}
+            source = f"{name}, characteristic {1e-6 * characteristic:.4g} MPa; {factors.source}"
+            source += f"; service class {service}" if moist else ""
+        creep = None
+        if factors is not None and factors.creep:
+            creep = factors.creep[service - 1 if moist else 0]
+        return Limits(
+            bending=bending,
+            erection=asked.erection or bending.get("short"),
+            axial=factors.axial if factors is not None else 1.0,
+            shear_weight=shear_weight,
+            cracked=factors.cracked if factors is not None else 1.0,
+            creep=creep,
+            source=source,
+        )
+
+
+def preset_limits(rod: Rod, service_class: int | None) -> Limits:
+    """The limits of a rod by its material's preset; of other materials none is known.
+
+    Parameters
+    ----------
+    rod : section and material.
+    service_class : of timber, as of `Strength`.
+    """
+    material = rod.material
+    factors = None if material is None or material.name is None else DESIGN.get(material.name)
+    if material is None or factors is None:
+        return Limits(bending={})
+    moist, bending, shear = len(factors.factors) > 1, material.bending_strength, material.shear_strength
+    weight = VON_MISES if bending is None or shear is None else bending / shear
+    asked = Strength(service_class=service_class if moist else None)
+    return Limits.of(rod, asked, characteristic=bending, shear_weight=weight)
+
+
+@dataclass(frozen=True, eq=False)
+class Utilisation:
+    """What the rods and joints of a shell use of their strength, at each entry (k,) of `rod_nodes`.
+
+    Parameters
+    ----------
+    uses : by what; what is not known is missing.
+    euler : largest compression of the spans next to each entry, over their Euler load.
+    """
+
+    uses: dict[By, Floats]
+    euler: Floats
+
+    __repr__ = brief
+
+    @property
+    def largest(self) -> dict[By, float]:
+        """The largest of each."""
+        return {by: float(values.max()) for by, values in self.uses.items()}
+
+    @property
+    def governs(self) -> tuple[By, int] | None:
+        """What is used most, and where; None: nothing is known."""
+        by = max(self.uses, key=lambda by: float(self.uses[by].max()), default=None)
+        return None if by is None else (by, int(np.argmax(self.uses[by])))
+
+    def with_permanent(self, permanent: "Utilisation") -> "Utilisation":
+        """The same, where the erected shell's own utilisation counts too.
+
+        Parameters
+        ----------
+        permanent : of the erected shell by the permanent strength.
+        """
+        uses = dict(self.uses)
+        rods = [permanent.uses[by] for by in ("bending", "shear") if by in permanent.uses]
+        if rods:
+            uses["permanent"] = np.maximum.reduce(rods)
+        return Utilisation(uses, self.euler)
+
+
+def utilisation(
+    shell: Shell, state: Floats, rod: Rod, *,
+    forces: Floats, limits: Limits, asked: Strength, duration: Duration, bent: Bending | None = None,
+) -> Utilisation:  # fmt: skip
+    """Utilisation of a shell in equilibrium.
+
+    Parameters
+    ----------
+    shell : with its source frames at the state.
+    state : (N, 3) node positions [m] and twist angles [rad].
+    rod : section and material of every rod.
+    forces : (e,) axial force of each edge, tension positive [N].
+    limits : of the rod.
+    asked : holes, slip and effective lengths.
+    duration : of the loads.
+    bent : the shell's bending, where it is known.
+
+    Raises
+    ------
+    InputError : holes in rods whose section varies or is not known.
+    """
+    mesh, section = shell.mesh, rod.section
+    bent = bent or bending_under(shell, state, rod, forces, limits)
+    local = varied_at_nodes(mesh, rod)
+    if asked.hole and local is not None:
+        raise InputError("strength.hole: the net section of rods that vary along their length is not known: leave out")
+    spans = Spans.of(mesh)
+    axial, across = forces[spans.middle], _shear_forces(shell, state)[spans.middle]
+    bends = np.full(len(mesh.rod_nodes), min(rod.bend_stiffnesses))
+    areas = np.ones(len(mesh.rod_nodes))
+    if local is not None:
+        bends, areas = bends * np.minimum(local.bend1, local.bend2), areas * local.stretch
+    euler_loads = pi**2 * spans.least(bends) / (asked.effective_length * spans.lengths) ** 2
+    euler = spans.on_entries(np.maximum(-axial, 0.0) / euler_loads)
+    uses: dict[By, Floats] = {}
+    strength = limits.bending.get(duration)
+    if strength is not None and bent.stress is not None:
+        net = np.ones(len(mesh.rod_nodes))
+        if asked.hole:
+            net[_at_joints(mesh)] = net_section(section, asked.hole)
+        drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
+        uses["bending"] = net * (bent.stress + drawn * (1.0 / limits.axial - 1.0)) / strength
+        if bent.torsion_stress is not None and (peak := _shear_peak(section)) is not None:
+            sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)
+            uses["shear"] = net * limits.shear_weight * (bent.torsion_stress + sheared) / strength
+    if asked.slip is not None:
+        uses["slip"] = spans.jumps(axial) / asked.slip
+    return Utilisation(uses, euler)
+
+
+def bending_under(shell: Shell, state: Floats, rod: Rod, forces: Floats, limits: Limits) -> Bending:
+    """Bending and stress of a shell whose axial forces (e,) [N] are known: where rods are warm their lengths do not say
+    them.
+
+    Parameters
+    ----------
+    shell, state, rod, forces, limits : as of `utilisation`.
+    """
+    strains = forces / shell.stretch.stiffness
+    return bending_of(shell, state, rod, shear_weight=limits.shear_weight, edge_strains=strains)
+
+
+def area_of(rod: Rod) -> float:
+    """Area of the section [m2]; of a given one as its axial stiffness and fibres have it."""
+    if isinstance(rod.section, GivenSection):
+        return rod.stretch_stiffness / (rod.section.fibre_modulus or np.inf)
+    return rod.section.area
+
+
+def _shear_peak(section: Section | GivenSection) -> float | None:
+    """Largest shear stress of a shear force over its mean; None: not known."""
+    if isinstance(section, Tube):
+        return 2.0
+    if isinstance(section, RectangularSection):
+        return 1.5
+    return 4.0 / 3.0 if isinstance(section, Circle | Ellipse) else None
+
+
+def net_section(section: Section | GivenSection, hole: float) -> float:
+    """Largest stress at a hole through the section along its first axis, over that of the full section.
+
+    Parameters
+    ----------
+    section : of the rod.
+    hole : diameter [m].
+
+    Raises
+    ------
+    InputError : the hole is as wide as the rod; the section is a given one.
+    """
+    if isinstance(section, GivenSection):
+        raise InputError("strength.hole: the net section of a given section is not known: leave it out")
+    first, _ = section.second_moments
+    if isinstance(section, Tube):
+        outer, inner = section.outer_radius, section.inner_radius
+        wide, area, cut = 2 * outer, 2 * hole * section.thickness, 2 * hole * (outer**3 - inner**3) / 3
+    elif isinstance(section, Ellipse):
+        wide, area, cut = 2 * section.b, 2 * hole * section.a, hole * (2 * section.a) ** 3 / 12
+    elif isinstance(section, Circle):
+        wide, area, cut = 2 * section.radius, 2 * hole * section.radius, hole * (2 * section.radius) ** 3 / 12
+    else:
+        wide, area, cut = section.height, hole * section.width, hole * section.width**3 / 12
+    left = min(1.0 - area / section.area, 1.0 - cut / first)
+    if hole >= wide or left <= 0:
+        raise InputError(
+            f"strength.hole = {hole:g} m: a hole of that diameter leaves nothing of the rod: make it smaller"
+        )
+    return 1.0 / left
+
+
+def _at_joints(mesh: GridMesh) -> Bools:
+    """(k,) which entries of `rod_nodes` are at joints."""
+    return np.isin(mesh.rod_nodes, np.unique(mesh.joint_pairs))
+
+
+def _shear_forces(shell: Shell, state: Floats) -> Floats:
+    """(e,) size of the shear force in each edge [N]."""
+    forces = cut_forces(shell, state)
+    ends = shell.stretch.blocks[: len(forces)]
+    tangents = unit(state[ends[:, 1]] - state[ends[:, 0]])
+    return np.asarray(np.linalg.norm(forces - dot(forces, tangents)[:, None] * tangents, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Spans:
+    """The s spans between neighbouring joints, and between the last joints and the ends, rod by rod.
+
+    Parameters
+    ----------
+    first, last : (s,) entries of `rod_nodes` at their ends.
+    middle : (s,) edge in the middle of each.
+    lengths : (s,) [m].
+    """
+
+    first: Ints
+    last: Ints
+    middle: Ints
+    lengths: Floats
+
+    @staticmethod
+    def of(mesh: GridMesh) -> "Spans":
+        """The spans of a mesh."""
+        stops = _at_joints(mesh)
+        stops[mesh.rod_start] = stops[mesh.rod_stop - 1] = True
+        entries = np.flatnonzero(stops)
+        rods = np.searchsorted(mesh.rod_start, entries, side="right") - 1
+        same = rods[1:] == rods[:-1]
+        first, last = entries[:-1][same], entries[1:][same]
+        middle = (first + last - 1) // 2 - rods[:-1][same]  # edges are counted rod by rod
+        return Spans(first, last, middle, mesh.stations[last] - mesh.stations[first])
+
+    def least(self, values: Floats) -> Floats:
+        """(s,) smallest of `values` (k,) of the entries of each span."""
+        parts: Iterable[Floats] = (values[a : b + 1] for a, b in zip(self.first, self.last, strict=True))
+        return np.array([part.min() for part in parts])
+
+    def on_entries(self, values: Floats) -> Floats:
+        """(k,) largest of the `values` (s,) of the spans that each entry is in."""
+        result = np.zeros(int(self.last.max()) + 1)
+        for a, b, value in zip(self.first, self.last, values, strict=True):
+            result[a : b + 1] = np.maximum(result[a : b + 1], value)
+        return result
+
+    def jumps(self, values: Floats) -> Floats:
+        """(k,) differences of the `values` (s,) on both sides of each joint; elsewhere 0."""
+        result = np.zeros(int(self.last.max()) + 1)
+        next_to = self.last[:-1] == self.first[1:]
+        result[self.last[:-1][next_to]] = np.abs(np.diff(values))[next_to]
+        return result

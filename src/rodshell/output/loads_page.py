@@ -1,0 +1,193 @@
+"""The report's part on a shell under loads, which an engineer can check by hand: assumptions, utilisation, deflections,
+stability, modes, foundations and bracing."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from rodshell.output.pictures import mode_picture
+from rodshell.output.schedules import loaded_shells
+from rodshell.output.svg import inline, picture_document
+from rodshell.results import Archive, Results
+from rodshell.results.loaded import LoadedShell
+from rodshell.results.records import Ends
+from rodshell.results.wording import millimetres, percent, rounded, rounding_of, stress
+from rodshell.units import percent_text
+
+MOST_MODES = 3  # pictures, of the combination that falls first
+BY = {
+    "bending": "bending and axial force",
+    "shear": "torsion and shear force",
+    "slip": "slip of a joint",
+    "permanent": "the erected shell, permanent",
+}
+STATED = (
+    "The erected shell is an equilibrium of elastic rods, without weight and held up until its bracing is fixed; the "
+    "bracing is then stressed, and all loads begin there.",
+    "Loads are fixed forces on the areas of the surface that belong to each node. Wind does not turn with the shell.",
+    "Large displacements and the rods' stresses from bending are in every figure; supports do not yield unless a load "
+    "moves them.",
+    "Stiffness is the mean one, and not reduced: neither by partial factors nor by creep. Relaxation of bent rods, "
+    "pressure at bolts, cladding and its stiffness, fatigue, fire and accidental loads are not checked.",
+)
+
+
+def loads_page(archive: Archive) -> dict[str, Any] | None:
+    """What the page shows; None where no loads were checked.
+
+    Parameters
+    ----------
+    archive : the result.
+    """
+    from markupsafe import Markup
+
+    results = archive.results
+    shells = list(loaded_shells(results))
+    if not shells:
+        return None
+    pictures = [
+        (caption, Markup(inline(picture_document(mode_picture(archive, ends, state)))))
+        for caption, ends, state in _modes(archive, shells)
+    ]
+    return {
+        "assumptions": [*_strengths(results), *STATED],
+        "strength": [_strength(results, *each) for each in shells],
+        "deflection": [_deflection(results, *each) for each in shells],
+        "stability": [_stability(*each) for each in shells],
+        "modes": pictures,
+        "foundations": [_foundation(results, *each) for each in shells],
+        "bracing": [_bracing(results, *each) for each in shells if each[2].bracing],
+    }  # fmt: skip
+
+
+def _strengths(results: Results) -> Iterator[str]:
+    """What was judged by, in sentences."""
+    used = results.strength
+    if used is None:
+        return
+    each = {name: getattr(used, name) for name in ("permanent", "long", "medium", "short", "instantaneous")}
+    known = ", ".join(f"{name} {stress(value)}" for name, value in each.items() if value is not None)
+    if not known:
+        yield "No design strength is known, and none was judged: give [strength]."
+    else:
+        yield (
+            f"Design strengths in bending: {known}. In tension and compression {percent(used.axial or 1.0)}, in shear "
+            f"{percent(used.shear or 0.0)} of that. From: {used.source}."
+        )
+    if used.erection_utilisation is not None:
+        yield f"Erection uses at most {percent(used.erection_utilisation)} of {stress(used.erection or 0.0)}."
+    if used.creep is not None:
+        yield (
+            f"Creep is not in the figures: deflections under permanent loads grow by {rounded(used.creep)} times what "
+            "they are at first (k_def)."
+        )
+    else:
+        yield "Creep is not in the figures; how large it is, is not known of this material."
+
+
+def _strength(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    place, parts = shell.governs, shell.utilisations
+    each = [None] * 4 if parts is None else [parts.bending, parts.shear, parts.slip, parts.permanent]
+    where = ""
+    if place is not None:
+        at = millimetres(place.at, rounding=rounding_of(results))
+        where = f"{BY.get(place.by or '', place.by or '')}: {place.rod}, {at} from its start"
+    return [
+        name,
+        ends,
+        shell.duration or "",
+        *("not known" if value is None else percent(value) for value in each),
+        where,
+    ]
+
+
+def _deflection(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    deflection, span = shell.max_deflection, _span(results)
+    return [
+        name,
+        ends,
+        rounded(shell.at_factor or 0.0),
+        millimetres(deflection, rounding=rounding_of(results)),
+        "" if not deflection or span is None else f"span/{span / deflection:.0f}",
+        "not known" if shell.max_stress is None else stress(shell.max_stress),
+        "" if shell.euler is None else percent(shell.euler),
+        "" if shell.euler_at is None else shell.euler_at.rod,
+    ]
+
+
+def _span(results: Results) -> float | None:
+    """The smaller width of the plan [m]."""
+    points = np.array(results.boundary, dtype=float).reshape(-1, 3)
+    return float(np.ptp(points[:, :2], axis=0).min()) if len(points) else None
+
+
+def _factor(value: float | None, missing: str) -> str:
+    return missing if value is None else rounded(value)
+
+
+def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    """Three figures side by side."""
+    imperfect = "not asked for" if shell.imperfect_kind is None else "over 100"
+    return [
+        name,
+        ends,
+        _factor(shell.linear_factor, "over 100"),
+        f"{_factor(shell.limit_factor, 'over 100')} ({shell.limit_kind})",
+        _factor(shell.imperfect_factor, imperfect),
+    ]
+
+
+def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[tuple[str, Ends, str]]:
+    """Caption, ends and state of the pictures: of the combination that falls first."""
+    name, ends, shell = min(shells, key=lambda each: np.inf if each[2].limit_factor is None else each[2].limit_factor)
+    for k, factor in enumerate(shell.mode_factors[:MOST_MODES], start=1):
+        state = f"loaded_buckling_{ends}_{name}_{k}"
+        if state in archive.states and factor is not None:
+            yield (
+                f"Linear buckling mode {k} under {name}, {ends} ends: at {rounded(factor)} times the loads",
+                ends,
+                state,
+            )
+    if (state := f"loaded_mode_{ends}_{name}") in archive.states:
+        yield f"How the shell gives way under {name}, {ends} ends: {shell.limit_kind}", ends, state
+
+
+def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    """Load and reactions, and the largest forces that the foundations carry."""
+    forces = np.array(shell.support_forces, dtype=float).reshape(-1, 3)
+    load, held = shell.load_sum or (0.0, 0.0, 0.0), shell.reaction_sum or (0.0, 0.0, 0.0)
+    across = np.linalg.norm(forces[:, :2], axis=1)
+    down = int(np.argmax(forces[:, 2]))
+    names = [f"{rod.id}.{end}" for rod in results.rods for end in (0, 1)]
+    return [
+        name,
+        ends,
+        ", ".join(_kilo(value) for value in load),
+        ", ".join(_kilo(value) for value in held),
+        f"{_kilo(forces[down, 2])} at {names[down]}",
+        f"{_kilo(across.max())} at {names[int(np.argmax(across))]}",
+        "none" if not shell.uplift else f"{_kilo(shell.uplift)} at {names[int(np.argmin(forces[:, 2]))]}",
+    ]
+
+
+def _kilo(newtons: float | None) -> str:
+    return f"{round(1e-3 * (newtons or 0.0), 2) + 0.0:.2f}"
+
+
+def _bracing(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    forces = np.array([force for force in shell.bracing if force is not None])
+    braces = results.fabrication.bracing if results.fabrication else ()
+    pull, push = max(0.0, float(forces.max(initial=0.0))), max(0.0, -float(forces.min(initial=0.0)))
+    where = int(np.argmax([abs(force or 0.0) for force in shell.bracing]))
+    most = f"{braces[where].start} to {braces[where].end}" if where < len(braces) else ""
+    return [
+        name,
+        ends,
+        str(len(forces)),
+        _kilo(pull),
+        _kilo(push),
+        most,
+        percent_text(float(np.mean(forces == 0.0))),
+        "not known" if shell.bracing_utilisation is None else percent(shell.bracing_utilisation),
+    ]

@@ -1,0 +1,64 @@
+"""The report's part on loads says what the result has."""
+
+from functools import cache
+
+import pytest
+
+import rodshell as rs
+from rodshell.output.loads_page import loads_page
+from rodshell.results import Archive
+
+CASE = {
+    "target": {"kind": "cap", "radius": "10 m", "base": "7 m"},
+    "layout": {"spacing": "3 m", "edge": "1.5 m"},
+    "rod": {
+        "section": {"kind": "rectangle", "width": "20 mm", "height": "30 mm"},
+        "material": {"preset": "larch"},
+    },
+    "joint": {"kind": "pin"},
+    "pop_up": {"ends": "pinned"},
+    "checks": {"stages": 0},
+    "bracing": {
+        "kind": "cables", "prestrain": 2e-4,
+        "section": {"kind": "circle", "radius": "2 mm"}, "material": {"preset": "spring-steel"},
+    },
+    "loads": [{"name": "snow", "kind": "snow", "value": "20 N/m2"}],
+    "combinations": [{"name": "winter", "factors": {"snow": 1.5}}],
+    "strength": {"service_class": 3, "hole": "6 mm", "slip": "500 N"},
+}  # fmt: skip
+
+
+@cache
+def archive() -> Archive:
+    return rs.Job.load(CASE).run().archive()
+
+
+def test_every_figure_of_the_page_is_that_of_the_result() -> None:
+    page, results = loads_page(archive()), archive().results
+    assert page is not None
+    loaded, used = results.loads["winter"]["pinned"], results.strength
+    assert loaded.utilisations is not None
+    assert used is not None
+    assert used.permanent == pytest.approx(0.5 * 30e6 / 1.3)
+    (row,) = page["strength"]
+    assert row[:3] == ["winter", "pinned", "short"]
+    shares = [float(value.removesuffix(" %").replace("under ", "")) for value in row[3:7]]
+    parts = loaded.utilisations
+    assert shares == pytest.approx(
+        [100 * v for v in (parts.bending, parts.shear, parts.slip, parts.permanent)], rel=0.1
+    )  # type: ignore[operator]
+    assert loaded.utilisation == max(v for v in (parts.bending, parts.shear, parts.slip, parts.permanent) if v)
+    assert loaded.governs is not None
+    assert loaded.governs.rod in row[7]
+    assert any("service class 3" in sentence and "EN 1995" in sentence for sentence in page["assumptions"])
+    assert any("grow by 2 times" in sentence for sentence in page["assumptions"])
+    assert len(page["modes"]) >= 3
+    (braced,) = page["bracing"]
+    assert braced[-1] != "not known"
+    (held,) = page["foundations"]
+    assert float(held[2].split(", ")[2]) == -float(held[3].split(", ")[2])
+
+
+def test_without_loads_there_is_no_page() -> None:
+    plain = {key: CASE[key] for key in ("target", "layout", "rod", "joint", "pop_up", "checks")}
+    assert loads_page(rs.Job.load(plain).run().archive()) is None
