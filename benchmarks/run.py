@@ -17,7 +17,19 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 
-from benchmarks import beside, earlier, factorisation, first_run, jobs, kernels, others, sameness, scaling, startup  # noqa: E402
+from benchmarks import (  # noqa: E402
+    beside,
+    earlier,
+    factorisation,
+    first_run,
+    jobs,
+    kernels,
+    others,
+    sameness,
+    scaling,
+    startup,
+    sweeps,
+)
 from benchmarks.rows import Row, Section, machine  # noqa: E402
 
 SECTIONS: dict[str, Callable[[bool], Section]] = {
@@ -33,6 +45,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "first": lambda _: first_run.section(),
     "first-jit": lambda _: first_run.section(jit=True),
     "sameness": sameness.sameness,
+    "sweeps": lambda quick: sweeps.sweeps(20 if quick else 100),
     "kernels": lambda _: kernels.kernels(),
     "pyelastica": others.pyelastica,
 }

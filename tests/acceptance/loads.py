@@ -6,13 +6,14 @@ Without a name every part is run. A further part is a module of rows and an entr
 import sys
 from collections.abc import Callable, Iterator
 
-from tests.acceptance import loads_creteil, loads_stability
+from tests.acceptance import loads_creteil, loads_shells, loads_stability
 from tests.acceptance.rows import Row, print_table
 
 PARTS: dict[str, Callable[[], Iterator[Row]]] = {
     "benchmarks": loads_stability.benchmark_rows,
     "closed-forms": loads_stability.closed_form_rows,
     "vibration": loads_stability.vibration_rows,
+    "shells": loads_shells.all_rows,
     "creteil": loads_creteil.rows,
 }
 

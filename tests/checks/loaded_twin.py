@@ -212,6 +212,13 @@ class LathBends:
 
     def energies(self, values):
         """(b,) [J] of three nodes and two angles each (b, 11)."""
+        strains = self.strains(values)
+        return sum(k * s**2 for k, s in zip((self.one, self.two, self.twist), strains, strict=True)) / (
+            2 * self.voronoi
+        )
+
+    def strains(self, values):
+        """Three of (b,): bends towards both directors, and twist [rad], of three nodes and two angles each (b, 11)."""
         x = values[:, :9].reshape(-1, 3, 3)
         frames = []
         for side in range(2):
@@ -228,7 +235,7 @@ class LathBends:
         towards_second = -np.sum(binormal * (m1 + n1), axis=1) / 2
         over = _carried(m1, s, t)
         twist = np.arctan(np.sum(np.cross(over, n1) * t, axis=1) / np.sum(over * n1, axis=1))
-        return (self.one * towards_first**2 + self.two * towards_second**2 + self.twist * twist**2) / (2 * self.voronoi)
+        return towards_first, towards_second, twist
 
 
 def _carried(vector, s, t):

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
-from tests.checks.loaded_twin import LoadedTwin, _coordinates
+from tests.checks.loaded_twin import TINY, LoadedTwin, _coordinates
 
 RASTER = 500  # points across the plan, whose loads go to the nearest node
 
@@ -38,7 +38,8 @@ class BracedTwin(LoadedTwin):
         return np.where(strain.real > 0, 0.5 * self.rope_stiffness * self.slack * strain**2, 0.0)
 
     def linear_factor(self, state):
-        """Lowest factor of linear buckling about a state: geometric stiffness of the change of axial forces alone."""
+        """Lowest factor of linear buckling about a state: the stiffness of the change of axial forces and of laths'
+        moments, the geometry being frozen. Rods that bend alike have no strains of their bending."""
         free, n = self.free, 3 * self.nodes
         matrix = self.hessian(state)[free][:, free].toarray()
         along = np.zeros(len(state))
@@ -56,8 +57,28 @@ class BracedTwin(LoadedTwin):
                 local = pull * (np.eye(3) - np.outer(t, t))
                 for p, q, sign in ((a, a, 1), (b, b, 1), (a, b, -1), (b, a, -1)):
                     stress[3 * p : 3 * p + 3, 3 * q : 3 * q + 3] += sign * local
+        stress += self.moment_stiffness(state, along)
         largest = eigh(-stress[np.ix_(free, free)], matrix, eigvals_only=True)[-1]
         return 1.0 / largest
+
+    def moment_stiffness(self, state, along):
+        """Of the moments that laths get along a motion: the second derivatives of their strains, times these."""
+        laths = [(energies.__self__, index) for energies, index, width in self.terms if width == 1]
+        if not laths:
+            return 0.0
+        ((bends, index),) = laths
+        stiffness = (bends.one, bends.two, bends.twist)
+        rates = [strain.imag / TINY for strain in bends.strains(state[index] + 1j * TINY * along[index])]
+        moments = [k * rate / bends.voronoi for k, rate in zip(stiffness, rates, strict=True)]
+
+        def work(values):
+            return sum(moment * strain for moment, strain in zip(moments, bends.strains(values), strict=True))
+
+        terms, self.terms = self.terms, [(work, index, 1)]
+        try:
+            return self.hessian(state).toarray()
+        finally:
+            self.terms = terms
 
     @property
     def axial_stiffness(self):

@@ -35,7 +35,9 @@ LOADS = {
 BRACED = {"none": None, "cables": rs.Cables(rod=ROPE, prestrain=5e-4), "laths": rs.Laths(eccentricity=0.03)}
 
 
-@pytest.mark.parametrize("bracing", BRACED)
+@pytest.mark.parametrize(
+    "bracing", ["none", pytest.param("cables", marks=pytest.mark.slow), pytest.param("laths", marks=pytest.mark.slow)]
+)
 def test_reactions_balance_every_kind_of_load(bracing: str) -> None:
     """Forces to 1e-9, with two layers of rods, both end conditions and each kind of bracing, all loads at once."""
     loads = rs.Loads(
@@ -199,6 +201,7 @@ def test_rods_without_mass_have_no_weight_to_check() -> None:
         rs.check_loads(form, one(rs.SelfWeight()))
 
 
+@pytest.mark.slow
 def test_bracing_across_an_opening_is_refused_or_leaves_diagonals_out(tmp_path: Path) -> None:
     """A hole in one cell of a vault, from a mesh."""
     ticks = np.linspace(-3.0, 3.0, 61)

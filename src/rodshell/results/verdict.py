@@ -274,7 +274,10 @@ def _weight(results: Results, usable: list[Ends]) -> Iterator[str]:
     weak = {ends: factor for ends, factor in factors.items() if factor is not None and factor < 1}
     if weak:
         each = " and ".join(f"{percent(factor)} of its own weight with {ends} ends" for ends, factor in weak.items())
-        yield f"it carries only {each}: it does not stand unless it is supported, braced or made of stiffer rods"
+        if any(shell.bracing for supported in results.loads.values() for shell in supported.values()):
+            yield f"without its bracing it carries only {each}: support it until its bracing is in place"
+        else:
+            yield f"it carries only {each}: it does not stand unless it is supported, braced or made of stiffer rods"
 
 
 def _from_flat(results: Results, usable: list[Ends], *, late: bool) -> Iterator[str]:

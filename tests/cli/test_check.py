@@ -1,0 +1,110 @@
+"""`rodshell check`: from a case and from a result; exit codes; what result.json and the schedules then hold."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.cli import main
+from rodshell.results import read
+
+ROOF = """
+[target]
+kind = "paraboloid"
+radius = "6 m"
+height = "3 m"
+[layout]
+spacing = "2 m"
+edge = "1 m"
+[rod]
+section = { kind = "tube", radius = "21 mm", thickness = "3.5 mm" }
+material = { preset = "gfrp" }
+[checks]
+stages = 0
+"""
+LOADS = """
+[[loads]]
+name = "own"
+kind = "self_weight"
+[[loads]]
+name = "snow"
+kind = "snow"
+value = "%s kN/m2"
+[[combinations]]
+name = "winter"
+factors = { own = 1.35, snow = 1.5 }
+[bracing]
+kind = "cables"
+prestrain = 0.001
+section = { kind = "circle", radius = "3 mm" }
+material = { youngs_modulus = "160 GPa", density = "7850 kg/m3" }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("roof.toml").write_text(ROOF)
+    Path("light.toml").write_text(LOADS % "0.02")
+    Path("heavy.toml").write_text(LOADS % "20")
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_a_case_and_then_its_result_are_checked_under_loads(folder: Path) -> None:
+    """Keys as documented; sums balance; forces of every brace and support are in the schedules; too much snow is 4."""
+    assert main(["check", "roof.toml", "--loads", "light.toml", "--only", "csv", "-q"]) == 0
+    result = json.loads(Path("out/roof/result.json").read_text())
+    loaded = result["loads"]["winter"]["pinned"]
+    wanted = {"at_factor", "load_sum", "reaction_sum", "max_deflection", "linear_factor", "limit_factor", "limit_kind"}
+    assert wanted | {"imperfect_factor", "utilisation", "governs"} <= loaded.keys()
+    assert loaded["at_factor"] == 1
+    np.testing.assert_allclose(loaded["reaction_sum"], -np.array(loaded["load_sum"]), atol=1e-5)
+    assert loaded["governs"]["rod"] in {rod["id"] for rod in result["rods"]}
+    assert len(loaded["bracing"]) == len(result["fabrication"]["bracing"])
+    rows = list(csv.DictReader(Path("out/roof/schedule/bracing.csv").read_text().splitlines()))
+    assert float(rows[0]["cut_mm"]) == pytest.approx(float(rows[0]["final_mm"]) / 1.001, abs=1)
+    assert [float(row["force_N_pinned_winter"]) for row in rows] == pytest.approx(loaded["bracing"], rel=1e-5)
+    supports = list(csv.DictReader(Path("out/roof/schedule/foundations.csv").read_text().splitlines()))
+    assert len(supports) == 2 * len(result["rods"])
+    assert read("out/roof").results.plain() == result  # a folder with loads is read again as it is
+    assert main(["check", "out/roof", "--loads", "heavy.toml", "--only", "csv", "-q"]) == 4
+    verdict = json.loads(Path("out/roof/result.json").read_text())["verdict"]
+    assert verdict["level"] == "unbuildable"
+    assert "falls under winter" in verdict["reasons"][0]
+
+
+@pytest.mark.slow
+def test_a_form_checks_its_loads_and_keeps_them_in_its_case(folder: Path) -> None:
+    job = rs.Job.load("roof.toml", loads="light.toml", pop_up__ends="pinned")
+    form = job.run()
+    assert form.loaded is not None
+    assert rs.Job.load(job.to_toml()) == job
+    again = job.changed(fabrication__end_allowance="10 mm").run(warm_start=form)
+    assert "checks" in again.reused
+    other = job.changed(stability__modes=2).run(warm_start=form)
+    assert "fabrication" in other.reused
+    assert "loads" not in other.reused
+    assert rs.Job.of_case(job.case).run(warm_start=form).loaded is form.loaded
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["roof.toml"], "has no loads: give --loads FILE"),
+        (["."], "has no case.toml"),
+        (["roof.toml", "--loads", "none.toml"], "there is no such file"),
+        (["roof.toml", "--loads", "roof.toml"], 'has "target", which no file of loads has'),
+        (["nothing"], "there is no case and no file"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(
+    arguments: list[str], message: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", *arguments, "-q"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert message in said
+    assert "\n" not in said
