@@ -1,7 +1,8 @@
 """A refinement from a form to a form: the last design that passes all gates is what is built.
 
-Where the best design is refused, the one accepted before it is tried, and so on; where none passes, the form stays as
-it was. Each patch of a form is refined by itself: its ends at the seams are supports as any others.
+Where the best design is refused, those accepted before it are tried, and designs between the last two; where none
+passes, the form stays as it was. Each patch of a form is refined by itself: its ends at the seams are supports as any
+others.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,11 +15,12 @@ from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.refining.gates import GATES, Gates, gates
 from rodshell.refining.gauss_newton import Step
-from rodshell.refining.refine import Refinement, popped_up, refine
+from rodshell.refining.refine import Candidate, Refinement, between, popped_up, refine
 from rodshell.refining.variables import Family
 from rodshell.units import percent_text
 
 Stages = PatchForm | PatchedForm
+HALVINGS = 3  # between a design that passes and a better one that does not
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,26 +134,53 @@ def _of_piece(stages: PatchForm, vary: Sequence[Family], ends: Ends, progress: P
 
 
 def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, Gates, str, int]:
-    """The last design that passes all gates, or None; its gates, or those of the best one; why that one was refused;
-    and the factorisations that all took."""
+    """The best design that passes all gates, or None; its gates, or those of the best one found; why that one was
+    refused; and the factorisations that all took.
+
+    Where a design is refused, the one before it in the search is tried, until one passes; then, by halving, designs
+    between it and the one that was refused last.
+    """
     if len(found.designs) == 1:
         judged = gates(found.before, progress=progress)
         return None, judged, "no nearer design was found", judged.factorizations
-    best: Gates | None = None
-    made = 0
-    for design in found.designs[:0:-1]:
-        try:
-            form, spent = popped_up(found.before, design, found.ends)
-        except InputError as gone:
-            judged, spent = Gates(dict.fromkeys(GATES, False), f"stable: {gone}", 0), 0
-        else:
-            judged = gates(form, all_of_them=best is None, progress=progress)
-        made += spent + judged.factorizations
+    form, judged, made = _judged(found, found.designs[-1], True, progress)
+    if judged.open:
+        return form, judged, "", made
+    best, accepted, refused = judged, None, found.designs[-1]
+    low = found.designs[0]
+    for design in found.designs[-2:0:-1]:
+        form, judged, more = _judged(found, design, False, progress)
+        made += more
         if judged.open:
-            return form, judged, "" if best is None else best.reason, made
-        best = best or judged
-    assert best is not None
-    return None, best, best.reason, made
+            accepted, low = (form, judged), design
+            break
+        refused = design
+    for _ in range(HALVINGS):
+        middle, spent = between(found, low, refused, 0.5)
+        made += spent
+        if middle is None:
+            break
+        form, judged, more = _judged(found, middle, False, progress)
+        made += more
+        if judged.open:
+            accepted, low = (form, judged), middle
+        else:
+            refused = middle
+    if accepted is None:
+        return None, best, best.reason, made
+    return *accepted, best.reason, made
+
+
+def _judged(
+    found: Refinement, design: Candidate, all_of_them: bool, progress: Progress
+) -> tuple[PatchForm | None, Gates, int]:
+    """A design popped up, its gates, and the factorisations of both; tried at all gates, or until one refuses it."""
+    try:
+        form, spent = popped_up(found.before, design, found.ends)
+    except InputError as gone:
+        return None, Gates(dict.fromkeys(GATES, False), f"stable: {gone}", 0), 0
+    judged = gates(form, all_of_them=all_of_them, progress=progress)
+    return form, judged, spent + judged.factorizations
 
 
 def _alone(stages: PatchForm, ends: Ends) -> PatchForm:
