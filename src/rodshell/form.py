@@ -344,6 +344,12 @@ class Form:
             met[ends] = contact_of_patches(self.footprint.mesh, states, self.rod)
         return merged_checks(each, met)
 
+    @property
+    def _design(self) -> dict[str, Floats]:
+        """The values of a refined design, from which `rodshell refine DIR` goes on."""
+        design = () if self.refined is None else self.refined.design
+        return {"design": np.array(design)} if design else {}
+
     @cached_property
     def _archive(self) -> Archive:
         checks, strengths, style = self.checks, self.options.judged_by(self.rod), self.options.drawings
@@ -355,5 +361,5 @@ class Form:
             strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
-        states = states_of(self.stages) | checked_states(checks, self.rod.stretch_stiffness)
+        states = states_of(self.stages) | self._design | checked_states(checks, self.rod.stretch_stiffness)
         return Archive(results, states, self.case.text(), self.inputs)

@@ -142,7 +142,11 @@ class Run:
             return earlier.refined
         from rodshell.refining.acceptance import refined  # it takes a tenth of a second to load, which few jobs need
 
-        return refined(stages, vary, ends=case.refine.ends, progress=self.progress)
+        table = case.refine
+        return refined(
+            stages, vary,
+            ends=table.ends, under_weight=table.under == "weight", start=table.start, progress=self.progress,
+        )  # fmt: skip
 
     def _decided(self, case: Case, found: Built) -> tuple[Case, Built, Search | None]:
         """The case with anchor and heading, and the search for them, if they are "auto"."""

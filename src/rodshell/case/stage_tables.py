@@ -20,6 +20,7 @@ from rodshell.case.values import (
     LengthsOrAuto,
     Names,
     NodeStiffness,
+    Numbers,
     Point,
     PointOrAuto,
     Polylines,
@@ -158,12 +159,12 @@ class PopUpTable(Table):
     )
 
 
-FAMILIES = ("taper", "double", "tails", "clamps", "holes", "offsets")
+FAMILIES = ("taper", "double", "sections", "tails", "clamps", "supports", "holes", "offsets")
 Families = Annotated[tuple[str, ...], BeforeValidator(words(FAMILIES))]
 
 
 class RefineTable(Table):
-    vary: Families = Field(default=(), description=f"what is varied: {', '.join(FAMILIES)}")
+    vary: Families = Field(default=(), description=", ".join(FAMILIES))
     ends: Literal["pinned", "clamped"] | None = Field(
         default=None, description="supports of the refined shell; default: the first of pop_up.ends"
     )
@@ -174,6 +175,10 @@ class RefineTable(Table):
     varies: Literal["size", "width", "height", "a", "b"] = Field(
         default="size", description="what of the section a taper changes: all lengths, or one"
     )
+    under: Literal["nothing", "weight"] = Field(
+        default="nothing", description="meet the target unloaded, or carrying the own weight"
+    )
+    start: Numbers | None = Field(default=None, description="design to begin with, as an interrupted search prints it")
     offer: Literal["on", "off"] = Field(default="on", description="say of any form what double laths would gain")
 
     def build(self) -> "tuple[Family, ...]":

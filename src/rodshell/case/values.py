@@ -226,6 +226,14 @@ def ratio(value: object) -> float:
     return number
 
 
+def numbers(value: object) -> tuple[float, ...]:
+    """Plain numbers: [1, 2, 3], or "1, 2, 3"."""
+    items = value.split(",") if isinstance(value, str) else value
+    if not isinstance(items, list | tuple) or not items:
+        raise ValueError("give numbers, such as [0.1, -0.3]")
+    return tuple(read_quantity(item, "number") for item in items)
+
+
 def words(choices: Sequence[str]) -> Callable[[object], tuple[str, ...]]:
     """Some of these words, each once: ["a", "b"], or "a, b"."""
 
@@ -278,6 +286,7 @@ Counts = Annotated[tuple[int, int] | Auto, BeforeValidator(counts)]
 Polylines = Annotated[tuple[tuple[tuple[float, float], ...], ...], BeforeValidator(polylines)]
 Point3 = Annotated[tuple[float, float, float], BeforeValidator(triple("length"))]
 Angles = Annotated[tuple[float, float, float], BeforeValidator(triple("angle"))]
+Numbers = Annotated[tuple[float, ...], BeforeValidator(numbers)]
 Ratio = Annotated[float, BeforeValidator(ratio)]
 Factor = Annotated[float, BeforeValidator(positive("number"))]
 Unit = Annotated[float, BeforeValidator(unit)]

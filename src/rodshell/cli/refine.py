@@ -1,7 +1,7 @@
 """`rodshell refine`: a form that is brought nearer to its target. Its options are those of `rodshell form`."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,6 +11,10 @@ from rodshell.cli.options import CaseCommand, case_options, output_options, over
 from rodshell.errors import InputError
 from rodshell.validation import choice
 
+if TYPE_CHECKING:
+    from rodshell.case import Case
+
+LATER = ("pop_up", "refine", "checks", "fabrication", "drawings")  # tables that leave the shell before it as it is
 VARY = "taper"  # where neither the command nor the case says
 
 
@@ -28,9 +32,12 @@ def command(name: str, ends: str | None, **values: Any) -> int:
     """Bring a form nearer to its target: vary its rods, and accept only what can be built.
 
     NAME, CASE.toml and SURFACE are those of rodshell form; DIR is an earlier result, whose case is run again. --vary
-    names what is varied: taper, the bending stiffness along the rods, or double, laths that are double over a share
-    of each rod. A design is accepted if it lies flat, pops up from flat to the same shape, does not depend on the
-    mesh, and stays stable and near its target when it is built with errors; else the form stays as it was.
+    names what is varied: taper, the bending stiffness along the rods; double, laths that are double over a share of
+    each rod; sections, of stock sizes; tails, cut lengths; clamps; supports; holes, the joints' places on the rods;
+    offsets of the rods. A result that was refined by the same keys goes on from its design.
+
+    A design is accepted if it lies flat, pops up from flat to the same shape, does not depend on the mesh, and stays
+    stable and near its target when it is built with errors; else the form stays as it was.
     """
     output = read_output_options(values)
     overrides = overrides_of(values)
@@ -44,9 +51,22 @@ def command(name: str, ends: str | None, **values: Any) -> int:
     if ends is not None:
         overrides |= {"pop_up.ends": choice("--ends", ends, ("pinned", "clamped"))}
     case = load_case(name, overrides)
+    if path.is_dir() and case.refine.start is None and all(key.partition(".")[0] in LATER for key in overrides):
+        overrides |= _design(path, case)
     only = ends or case.refine.ends or (case.ends or ("pinned",))[0]
     vary = case.refine.vary or VARY
     return run_case(
         load_case(name, overrides | {"refine.vary": vary, "refine.ends": only, "pop_up.ends": only}),
         f"{stem}-refined", output,
     )  # fmt: skip
+
+
+def _design(folder: Path, case: "Case") -> dict[str, object]:
+    """The design of an earlier result that was refined by the same keys, to go on from; else nothing."""
+    from rodshell.results.archive import read
+
+    kept = read(folder)
+    same = load_case(str(folder / "case.toml")).refine.model_dump(exclude={"start", "offer"})
+    if "design" not in kept.states or same != case.refine.model_dump(exclude={"start", "offer"}):
+        return {}
+    return {"refine.start": kept.states["design"].tolist()}

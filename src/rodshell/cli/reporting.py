@@ -146,18 +146,21 @@ class Result(Protocol):
 
 @dataclass(frozen=True)
 class Kept:
-    """An archive as a result; `kinds` of files are written with it (None: all), and `more` by name."""
+    """An archive as a result; `kinds` of files are written with it (None: all), and `more` by name. `offer` says what a
+    refinement would gain."""
 
     archive: "Archive"
     kinds: list[str] | None = None
     more: dict[str, str] = field(default_factory=dict)
+    offer: str = ""
 
     @property
     def status(self) -> str:
         return self.archive.results.status
 
     def summary(self) -> str:
-        return self.archive.summary()
+        offer = f"\n  refine    {self.offer}" if self.offer else ""
+        return self.archive.summary() + offer
 
     def result(self) -> dict[str, Any]:
         return self.archive.results.plain()
@@ -201,8 +204,20 @@ def run_and_deliver(
         archive = form.archive()
         if form.search is not None and not (output.quiet or output.as_json):
             click.echo(form.search.table())
-        kept = Kept(archive, output.kinds, pictures(form))
+        offer = "" if output.quiet or output.as_json else _offer(form, progress)
+        kept = Kept(archive, output.kinds, pictures(form), offer)
         return deliver(kept, kept.save, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+
+
+def _offer(form: "Form", progress: Progress) -> str:
+    """What double laths would gain, of a form that is not refined, unless the case switches it off."""
+    if form.case.refine.offer == "off" or form.refined is not None or form.from_table:
+        return ""
+    from rodshell.refining.offer import offer
+
+    with progress:
+        found = offer(form.stages, progress=progress)
+    return "" if found is None else found.words
 
 
 def _announce(sentence: str) -> None:

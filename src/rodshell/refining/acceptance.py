@@ -1,26 +1,29 @@
 """A refinement from a form to a form: the last design that passes all gates is what is built.
 
-Where the best design is refused, those accepted before it are tried, and designs between the last two; where none
-passes, the form stays as it was. Each patch of a form is refined by itself: its ends at the seams are supports as any
-others.
+Where the best design is refused, those accepted before it are tried, and designs between two of them. Then it is
+searched again: on the mesh of the grid's spans where meshing changed the gap, with a higher limit of the lowest
+eigenvalue where the shell does not withstand errors or comes to another shape from flat. Where none passes, the form
+stays as it was. Each patch of a form is refined by itself: its ends at the seams are supports as any others.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rodshell.errors import InputError
-from rodshell.formfinding.patches import PatchedForm
-from rodshell.formfinding.pipeline import Agreement, PatchForm
+from rodshell.formfinding.patches import PatchedForm, merged_agreement
+from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.refining.gates import GATES, Gates, gates
 from rodshell.refining.gauss_newton import Step
-from rodshell.refining.refine import Candidate, Refinement, between, popped_up, refine
+from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, between, loaded_gap, popped_up, refine
 from rodshell.refining.variables import Family
 from rodshell.units import percent_text
 
 Stages = PatchForm | PatchedForm
+FIRMER = (0.75, 1.0)  # shares of the lowest eigenvalue that are asked for where a shell does not withstand errors
 HALVINGS = 3  # between a design that passes and a better one that does not
+NEARER = 1.0 - 1e-6  # of the gap before: what is not smaller is no gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +39,9 @@ class Refined:
     refused : why the best design was refused, beginning with the gate's name, or why there is none; "" if accepted.
     factorizations : of the search.
     gate_factorizations : of all gates.
+    stopped : when and where the search was out of time, or "".
+    design : values of the variables of the design that was accepted; of a form in patches none.
+    loaded : gaps before and after of the shell that carries its own weight, where it was refined for that; else none.
     """
 
     vary: tuple[str, ...]
@@ -46,6 +52,9 @@ class Refined:
     refused: str
     factorizations: int
     gate_factorizations: int
+    stopped: str = ""
+    design: tuple[float, ...] = ()
+    loaded: tuple[Agreement, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Refined by {', '.join(self.vary)}, {self.words}>"
@@ -57,13 +66,13 @@ class Refined:
 
     @property
     def gap_before(self) -> Agreement:
-        """Distance to the target before."""
-        return self.before.agreement[self.ends]
+        """Distance to the target before, under the own weight where it was refined for that."""
+        return self.loaded[0] if self.loaded else self.before.agreement[self.ends]
 
     @property
     def gap_after(self) -> Agreement:
-        """Distance to the target after."""
-        return self.after.agreement[self.ends]
+        """Distance to the target after, as `gap_before`."""
+        return self.loaded[1] if self.loaded else self.after.agreement[self.ends]
 
     @property
     def words(self) -> str:
@@ -76,8 +85,9 @@ class Refined:
 
 
 def refined(
-    stages: Stages, vary: Sequence[Family], *, ends: Ends | None = None, progress: Progress = silent
-) -> Refined:
+    stages: Stages, vary: Sequence[Family], *, ends: Ends | None = None, under_weight: bool = False,
+    start: Sequence[float] | None = None, progress: Progress = silent,
+) -> Refined:  # fmt: skip
     """Refine a form, patch by patch.
 
     Parameters
@@ -85,102 +95,152 @@ def refined(
     stages : the form.
     vary : what is varied.
     ends : the only end condition of the refined form; None: the first asked for.
-    progress : called as progress(stage, detail, residual).
+    under_weight : bring the shell that carries its own weight to the target, in place of the unloaded one.
+    start : `Refined.design` of an earlier refinement, from which to go on.
+    progress : called as progress(stage, detail, residual). An OutOfTimeError that it raises ends the search, and the
+        gates are tried without it. A KeyboardInterrupt goes on with a text that says where the search was.
 
     Raises
     ------
-    InputError : the form has no target, or no pop-up with these ends.
+    InputError : the form has no target, or no pop-up with these ends; `start` does not fit.
     """
     end = stages.ends[0] if ends is None else ends
     if isinstance(stages, PatchForm):
-        return _of_piece(stages, vary, end, progress)
+        return _of_piece(stages, vary, end, under_weight, start, progress)
+    if start is not None:
+        raise InputError("refine.start: each patch of a form has a design of its own: leave it out")
     parts, patches = dict[str, Refined](), dict[str, PatchForm]()
     for name, patch in stages.patches.items():
 
         def of_patch(stage: str, detail: str, residual: float, name: str = name) -> None:
             progress(stage, f"patch {name}, {detail}", residual)
 
-        parts[name] = _of_piece(patch, vary, end, of_patch)
-        refined_patch = parts[name].after
-        assert isinstance(refined_patch, PatchForm)
-        patches[name] = refined_patch if parts[name].changed else _alone(patch, end)
-    changed = any(part.changed for part in parts.values())
+        parts[name] = _of_piece(patch, vary, end, under_weight, None, of_patch)
+        form = parts[name].after
+        assert isinstance(form, PatchForm)
+        patches[name] = form if parts[name].changed else _alone(patch, end)
+    every = list(parts.values())
+    changed = any(part.changed for part in every)
+    loaded = tuple(merged_agreement(gaps) for gaps in zip(*(part.loaded for part in every), strict=True))
     return Refined(
         tuple(family.name for family in vary), end,
         stages, replace(stages, patches=patches, ends=(end,)) if changed else stages,
-        {name: all(part.gates[name] for part in parts.values()) for name in GATES},
+        {name: all(part.gates[name] for part in every) for name in GATES},
         "; ".join(f"patch {name}, {part.refused}" for name, part in parts.items() if part.refused),
-        sum(part.factorizations for part in parts.values()),
-        sum(part.gate_factorizations for part in parts.values()),
+        sum(part.factorizations for part in every), sum(part.gate_factorizations for part in every),
+        next((part.stopped for part in every if part.stopped), ""), (), loaded,
     )  # fmt: skip
 
 
-def _of_piece(stages: PatchForm, vary: Sequence[Family], ends: Ends, progress: Progress) -> Refined:
-    """Of a form in one piece."""
-
-    def searching(step: Step) -> None:
-        gap = "no equilibrium" if step.rms is None else f"gap {percent_text(step.rms)} rms"
-        lowest = "" if step.lowest is None else f", lowest eigenvalue {step.lowest:.2g} of before"
-        progress("refine", f"design {step.number}: {gap}{lowest}, step {step.radius:.2g}", 0.0)
-
+def _of_piece(
+    stages: PatchForm, vary: Sequence[Family], ends: Ends, under_weight: bool, start: Sequence[float] | None,
+    progress: Progress,
+) -> Refined:  # fmt: skip
+    """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
     names = tuple(family.name for family in vary)
     progress("refine", ", ".join(names), 0.0)
     if ends in stages.popped and not stages.popped[ends].report.stable:
         judged = gates(_alone(stages, ends), progress=progress)
         return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
-    found = refine(stages, vary, ends=ends, progress=searching)
-    form, judged, refused, made = _accepted(found, progress)
-    return Refined(names, ends, stages, form or stages, judged.passed, refused, found.factorizations, made)
+    first = best = last = _searched(stages, vary, ends, under_weight, start, LEAST_EIGENVALUE, progress)
+    firmer, again = list(FIRMER), stages
+    while last.refused and not last.stopped:
+        gate = last.refused.partition(":")[0]
+        if gate == "remeshed" and again is stages:
+            again = meshed_again(stages, ends)
+            if not again.popped[ends].report.stable:
+                break
+        elif gate not in ("tolerance", "from_flat") or not firmer:
+            break
+        least = firmer.pop(0) if gate != "remeshed" else LEAST_EIGENVALUE
+        last = _searched(again, vary, ends, under_weight, start, least, progress)
+        made = best.factorizations + last.factorizations, best.gate_factorizations + last.gate_factorizations
+        nearer = last.changed and (not best.changed or last.gap_after.rms < best.gap_after.rms)
+        best = replace(last if nearer else best, factorizations=made[0], gate_factorizations=made[1])
+    if not best.changed:
+        return replace(best, before=stages, after=stages, refused=first.refused, stopped=last.stopped)
+    return replace(best, before=stages, stopped=last.stopped)
 
 
-def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, Gates, str, int]:
-    """The best design that passes all gates, or None; its gates, or those of the best one found; why that one was
-    refused; and the factorisations that all took.
+def _searched(
+    stages: PatchForm, vary: Sequence[Family], ends: Ends, under_weight: bool, start: Sequence[float] | None,
+    least_eigenvalue: float, progress: Progress,
+) -> Refined:  # fmt: skip
+    """One search, and the best of its designs that passes the gates."""
+    best = list[Step]()
+
+    def searching(step: Step) -> None:
+        if step.accepted:
+            best[:] = [step]
+        gap = "no equilibrium" if step.rms is None else f"gap {percent_text(step.rms)} rms"
+        lowest = "" if step.lowest is None else f", lowest eigenvalue {step.lowest:.2g} of before"
+        progress("refine", f"design {step.number}: {gap}{lowest}, step {step.radius:.2g}", 0.0)
+
+    try:
+        found = refine(
+            stages, vary, ends=ends, under_weight=under_weight, start=start,
+            least_eigenvalue=least_eigenvalue, progress=searching,
+        )  # fmt: skip
+        form, design, judged, refused, made = _accepted(found, silent if found.stopped else progress)
+    except KeyboardInterrupt as stopped:
+        raise KeyboardInterrupt(_where(best) or str(stopped)) from stopped
+    loaded: tuple[Agreement, ...] = ()
+    if found.loaded is not None:
+        before = found.loaded[0]
+        loaded = (before, before if form is None or design is None else loaded_gap(form, design, ends))
+    values = () if design is None else tuple(design.point.values.tolist())
+    return Refined(
+        found.vary, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
+        found.stopped, values, loaded,
+    )  # fmt: skip
+
+
+def _where(best: list[Step]) -> str:
+    """How to go on from the best design that an interrupted search has found."""
+    if not best or best[0].rms is None:
+        return ""
+    values = ",".join(f"{value:.6g}" for value in best[0].values)
+    return f"the gap was down to {percent_text(best[0].rms)} rms; to go on from there: --refine.start={values}"
+
+
+def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, Candidate | None, Gates, str, int]:
+    """The best design that passes all gates, and its form, or None; its gates, or those of the best one; why that one
+    was refused; and the factorisations that all took.
 
     Where a design is refused, the one before it in the search is tried, until one passes; then, by halving, designs
     between it and the one that was refused last.
     """
-    if len(found.designs) == 1:
+    before = found.gap_before if found.loaded is None else found.loaded[0]
+    nearer = [design for design in found.designs if design.point.rms < NEARER * before.rms_relative]
+    if not nearer:
         judged = gates(found.before, progress=progress)
-        return None, judged, "no nearer design was found", judged.factorizations
-    form, judged, made = _judged(found, found.designs[-1], True, progress)
-    if judged.open:
-        return form, judged, "", made
-    best, accepted, refused = judged, None, found.designs[-1]
-    low = found.designs[0]
-    for design in found.designs[-2:0:-1]:
-        form, judged, more = _judged(found, design, False, progress)
-        made += more
+        return None, None, judged, "no nearer design was found", judged.factorizations
+    best: Gates | None = None
+    made, accepted, low, refused = 0, None, found.designs[0], nearer[-1]
+    for design in reversed(nearer):
+        form, spent = popped_up(found.before, design, found.ends)
+        judged = gates(form, all_of_them=best is None, progress=progress)
+        made += spent + judged.factorizations
         if judged.open:
-            accepted, low = (form, judged), design
+            accepted, low = (form, design, judged), design
             break
-        refused = design
-    for _ in range(HALVINGS):
+        best, refused = best or judged, design
+    for _ in range(0 if best is None else HALVINGS):
         middle, spent = between(found, low, refused, 0.5)
         made += spent
-        if middle is None:
+        if middle is None or middle.point.rms >= NEARER * before.rms_relative:
             break
-        form, judged, more = _judged(found, middle, False, progress)
-        made += more
+        form, spent = popped_up(found.before, middle, found.ends)
+        judged = gates(form, all_of_them=False, progress=progress)
+        made += spent + judged.factorizations
         if judged.open:
-            accepted, low = (form, judged), middle
+            accepted, low = (form, middle, judged), middle
         else:
             refused = middle
     if accepted is None:
-        return None, best, best.reason, made
-    return *accepted, best.reason, made
-
-
-def _judged(
-    found: Refinement, design: Candidate, all_of_them: bool, progress: Progress
-) -> tuple[PatchForm | None, Gates, int]:
-    """A design popped up, its gates, and the factorisations of both; tried at all gates, or until one refuses it."""
-    try:
-        form, spent = popped_up(found.before, design, found.ends)
-    except InputError as gone:
-        return None, Gates(dict.fromkeys(GATES, False), f"stable: {gone}", 0), 0
-    judged = gates(form, all_of_them=all_of_them, progress=progress)
-    return form, judged, spent + judged.factorizations
+        assert best is not None
+        return None, None, best, best.reason, made
+    return *accepted, "" if best is None else best.reason, made
 
 
 def _alone(stages: PatchForm, ends: Ends) -> PatchForm:

@@ -171,7 +171,7 @@ def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
         errors = (SPAN_ERROR * form.target.size * random.uniform(-1.0, 1.0, edges) / lengths)[span]
         softer = STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))[mesh.edge_rods, None]
         here, made = found, 0
-        for share in ERROR_STEPS:  # all at once may lead to an unstable state beside the one that the shell goes to
+        for share in ERROR_STEPS:  # all at once may lead to an unstable state next to the one that the shell goes to
             varied = table.copy()
             varied[:, LENGTH] *= 1.0 + share * errors
             varied[:, EI1:LENGTH] *= 1.0 + share * softer

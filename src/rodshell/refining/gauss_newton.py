@@ -34,6 +34,7 @@ class Step:
     lowest : lowest eigenvalue over that before, or None.
     radius : of the trust region.
     accepted : whether the design became the new one.
+    values : (n,) of the variables.
     """
 
     number: int
@@ -41,6 +42,7 @@ class Step:
     lowest: float | None
     radius: float
     accepted: bool
+    values: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +55,14 @@ class Found:
     converged : whether no step is foreseen to gain more.
     factorizations : made in all.
     steps : every evaluation.
+    stopped : when and where the search was out of time, or "".
     """
 
     accepted: tuple[Point, ...]
     converged: bool
     factorizations: int
     steps: tuple[Step, ...]
+    stopped: str = ""
 
 
 def gauss_newton(
@@ -83,11 +87,11 @@ def gauss_newton(
     lowest_before : eigenvalue to which those of the steps are related; None: they are not computed.
     radius : first trust radius, in scales of the variables.
     most : evaluations.
-    progress : called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
+    progress : called after each evaluation; an OutOfTimeError that it raises ends the search.
     """
     box = variables.box
     here, accepted, steps, factorizations = first, [first], list[Step](), 1
-    converged, fresh = False, True
+    converged, fresh, stopped = False, True, ""
     while len(steps) < most and radius >= LEAST_RADIUS:
         if here.rms < NEAR_ENOUGH:
             converged = True
@@ -117,8 +121,8 @@ def gauss_newton(
             if lowest_before is not None:
                 lowest = float(there.modes.values[0]) / lowest_before
             good = allows(there)
-        steps.append(Step(len(steps) + 1, None if there is None else there.rms, lowest, radius, good))
-        late = _late(progress, steps[-1])
+        rms = None if there is None else there.rms
+        steps.append(Step(len(steps) + 1, rms, lowest, radius, good, tuple(values.tolist())))
         if not good or gain < POOR:
             radius *= 0.3 if there is None else 0.5
         elif gain > GOOD and reached:
@@ -126,18 +130,12 @@ def gauss_newton(
         if good and there is not None:
             here, fresh = there, True
             accepted.append(here)
-        if late:
+        try:
+            progress(steps[-1])
+        except OutOfTimeError as late:
+            stopped = str(late)
             break
-    return Found(tuple(accepted), converged, factorizations, tuple(steps))
-
-
-def _late(progress: Callable[[Step], None], step: Step) -> bool:
-    """Whether the time is over, which `progress` says by an error."""
-    try:
-        progress(step)
-    except OutOfTimeError:
-        return True
-    return False
+    return Found(tuple(accepted), converged, factorizations, tuple(steps), stopped)
 
 
 def _reduced(jacobian: Floats, r: Floats) -> tuple[Floats, Floats]:

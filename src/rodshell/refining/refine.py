@@ -69,6 +69,7 @@ class Refinement:
     factorizations : of the search.
     steps : its evaluations.
     variables : what was varied.
+    stopped : when and where the search was out of time, or "".
     loaded : gaps before and after under the loads, where it was refined under loads; else None.
     """
 
@@ -81,6 +82,7 @@ class Refinement:
     factorizations: int
     steps: tuple[Step, ...]
     variables: Design
+    stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
 
     @property
@@ -103,6 +105,7 @@ def refine(
     least_eigenvalue: float = LEAST_EIGENVALUE,
     under_weight: bool = False,
     dead_loads: Floats | None = None,
+    start: Sequence[float] | None = None,
     most_evaluations: int = 30,
     progress: Progress = lambda step: None,
 ) -> Refinement:
@@ -117,8 +120,9 @@ def refine(
     least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
     under_weight : bring the shell that carries its own weight to the target; unloaded it then stands above.
     dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
+    start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
     most_evaluations : designs that are tried.
-    progress : called after each; what it raises ends the search.
+    progress : called after each; an OutOfTimeError that it raises ends the search with what was found.
 
     Raises
     ------
@@ -129,7 +133,7 @@ def refine(
     ends = stages.ends[0] if ends is None else ends
     structure = replace(structure_of(stages, ends), weighs=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
-    here, spent = first_point(structure, variables)
+    here, spent = first_point(structure, variables, start)
     before = float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
@@ -153,17 +157,9 @@ def refine(
     held = replace(stages, popped={ends: stages.popped[ends]}, agreement={ends: stages.agreement[ends]}, ends=(ends,))
     names = tuple(family.name for family in families)
     return Refinement(
-        names,
-        ends,
-        held,
-        after,
-        designs,
-        found.converged,
-        spent + found.factorizations + made,
-        found.steps,
-        variables,
-        loaded,
-    )
+        names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
+        found.steps, variables, found.stopped, loaded,
+    )  # fmt: skip
 
 
 def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
@@ -240,19 +236,28 @@ def structure_of(stages: PatchForm, ends: Ends) -> Structure:
     return Structure(popped, stages.rod, stages.joint, stages.target)
 
 
-def first_point(structure: Structure, variables: Design) -> tuple[Point, int]:
+def first_point(structure: Structure, variables: Design, start: Sequence[float] | None = None) -> tuple[Point, int]:
     """The design to start from, and the factorisations that it took.
 
     Parameters
     ----------
     structure : the shell.
     variables : what is varied.
+    start : other values than those without effect.
 
     Raises
     ------
-    InputError : it has no stable equilibrium near the shell's own.
+    InputError : it has no stable equilibrium near the shell's own; `start` is not as long as there are variables.
     """
-    values = variables.box.start
+    box = variables.box
+    values = box.start
+    if start is not None:
+        if len(start) != len(values):
+            raise InputError(
+                f"the design to start from has {len(start)} values, but what is varied here has {len(values)}: leave "
+                "it out, or vary the same as in the search that it comes from"
+            )
+        values = np.clip(np.asarray(start, dtype=float), box.lower, box.upper)
     change = variables.change(values)
     here, edges, made = structure.popped.equilibrium, structure.edges, 0
     if change.stiffness.any() or change.lengths.any() or change.held.any():

@@ -215,9 +215,11 @@ def with_refinement(results: Results, found: "Refined") -> Results:
         GapBefore(rms_relative=gap.rms_relative, max_relative=gap.max_relative)
         for gap in (found.gap_before, found.gap_after)
     )
-    refusal = () if found.changed else (f"the form is not refined: {found.refused}",)
+    said = [] if found.changed else [f"the form is not refined: {found.refused}"]
+    if found.stopped:
+        said.append(f"{found.stopped}: the refinement was stopped at what it had found")
     return results.changed(
-        warnings=(*results.warnings, *refusal),
+        warnings=(*results.warnings, *said),
         refinement=Refinement(
             vary=found.vary,
             ends=found.ends,
