@@ -166,8 +166,9 @@ def test_a_shell_that_is_not_stable_is_tried_at_no_other_gate() -> None:
 # Acceptance
 
 
-def refused_after(count: int, monkeypatch: pytest.MonkeyPatch) -> list[PatchForm]:
-    """Gates that refuse so many designs."""
+def refused_after(count: int, monkeypatch: pytest.MonkeyPatch, halvings: int = 0) -> list[PatchForm]:
+    """Gates that refuse so many designs; after the first that passes, so many between two are tried."""
+    monkeypatch.setattr(acceptance, "HALVINGS", halvings)
     tried = list[PatchForm]()
 
     def some(form: PatchForm, *, all_of_them: bool = True, progress: object = None) -> Gates:
@@ -194,6 +195,43 @@ def test_the_last_design_that_passes_is_kept(monkeypatch: pytest.MonkeyPatch) ->
         designs[-2].point.rms * stages().target.size, rel=0.05
     )  # EA over EI differs
     assert "a nearer design was refused" in found.words
+
+
+def test_between_a_design_that_passes_and_a_better_one_that_does_not_better_ones_are_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried = refused_after(1, monkeypatch, halvings=2)
+    found = acceptance.refined(stages(), (refine.FAMILIES["taper"],), ends="pinned")
+    gaps = [agreement(form.popped["pinned"], stages().target).rms for form in tried]
+    assert gaps[0] < gaps[3] < gaps[2] < gaps[1]
+    assert found.gap_after.rms == pytest.approx(gaps[3])
+
+
+def test_a_search_that_is_out_of_time_keeps_what_it_found() -> None:
+    def late(stage: str, detail: str, residual: float) -> None:
+        if "design 1" in detail:
+            raise rs.OutOfTimeError("out of time after 3 s")
+
+    found = acceptance.refined(stages(), (refine.FAMILIES["taper"],), progress=late)
+    assert found.stopped == "out of time after 3 s"
+    assert found.changed
+    assert len(found.design) > 2
+
+
+def test_an_interrupted_search_says_how_to_go_on_and_goes_on_there() -> None:
+    def interrupted(stage: str, detail: str, residual: float) -> None:
+        if "design 2" in detail:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match=r"the gap was down to .* --refine.start=") as stopped:
+        acceptance.refined(stages(), (refine.FAMILIES["taper"],), progress=interrupted)
+    start = [float(value) for value in str(stopped.value).rpartition("=")[2].split(",")]
+    whole = refine.refine(stages(), "taper")
+    rest = refine.refine(stages(), "taper", start=start)
+    assert rest.designs[0].point.rms == pytest.approx(whole.designs[2].point.rms, rel=1e-3)
+    assert rest.gap_after.rms == pytest.approx(whole.gap_after.rms, rel=0.02)
+    with pytest.raises(rs.InputError, match="has 2 values"):
+        refine.refine(stages(), "taper", start=start[:2])
 
 
 def test_where_none_passes_the_form_stays_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -204,8 +204,8 @@ def _where(best: list[Step]) -> str:
 
 
 def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, Candidate | None, Gates, str, int]:
-    """The best design that passes all gates, and its form, or None; its gates, or those of the best one; why that one
-    was refused; and the factorisations that all took.
+    """The best design that passes all gates, and its form, or None; its gates, or those of the best one found; why that
+    one was refused; and the factorisations that all took.
 
     Where a design is refused, the one before it in the search is tried, until one passes; then, by halving, designs
     between it and the one that was refused last.
@@ -215,32 +215,40 @@ def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, 
     if not nearer:
         judged = gates(found.before, progress=progress)
         return None, None, judged, "no nearer design was found", judged.factorizations
-    best: Gates | None = None
-    made, accepted, low, refused = 0, None, found.designs[0], nearer[-1]
-    for design in reversed(nearer):
-        form, spent = popped_up(found.before, design, found.ends)
-        judged = gates(form, all_of_them=best is None, progress=progress)
-        made += spent + judged.factorizations
+    form, judged, made = _judged(found, nearer[-1], True, progress)
+    if judged.open:
+        return form, nearer[-1], judged, "", made
+    best, accepted, refused, low = judged, None, nearer[-1], found.designs[0]
+    for design in nearer[-2::-1]:
+        form, judged, more = _judged(found, design, False, progress)
+        made += more
         if judged.open:
             accepted, low = (form, design, judged), design
             break
-        best, refused = best or judged, design
-    for _ in range(0 if best is None else HALVINGS):
+        refused = design
+    for _ in range(HALVINGS):
         middle, spent = between(found, low, refused, 0.5)
         made += spent
-        if middle is None or middle.point.rms >= NEARER * before.rms_relative:
+        if middle is None:
             break
-        form, spent = popped_up(found.before, middle, found.ends)
-        judged = gates(form, all_of_them=False, progress=progress)
-        made += spent + judged.factorizations
-        if judged.open:
+        form, judged, more = _judged(found, middle, False, progress)
+        made += more
+        if judged.open and middle.point.rms < low.point.rms:
             accepted, low = (form, middle, judged), middle
         else:
             refused = middle
     if accepted is None:
-        assert best is not None
         return None, None, best, best.reason, made
-    return *accepted, "" if best is None else best.reason, made
+    return *accepted, best.reason, made
+
+
+def _judged(
+    found: Refinement, design: Candidate, all_of_them: bool, progress: Progress
+) -> tuple[PatchForm, Gates, int]:
+    """A design popped up, its gates, and the factorisations of both; tried at all gates, or until one refuses it."""
+    form, spent = popped_up(found.before, design, found.ends)
+    judged = gates(form, all_of_them=all_of_them, progress=progress)
+    return form, judged, spent + judged.factorizations
 
 
 def _alone(stages: PatchForm, ends: Ends) -> PatchForm:

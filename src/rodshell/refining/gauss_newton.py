@@ -87,7 +87,7 @@ def gauss_newton(
     lowest_before : eigenvalue to which those of the steps are related; None: they are not computed.
     radius : first trust radius, in scales of the variables.
     most : evaluations.
-    progress : called after each evaluation; an OutOfTimeError that it raises ends the search.
+    progress : called after each evaluation; an OutOfTimeError that it raises ends the search with what was found.
     """
     box = variables.box
     here, accepted, steps, factorizations = first, [first], list[Step](), 1
