@@ -23,7 +23,7 @@ from rodshell.units import percent_text
 Stages = PatchForm | PatchedForm
 FIRMER = (0.75, 1.0)  # shares of the lowest eigenvalue that are asked for where a shell does not withstand errors
 HALVINGS = 3  # between a design that passes and a better one that does not
-NEARER = 1.0 - 1e-6  # of the gap before: what is not smaller is no gain
+NEARER = 1.0 - 1e-6  # of the gap before: a design must be nearer than that
 
 
 @dataclass(frozen=True, eq=False)
