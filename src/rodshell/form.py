@@ -346,7 +346,7 @@ class Form:
 
     @property
     def _design(self) -> dict[str, Floats]:
-        """The values of a refined design, from which `rodshell refine DIR` goes on."""
+        """The values of a refined design, from which `rodshell refine DIR` continues."""
         design = () if self.refined is None else self.refined.design
         return {"design": np.array(design)} if design else {}
 

@@ -10,6 +10,7 @@ import pytest
 import rodshell as rs
 from rodshell.case.stage_tables import FAMILIES as WORDS
 from rodshell.cli import main
+from rodshell.refining.offer import offer
 from rodshell.refining.refine import FAMILIES
 
 COARSE = ("--layout.spacing", "60 mm", "--checks.stages", "0", "--only", "csv", "--quiet")
@@ -76,6 +77,19 @@ def test_refine_in_python_is_the_job_with_the_key() -> None:
     assert better.case.refine.vary == ("taper",)
     assert better.agreement["pinned"].rms == pytest.approx(form().agreement["pinned"].rms, rel=1e-6)
     np.testing.assert_allclose(better.popped["pinned"].positions, form().popped["pinned"].positions, atol=1e-9)
+
+
+def test_the_offer_foretells_what_refining_by_double_laths_gains() -> None:
+    plain = job().changed(refine__vary="", pop_up__ends="both").run(until="pop-up")
+    found = offer(plain.stages)
+    assert found is not None
+    assert (found.ends, found.before) == ("pinned", plain.agreement["pinned"].rms_relative)
+    better = rs.refine(plain, "double", ends="pinned")
+    assert better.agreement["pinned"].rms_relative <= found.after * (1 + 1e-9)
+    assert found.after < 1.2 * better.agreement["pinned"].rms_relative
+    assert found.factorizations <= 20
+    assert "--vary double --ends pinned" in found.words
+    assert "choose clamped ends" in found.words
 
 
 def test_refine_pops_up_ends_that_the_form_did_not_have() -> None:

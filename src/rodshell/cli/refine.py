@@ -34,7 +34,7 @@ def command(name: str, ends: str | None, **values: Any) -> int:
     NAME, CASE.toml and SURFACE are those of rodshell form; DIR is an earlier result, whose case is run again. --vary
     names what is varied: taper, the bending stiffness along the rods; double, laths that are double over a share of
     each rod; sections, of stock sizes; tails, cut lengths; clamps; supports; holes, the joints' places on the rods;
-    offsets of the rods. A result that was refined by the same keys goes on from its design.
+    offsets of the rods. A result that was refined by the same keys continues from its design.
 
     A design is accepted if it lies flat, pops up from flat to the same shape, does not depend on the mesh, and stays
     stable and near its target when it is built with errors; else the form stays as it was.
@@ -62,7 +62,7 @@ def command(name: str, ends: str | None, **values: Any) -> int:
 
 
 def _design(folder: Path, case: "Case") -> dict[str, object]:
-    """The design of an earlier result that was refined by the same keys, to go on from; else nothing."""
+    """The design of an earlier result that was refined by the same keys, to continue from; else nothing."""
     from rodshell.results.archive import read
 
     kept = read(folder)

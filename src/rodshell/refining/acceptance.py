@@ -23,7 +23,7 @@ from rodshell.units import percent_text
 Stages = PatchForm | PatchedForm
 FIRMER = (0.75, 1.0)  # shares of the lowest eigenvalue that are asked for where a shell does not withstand errors
 HALVINGS = 3  # between a design that passes and a better one that does not
-NEARER = 1.0 - 1e-6  # of the gap before: a design must be nearer than that
+NEARER = 1.0 - 1e-6  # of the gap before: more is not a gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +96,9 @@ def refined(
     vary : what is varied.
     ends : the only end condition of the refined form; None: the first asked for.
     under_weight : bring the shell that carries its own weight to the target, in place of the unloaded one.
-    start : `Refined.design` of an earlier refinement, from which to go on.
+    start : `Refined.design` of an earlier refinement, from which to continue.
     progress : called as progress(stage, detail, residual). An OutOfTimeError that it raises ends the search, and the
-        gates are tried without it. A KeyboardInterrupt goes on with a text that says where the search was.
+        gates are tried without it. A KeyboardInterrupt is raised again with a text that says where the search was.
 
     Raises
     ------
@@ -196,11 +196,11 @@ def _searched(
 
 
 def _where(best: list[Step]) -> str:
-    """How to go on from the best design that an interrupted search has found."""
+    """How to continue from the best design that an interrupted search has found."""
     if not best or best[0].rms is None:
         return ""
     values = ",".join(f"{value:.6g}" for value in best[0].values)
-    return f"the gap was down to {percent_text(best[0].rms)} rms; to go on from there: --refine.start={values}"
+    return f"the gap was down to {percent_text(best[0].rms)} rms; to continue from there: --refine.start={values}"
 
 
 def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, Candidate | None, Gates, str, int]:
