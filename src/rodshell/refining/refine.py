@@ -137,7 +137,7 @@ def refine(
     structure = replace(structure_of(stages, ends), weighs=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
     here, spent = first_point(structure, variables, start)
-    before = float(here.modes.values[0])
+    before = structure.lowest if here.equilibrium.problem.load is None else float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
     goals = [Gap(), *stressed] if objectives is None else list(objectives)
@@ -151,7 +151,7 @@ def refine(
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    designs = tuple(Candidate(point, built(variables, point, before)) for point in accepted)
+    designs = tuple(Candidate(point, built(variables, point)) for point in accepted)
     after, made = popped_up(stages, designs[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
@@ -185,11 +185,10 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
     point, made = here.tried(values, variables.change(values))
     if point is None:
         return None, made + 1
-    before = float(refinement.designs[0].point.modes.values[0])
-    return Candidate(point, built(variables, point, before)), made + 1
+    return Candidate(point, built(variables, point)), made + 1
 
 
-def built(variables: Design, point: Point, before: float) -> Grid:
+def built(variables: Design, point: Point) -> Grid:
     """The grid of a design.
 
     A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
@@ -199,7 +198,6 @@ def built(variables: Design, point: Point, before: float) -> Grid:
     ----------
     variables : what is varied.
     point : the design.
-    before : the lowest eigenvalue before.
     """
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
@@ -209,7 +207,7 @@ def built(variables: Design, point: Point, before: float) -> Grid:
     if point.equilibrium.problem.load is None and not springs:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
-        least = STIFFER * before / float(point.modes.values[0])
+        least = STIFFER * structure.lowest / float(point.modes.values[0])
         values = variables.stiffer(values, float(np.log(max(1.0 / thickest, min(1.0, least)))))
     return variables.applied(grid, values)
 

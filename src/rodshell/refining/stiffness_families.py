@@ -163,7 +163,11 @@ class Taper:
         zero = np.zeros(count)
         box = Box(zero, zero - half, zero + half, zero + 1.0)
         return Profiles(
-            structure, variable_of, lambda logs: Profile.symmetric(np.exp(logs).tolist(), varies=self.varies), box
+            structure,
+            variable_of,
+            lambda logs: Profile.symmetric(np.exp(logs).tolist(), varies=self.varies),
+            box,
+            common=True,
         )
 
 
