@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         StabilityError,
     )
     from rodshell.fabrication import Fabrication, fabricate
-    from rodshell.form import Form
+    from rodshell.form import Form, check_loads
     from rodshell.formfinding import (
         Agreement,
         Bound,
@@ -59,6 +59,10 @@ if TYPE_CHECKING:
         Spring,
     )
     from rodshell.layout import FlatGrid, FlatRod, GridLayout, GridMesh, Profile, mesh_grid, straight_rods
+    from rodshell.loads.bracing import Cables
+    from rodshell.loads.combinations import Loads, Stability
+    from rodshell.loads.kinds import LineLoad, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
+    from rodshell.loads.laths import Laths
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
     from rodshell.nets import ChebyshevNet, chebyshev_net
@@ -94,7 +98,7 @@ _HOMES = {
         "StabilityError",
     ),
     "rodshell.fabrication": ("Fabrication", "fabricate"),
-    "rodshell.form": ("Form",),
+    "rodshell.form": ("Form", "check_loads"),
     "rodshell.formfinding": (
         "Agreement", "Bound", "Boundary", "Draped", "Fall", "Footprint", "Gravity", "PopUp", "Trimmed", "agreement",
         "drape", "map_back", "pop_up", "trim",
@@ -106,6 +110,10 @@ _HOMES = {
     "rodshell.job": ("Job", "find_form", "pop_up_table", "refine"),
     "rodshell.joints": ("Ball", "ExplicitPenalty", "ImplicitPenalty", "Linker", "Pin", "Rigid", "SharedDofs", "Spring"),
     "rodshell.layout": ("FlatGrid", "FlatRod", "GridLayout", "GridMesh", "Profile", "mesh_grid", "straight_rods"),
+    "rodshell.loads.bracing": ("Cables",),
+    "rodshell.loads.combinations": ("Loads", "Stability"),
+    "rodshell.loads.kinds": ("LineLoad", "PointLoad", "SelfWeight", "Settlement", "Snow", "Temperature", "Wind"),
+    "rodshell.loads.laths": ("Laths",),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
     "rodshell.nets": ("ChebyshevNet", "chebyshev_net"),
@@ -127,17 +135,19 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cap", "ChebyshevNet", "Circle", "ConvergenceError", "Damping",
-    "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse", "Ellipsoid",
-    "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form", "Freeform",
-    "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere", "ImplicitEuler",
-    "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Linker", "Material", "Motion", "NetLimitError",
-    "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoads",
-    "PopUp", "Profile", "Rectangle", "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape",
-    "RodSupports", "RodshellError", "Sample", "SharedDofs", "Shell", "Spring", "StabilityError", "Target", "TimeSeries",
-    "Trimmed", "Tube", "Verdict", "agreement", "bar", "chebyshev_net", "check", "drape", "dynamic_pop_up", "export",
-    "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise", "pop_up", "pop_up_table", "read",
-    "read_sweep", "refine", "save", "search", "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
+    "Agreement", "Archive", "Ball", "Bound", "Boundary", "Cables", "Cap", "ChebyshevNet", "Circle", "ConvergenceError",
+    "Damping", "Disc", "Draped", "DrawingStyle", "DynamicPopUp", "DynamicPopUpSettings", "ElasticRod", "Ellipse",
+    "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form",
+    "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere",
+    "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Laths", "LineLoad", "Linker", "Loads",
+    "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid",
+    "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection",
+    "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight",
+    "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Target", "Temperature",
+    "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads",
+    "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise",
+    "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "simulate", "solve_rod",
+    "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

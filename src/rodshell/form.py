@@ -25,6 +25,7 @@ from rodshell.formfinding.seams import Meeting
 from rodshell.formfinding.search import Search
 from rodshell.joints import Joint
 from rodshell.layout import GridLayout
+from rodshell.layout.cells import Pattern
 from rodshell.output.files import save, wanted_kinds
 from rodshell.output.options import OutputOptions
 from rodshell.results import Archive, Results, Verdict
@@ -37,6 +38,8 @@ from rodshell.validation import instance
 if TYPE_CHECKING:
     from anywidget import AnyWidget
 
+    from rodshell.loads.check import LoadChecks
+    from rodshell.loads.combinations import Loads
     from rodshell.refining.acceptance import Refined
 
 Stages = PatchForm | PatchedForm
@@ -68,6 +71,7 @@ class Form:
     reused: tuple[str, ...] = ()
     _known_checks: Checks | None = field(default=None)
     _known_fabrication: Fabricated | None = field(default=None)
+    _known_loaded: "LoadChecks | None" = field(default=None)
 
     # What was asked for
 
@@ -191,8 +195,28 @@ class Form:
         ends = final_ends(self.checks)
         shape = None if ends is None else self.popped[ends].positions
         return fabricate(
-            self.footprint.mesh, self.rod, self.options.fabrication, curvature=sharpest(self.checks), final=shape
+            self.footprint.mesh,
+            self.rod,
+            self.options.fabrication,
+            curvature=sharpest(self.checks),
+            final=shape,
+            pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
+            prestrain=getattr(self.case.bracing, "prestrain", None),
         )
+
+    @cached_property
+    def loaded(self) -> "LoadChecks | None":
+        """The checks under the loads of the case, None where it has none; made as `checks` are."""
+        if self._known_loaded is not None:
+            return self._known_loaded
+        loads = self.case.built_loads()
+        return None if loads is None else check_loads(self, loads)
+
+    @property
+    def known_loaded(self) -> "LoadChecks | None":
+        """The checks under loads, if they were made."""
+        found: LoadChecks | None = self.__dict__.get("loaded", self._known_loaded)
+        return found
 
     @property
     def known_checks(self) -> Checks | None:
@@ -217,7 +241,10 @@ class Form:
         asked = Case.model_validate(options.parameters())
         tables = {name: getattr(asked, name) for name in ("checks", "fabrication", "drawings")}
         case = self.case.model_copy(update=tables)
-        return replace(self, case=case, options=options, _known_checks=known, _known_fabrication=None)
+        loaded = self.known_loaded if same and options.strength == self.options.strength else None
+        return replace(
+            self, case=case, options=options, _known_checks=known, _known_fabrication=None, _known_loaded=loaded
+        )
 
     def finished(self, progress: Progress = silent) -> "Form":
         """This form, its checks and fabrication made now; a progress may end the checks early."""
@@ -225,7 +252,10 @@ class Form:
         if checks is None or checks.stopped:
             checks = self._checked(progress)
         known = replace(self, _known_checks=checks)
-        return replace(known, _known_fabrication=known.fabrication)
+        loaded, loads = self.known_loaded, self.case.built_loads()
+        if loads is not None and (loaded is None or loaded.stopped):
+            loaded = check_loads(known, loads, progress=progress)
+        return replace(known, _known_fabrication=known.fabrication, _known_loaded=loaded)
 
     # Files
 
@@ -360,6 +390,40 @@ class Form:
             results, self.footprint.mesh, checks, self.fabrication,
             strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
         )  # fmt: skip
+        if self.loaded is not None:
+            from rodshell.results.from_loads import loaded_results
+
+            results = loaded_results(results, self.footprint.mesh, self.loaded)
         results = judged(results, drawings=style.parameters(), name=style.name, rod_chosen=self.options.rod_chosen)
         states = states_of(self.stages) | self._design | checked_states(checks, self.rod.stretch_stiffness)
+        if self.loaded is not None:
+            from rodshell.results.from_loads import loaded_states
+
+            states |= loaded_states(self.loaded)
         return Archive(results, states, self.case.text(), self.inputs)
+
+
+def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "LoadChecks":
+    """Check a form under loads: deflections, reactions, stability and utilisation under each of their combinations.
+
+    Parameters
+    ----------
+    form : whose shells are loaded, with each end condition that converged.
+    loads : and their combinations.
+    progress : called with stage and figures.
+
+    Raises
+    ------
+    InputError : a load does not fit the form; the form is in patches, or comes from a table of rods.
+    """
+    from rodshell.loads.check import check_shells  # most forms have no loads
+    from rodshell.loads.combinations import Loads
+    from rodshell.loads.structure import Strength
+
+    instance("form", form, Form)
+    instance("loads", loads, Loads, "a rodshell.Loads(...)")
+    if isinstance(form.stages, PatchedForm):
+        raise InputError("a form in patches cannot be checked under loads: leave out the seams, or the loads")
+    judged_by = form.options.judged_by(form.rod)
+    strength = Strength(strength=judged_by.strength, shear_weight=judged_by.shear_weight)
+    return check_shells(form.stages, loads, strength=strength, progress=progress)

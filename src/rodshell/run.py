@@ -36,7 +36,8 @@ STAGES: dict[str, tuple[str, ...]] = {
     "pop-up": ("pop_up",),
     "refine": ("refine",),
     "checks": ("checks",),
-    "fabrication": ("fabrication",),
+    "fabrication": ("fabrication", "bracing"),
+    "loads": ("loads", "combinations", "stability"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
@@ -197,7 +198,10 @@ class Run:
                 reused += ["checks"]
                 made = earlier.known_fabrication if "fabrication" in same else None
                 reused += ["fabrication"] if made is not None else []
-                form = replace(form, _known_checks=checks, _known_fabrication=made)
+                loaded = earlier.known_loaded if "loads" in same else None
+                loaded = None if loaded is None or loaded.stopped else loaded
+                reused += ["loads"] if "loads" in same and (loaded is not None or not case.loads) else []
+                form = replace(form, _known_checks=checks, _known_fabrication=made, _known_loaded=loaded)
         return replace(form, reused=tuple(reused))
 
     def _unchanged(self, case: Case) -> list[str]:

@@ -29,6 +29,10 @@ Kind = Literal[
     "inertia per length",
     "time",
     "stiffness",
+    "pressure",
+    "mass per area",
+    "force per length",
+    "temperature",
     "memory",
     "number",
 ]
@@ -85,6 +89,12 @@ _KINDS: dict[Kind, _Units] = {
             "6894757.293168361 ksi",
         ),
     ),
+    "pressure": _Units(
+        "a pressure", '"0.5 kN/m2"', _factors("1 N/m2 Pa", "1e3 kN/m2 kPa", "47.88025898033584 psf lbf/ft2")
+    ),
+    "mass per area": _Units("a mass per area", '"5 kg/m2"', _factors("1 kg/m2", "0.001 g/m2")),
+    "force per length": _Units("a force per length", '"0.8 kN/m"', _factors("1 N/m", "1e3 kN/m N/mm")),
+    "temperature": _Units("a change of temperature", '"30 K"', _factors("1 K °C degC C")),
     "time": _Units("a time", '"10 ms"', _factors("1 s second seconds", "0.001 ms", "60 min minutes", "3600 h hours")),
     "stiffness": _Units("a stiffness", '"0.8 N/m"', _factors("1 N/m", "1e3 N/mm kN/m")),
     "density": _Units(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rodshell as rs
-from rodshell.fabrication import Fabrication, diagonals, fabricate, nest, splices
+from rodshell.fabrication import Fabrication, fabricate, nest, splices
 from rodshell.layout import FlatGrid, mesh_grid, straight_rods
 from rodshell.layout.flatgrid import layers
 from rodshell.layout.gridlayout import GridLayout
@@ -148,32 +148,6 @@ def test_short_pieces_are_avoided_where_that_takes_no_more_bars(rods: int, piece
 
 def test_a_rod_within_its_stock_is_not_spliced() -> None:
     assert splices(1.0, [0.2, 0.4], 1.0, stations=[0.0, 1.0], curvature=[0.0, 0.0]) == []
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_every_cell_has_two_diagonals(turned: bool) -> None:
-    """A 3 x 4 lattice of 2 by 1 m cells; also where every second rod runs the other way."""
-    ends = [[[0, y], [8, y]] for y in (1.0, 2.0, 3.0)] + [[[x, 0], [x, 4]] for x in (1.0, 3.0, 5.0, 7.0)]
-    if turned:
-        ends = [pair[::-1] if k % 2 else pair for k, pair in enumerate(ends)]
-    grid = straight_rods(ends)
-    places = np.array(
-        [grid.rods[a].point(s) for (a, _), (s, _) in zip(grid.crossings.rods, grid.crossings.at, strict=True)]
-    )
-    sheared = np.column_stack([places @ np.array([[1, 0.5], [0, 1]]).T, 0 * places[:, 0]])
-    found = diagonals(grid.crossings.rods, grid.crossings.at, places, sheared)
-    assert len(found) == 2 * 2 * 3
-    assert len({frozenset(one.joints) for one in found}) == len(found)
-    np.testing.assert_allclose([one.flat for one in found], np.hypot(2, 1))
-    expected = {round(float(np.hypot(2 + 0.5 * side, 1)), 9) for side in (1, -1)}
-    assert {round(one.final, 9) for one in found} == expected
-
-
-def test_a_cell_with_a_missing_joint_has_none() -> None:
-    ends = [[[0, y], [8, y]] for y in (1.0, 2.0)] + [[[1.0, 0], [1.0, 4]], [[3.0, 0], [3.0, 1.5]], [[5.0, 0], [5.0, 4]]]
-    grid = straight_rods(ends)
-    places = np.zeros((len(grid.crossings), 3))
-    assert diagonals(grid.crossings.rods, grid.crossings.at, places, places) == []
 
 
 def lattice() -> FlatGrid:

@@ -8,6 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from pydantic import Field
 
+from rodshell.case.load_tables import (
+    BracingKinds,
+    CombinationTable,
+    LoadKinds,
+    NoBracingTable,
+    StabilityTable,
+)
 from rodshell.case.rod_tables import BallTable, JointKinds, RodTable
 from rodshell.case.stage_tables import (
     ChecksTable,
@@ -30,6 +37,7 @@ if TYPE_CHECKING:
     from rodshell.formfinding.popup import Ends
     from rodshell.joints import Joint
     from rodshell.layout import GridLayout
+    from rodshell.loads.combinations import Loads
     from rodshell.output.options import OutputOptions
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
@@ -69,12 +77,22 @@ class Case(Table):
     checks: ChecksTable = Field(default_factory=ChecksTable)
     fabrication: FabricationTable = Field(default_factory=FabricationTable)
     drawings: DrawingsTable = Field(default_factory=DrawingsTable)
+    loads: tuple[LoadKinds, ...] = Field(
+        default=(), description="file with [[loads]] and their [[combinations]]; in a case file tables"
+    )
+    combinations: tuple[CombinationTable, ...] = Field(
+        default=(), description="combinations of loads; in a case file only"
+    )
+    bracing: BracingKinds = Field(default_factory=NoBracingTable, discriminator="kind")
+    stability: StabilityTable = Field(default_factory=StabilityTable)
 
     @property
     def held_objects(self) -> dict[str, Held]:
         """Objects that tables were made of and that their keys do not describe, by the name of the table."""
         tables = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: table.held for name, table in tables.items() if table.held is not None}
+        return {
+            name: table.held for name, table in tables.items() if isinstance(table, Table) and table.held is not None
+        }
 
     def to_toml(self) -> str:
         """The full input as a case file with SI numbers: loading it from anywhere gives the same case.
@@ -90,7 +108,9 @@ class Case(Table):
                     f"no case file can describe {held.what} ({name}): keep the Python that makes it, or save the form"
                 )
             notes += [f"# {held.note}\n"] if held.note else []
-        return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True))
+        idle = {"stability"} if not self.loads else set[str]()
+        idle |= {"bracing"} if self.bracing.kind == "none" else set()
+        return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
 
     def text(self) -> str:
         """As `to_toml`, or a comment on why no case file can give the same again."""
@@ -189,6 +209,8 @@ class Case(Table):
         target = target or built(self.target)
         layout = built(self.layout, target)
         self._require_stock(layout)
+        self.bracing.build()
+        self.built_loads()
         rod = self.rod_on(target, layout, anchor=anchor)
         self.output_options().require_known_stress(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
@@ -216,6 +238,29 @@ class Case(Table):
         ):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")
+
+    def built_loads(self) -> "Loads | None":
+        """What the shell is to be checked under; None where the case has no loads.
+
+        Raises
+        ------
+        InputError : two loads or two combinations of one name, and what `Loads` refuses.
+        """
+        if not self.loads and not self.combinations:
+            return None
+        from rodshell.loads.combinations import Loads
+
+        for tables, rows in (("loads", self.loads), ("combinations", self.combinations)):
+            names = [row.name for row in rows]
+            for name in names:
+                if names.count(name) > 1:
+                    raise InputError(f"{tables} has {shown(name)} twice: give each a name of its own")
+        return Loads(
+            loads={load.name: load.build() for load in self.loads},
+            combinations={row.name: dict(row.factors) for row in self.combinations},
+            bracing=self.bracing.build(),
+            stability=self.stability.build(),
+        )
 
     def output_options(self) -> "OutputOptions":
         """Options of checks, fabrication and drawings.
@@ -245,18 +290,30 @@ def built(table: Table, *arguments: object) -> Any:
     return table.held.value if table.held is not None else table.build(*arguments)  # type: ignore[attr-defined]
 
 
-def toml_text(case: Mapping[str, Mapping[str, object]]) -> str:
-    """One [table] for each entry, its own tables inline, keys in the order given."""
+def toml_text(case: Mapping[str, Any]) -> str:
+    """One [table] for each entry, one [[table]] for each in a row, their own tables inline, keys in the order given."""
     tables = [
-        f"[{name}]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in table.items())
-        for name, table in case.items()
+        f"{head}\n" + "".join(f"{key} = {_value(value)}\n" for key, value in table.items())
+        for name, entry in case.items()
+        for head, table in _headed(name, entry)
     ]
     return "\n".join([HEADER, *tables])
 
 
+def _headed(name: str, entry: Any) -> list[tuple[str, Mapping[str, Any]]]:
+    """A table, or each of the tables in a row, with its head."""
+    return [(f"[{name}]", entry)] if isinstance(entry, Mapping) else [(f"[[{name}]]", table) for table in entry]
+
+
+def _key(name: str) -> str:
+    """A key, in quotation marks where it is not a bare word of TOML."""
+    bare = name.replace("-", "").replace("_", "")
+    return name if bare.isascii() and bare.isalnum() else _value(name)
+
+
 def _value(value: object) -> str:
     if isinstance(value, Mapping):
-        inside = ", ".join(f"{key} = {_value(item)}" for key, item in value.items())
+        inside = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
         return f"{{ {inside} }}" if inside else "{}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"

@@ -12,13 +12,27 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from rodshell.case.case import Case
+from rodshell.case.load_tables import AnyLoad, CombinationTable
 from rodshell.case.stage_tables import IDLE, PatchTable
 from rodshell.case.values import Table
 from rodshell.units import shown
 from rodshell.validation import either, not_a_choice
 
-BY_KIND: dict[str, str] = {"target": "hemisphere", "rod.section": "auto", "joint": "ball"}
+BY_KIND: dict[str, str] = {
+    "target": "hemisphere",
+    "rod.section": "auto",
+    "joint": "ball",
+    "bracing": "none",
+    "bracing.section": "circle",
+}
 """Tables whose `kind` decides which keys they have, and the kind that they are by default."""
+
+ROWS: dict[str, tuple[tuple[type[Table], ...], str]] = {
+    "seams.patches": ((PatchTable,), '[{ name = "B", rotate = "10 deg" }]'),
+    "loads": (get_args(AnyLoad), '[{ name = "snow", kind = "snow", value = "0.5 kN/m2" }]'),
+    "combinations": ((CombinationTable,), '[{ name = "winter", factors = { snow = 1.5 } }]'),
+}
+"""Keys that hold tables in a row, the tables that these may be, and an example."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +118,8 @@ def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
     """The first thing that is wrong with the case `raw`; a misspelt key goes before the one that it meant."""
     row = min(error.errors(), key=lambda row: row["type"] != "extra_forbidden")
     path, value = _path(row), row["input"]
+    if (within := _rows_of(path)) is not None:
+        return _fault_in_a_row(row, path, within)
     match row["type"]:
         case "extra_forbidden":
             return unknown_key(path, value, raw)
@@ -119,8 +135,43 @@ def sentence(error: ValidationError, raw: Mapping[str, Any]) -> str:
             return reason if path in case_tables() else f"{path} = {shown(value)}: {reason}"
         case "string_type":
             return f"{path} = {shown(value)}: must be text, the {_help(path)}"
-        case "tuple_type" | "model_type":
-            example = '[{ name = "B", rotate = "10 deg" }]'
+    return f"{path} = {shown(value)}: {row['msg']}"
+
+
+def _rows_of(path: str) -> str | None:
+    """The key with tables in a row that an error is about, or None."""
+    return next((name for name in ROWS if f"{path}.".startswith(f"{name}.")), None)
+
+
+def _fault_in_a_row(row: ErrorDetails, path: str, within: str) -> str:
+    """What is wrong with tables in a row, or with a key of one of them."""
+    models, example = ROWS[within]
+    value, name = row["input"], path.rpartition(".")[2]
+    kinds = [_kind_of(model) for model in models] if len(models) > 1 else []
+    kind = next((str(part) for part in row["loc"] if part in kinds), None)
+    model = models[kinds.index(kind)] if kind is not None else models[0]
+    what = f' of kind "{kind}"' if kind is not None else ""
+    known = model.model_fields
+    match row["type"]:
+        case "extra_forbidden":
+            near = get_close_matches(name, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"a table{what} has {', '.join(known)}"
+            return f"unknown key {path}: {hint}"
+        case "missing":
+            return f"{path} is missing: give the {known[name].description}"
+        case "union_tag_not_found":
+            return f"{path}.kind is missing: give {either(kinds)}"
+        case "union_tag_invalid":
+            return not_a_choice(f"{path}.kind", value["kind"], kinds)
+        case "literal_error":
+            return not_a_choice(path, value, _choices(known[name].annotation)[0])
+        case "value_error":
+            return f"{path} = {shown(value)}: {row['ctx']['error']}"
+        case "string_type":
+            return f"{path} = {shown(value)}: must be text, the {known[name].description}"
+        case "string_too_short":
+            return f"{path} is empty: give the {known[name].description}"
+        case "tuple_type" | "model_type" | "model_attributes_type":
             return f"{path} = {shown(value)}: give tables in a case file, such as {example}"
     return f"{path} = {shown(value)}: {row['msg']}"
 
@@ -168,9 +219,7 @@ def _table_of(raw: Mapping[str, Any], path: str) -> Mapping[str, Any]:
 
 
 def _help(path: str) -> str:
-    """The line of help of a key; of a key of one patch, without the patch's number."""
-    if path.startswith("seams.patches."):
-        return str(PatchTable.model_fields[path.rpartition(".")[2]].description)
+    """The line of help of a key."""
     return case_keys()[path].help
 
 
@@ -189,7 +238,7 @@ def _nearest(path: str, keys: Mapping[str, CaseKey]) -> str | None:
 
 def _inside(table: str, keys: Mapping[str, CaseKey]) -> list[str]:
     """Names of the keys and tables directly inside a table; of the outermost tables for ""."""
-    paths = [*keys, *case_tables()]
+    paths = [*keys, *case_tables()] if table else [*case_tables(), *keys]
     return [name for outer, _, name in (path.rpartition(".") for path in paths) if outer == table]
 
 
@@ -200,4 +249,6 @@ def _path(row: ErrorDetails) -> str:
         depth = table.count(".") + 1
         if ".".join(path[:depth]) == table:
             del path[depth : depth + 1]
+    if path[0] == "loads" and len(path) > 2:  # loads.0.snow.value
+        del path[2]
     return ".".join(path)

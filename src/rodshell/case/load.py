@@ -148,6 +148,7 @@ def flattened(changes: Mapping[str, object]) -> dict[str, object]:
 def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
     """The case of tables as they were read, with some keys changed."""
     _rename(raw, overrides)
+    _read_loads(raw, overrides)
     for path in case_tables():
         if not isinstance(_table(raw, path), dict):
             raise InputError(not_a_table(path, _table(raw, path)))
@@ -158,6 +159,8 @@ def _validated(raw: Raw, overrides: dict[str, object]) -> Case:
         table = _table(raw, path)
         if path == "rod.section" and (table or any(key.startswith("rod.section.") for key in overrides)):
             kind = "circle"
+        if path == "bracing.section" and not (table or any(key.startswith(f"{path}.") for key in overrides)):
+            continue
         table.setdefault("kind", kind)
     _drop_for_another_kind(raw, overrides)
     for path, value in overrides.items():
@@ -189,6 +192,30 @@ def _rename(raw: Raw, overrides: dict[str, object]) -> None:
                 del raw[old_table]
 
 
+LOAD_TABLES = ("loads", "combinations", "bracing", "stability")
+"""What a file of loads may have; it replaces all of these that the case has."""
+
+
+def _read_loads(raw: Raw, overrides: dict[str, object]) -> None:
+    """Put the tables of a file of loads, that an override names, in the place of the case's."""
+    name = overrides.get("loads")
+    if not isinstance(name, str | PathLike):
+        return
+    wanted = "give a TOML file with [[loads]] and [[combinations]]"
+    if not Path(name).is_file():
+        raise InputError(f"loads = {shown(str(name))}: there is no such file: {wanted}")
+    del overrides["loads"]
+    given = _raw_of(Path(name))
+    for key in given:
+        if key not in LOAD_TABLES:
+            raise InputError(f"{name} has {shown(key)}, which no file of loads has: it has {', '.join(LOAD_TABLES)}")
+    if "loads" not in given:
+        raise InputError(f"{name} has no loads: {wanted}")
+    for key in LOAD_TABLES:
+        raw.pop(key, None)
+    raw |= given
+
+
 def _found_table(raw: Raw, path: str) -> Raw:
     """The table at a dotted path; empty where there is none."""
     inner: Any = raw
@@ -200,7 +227,7 @@ def _found_table(raw: Raw, path: str) -> Raw:
 def _table(raw: Raw, path: str) -> Any:
     """The table at a dotted path, made where it is missing."""
     inner: Any = raw
-    for name in path.split("."):
+    for name in path.split(".") if path else ():
         inner = inner.setdefault(name, {})
     return inner
 

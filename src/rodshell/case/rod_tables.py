@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from math import inf
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -122,13 +122,15 @@ class MaterialTable(Table):
     shear: Stress | None = Field(default=None, description="shear modulus, in place of Poisson's ratio, as for timber")
     density: Density = Field(default=1000.0, description="density")
 
+    _path: ClassVar[str] = "rod.material"
+
     @model_validator(mode="before")
     @classmethod
     def _complete(cls, given: dict[str, Any]) -> dict[str, Any]:
         """What the preset says of the keys that are left out; and not both of Poisson's ratio and a shear modulus."""
         given = {key: value for key, value in given.items() if value is not None}
         if "shear" in given and "poisson_ratio" in given:
-            raise ValueError("rod.material.shear stands in place of poisson_ratio: leave one of them out")
+            raise ValueError(f"{cls._path}.shear stands in place of poisson_ratio: leave one of them out")
         if given.get("preset") in get_args(PresetName):
             given = preset_values(given["preset"], given)
         return given if "shear" in given else {"poisson_ratio": 0.5, **given}
@@ -137,7 +139,7 @@ class MaterialTable(Table):
     def _has_a_modulus(self) -> Self:
         if self.youngs_modulus is None:
             names = ", ".join(get_args(PresetName))
-            raise ValueError(f"rod.material has no youngs_modulus: give it, or a preset ({names})")
+            raise ValueError(f"{self._path} has no youngs_modulus: give it, or a preset ({names})")
         return self
 
     def build(self) -> Material:

@@ -1,7 +1,7 @@
 """Options of the commands: keys of the case file, and those that several commands have."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
@@ -93,7 +93,14 @@ def _kinds_of(arguments: tuple[str, ...]) -> dict[str, str] | None:
         case = load_case(arguments[0], overrides)
     except InputError:
         return None
-    return {"target": case.target.kind, "rod.section": case.rod.section.kind, "joint": case.joint.kind}
+    section = getattr(case.bracing, "section", None)
+    return {
+        "target": case.target.kind,
+        "rod.section": case.rod.section.kind,
+        "joint": case.joint.kind,
+        "bracing": case.bracing.kind,
+        "bracing.section": BY_KIND["bracing.section"] if section is None else section.kind,
+    }
 
 
 def case_options(*tables: str) -> list[click.Parameter]:
@@ -123,6 +130,10 @@ class RunOptions:
     force: bool
     as_json: bool
     quiet: bool
+
+    def into(self, folder: str) -> "RunOptions":
+        """The same with another folder for the results."""
+        return replace(self, out=folder)
 
 
 FORCE = click.option(

@@ -1,7 +1,7 @@
 """How a form is made: layers, cut lengths, splices, stock, bracing."""
 
 from rodshell.fabrication.cutting import Bar, Nesting, nest, splices
-from rodshell.fabrication.fabricate import Diagonal, Fabricated, Fabrication, diagonals, fabricate
+from rodshell.fabrication.fabricate import Diagonal, Fabricated, Fabrication, fabricate
 
 __all__ = [
     "Bar",
@@ -9,7 +9,6 @@ __all__ = [
     "Fabricated",
     "Fabrication",
     "Nesting",
-    "diagonals",
     "fabricate",
     "nest",
     "splices",

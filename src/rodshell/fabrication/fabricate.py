@@ -1,17 +1,16 @@
 """Cut list, layers, splices, stock and bracing of a grid, in one call, and the lengths that decide the cutting."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.fabrication.cutting import Nesting, nest, splices
 from rodshell.layout import GridMesh, Profile
+from rodshell.layout.cells import Pattern, diagonals
 from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
 from rodshell.rods.varied import varied
@@ -22,61 +21,13 @@ SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no m
 
 @dataclass(frozen=True)
 class Diagonal:
-    """One diagonal of a cell: the joints that it ties, and their distance flat and in the final shape [m]."""
+    """One diagonal of a cell: the joints that it ties, and their distance flat and in the final shape [m]; of a cable
+    also its length free of stress [m]."""
 
     joints: tuple[int, int]
     flat: float
     final: float
-
-
-def diagonals(rods: ArrayLike, at: ArrayLike, flat: Floats, final: Floats) -> list[Diagonal]:
-    """Both diagonals of every cell between four neighbouring joints of four rods.
-
-    Parameters
-    ----------
-    rods, at : (c, 2) the rods of each joint, and its distance along each [m].
-    flat, final : (c, 2 or 3) places of the joints [m].
-    """
-    pairs = [
-        corners
-        for cell in _cells(np.asarray(rods).tolist(), np.asarray(at, dtype=float))
-        for corners in ((cell[0], cell[2]), (cell[1], cell[3]))
-    ]
-    return [
-        Diagonal((a, b), float(np.linalg.norm(flat[a] - flat[b])), float(np.linalg.norm(final[a] - final[b])))
-        for a, b in pairs
-    ]
-
-
-def _cells(rods: Sequence[Sequence[int]], at: Floats) -> list[tuple[int, int, int, int]]:
-    """The four joints of each cell, in their order around it."""
-    along: dict[int, list[tuple[float, int]]] = {}
-    for joint, (pair, positions) in enumerate(zip(rods, at.tolist(), strict=True)):
-        for rod, place in zip(pair, positions, strict=True):
-            along.setdefault(rod, []).append((place, joint))
-    next_to: dict[tuple[int, int], list[int]] = {}  # the joints next to a joint on a rod
-    for rod, on_rod in along.items():
-        row = [joint for _, joint in sorted(on_rod)]
-        for k, joint in enumerate(row):
-            next_to[joint, rod] = row[max(k - 1, 0) : k] + row[k + 1 : k + 2]
-    found: dict[frozenset[int], tuple[int, int, int, int]] = {}
-    for joint, (p, q) in enumerate(rods):
-        for on in next_to[joint, p]:
-            for over in next_to[joint, q]:
-                corner = _meeting(next_to, rods, on, over, p, q)
-                if corner is not None:
-                    found.setdefault(frozenset((joint, on, corner, over)), (joint, on, corner, over))
-    return list(found.values())
-
-
-def _meeting(
-    next_to: dict[tuple[int, int], list[int]], rods: Sequence[Sequence[int]], on: int, over: int, p: int, q: int
-) -> int | None:
-    """The joint next to `on` on its other rod and next to `over` on its own, or None."""
-    other_of_on = rods[on][1] if rods[on][0] == p else rods[on][0]
-    other_of_over = rods[over][1] if rods[over][0] == q else rods[over][0]
-    both = set(next_to[on, other_of_on]) & set(next_to[over, other_of_over])
-    return min(both) if both else None
+    cut: float | None = None
 
 
 @dataclass(frozen=True)
@@ -133,14 +84,17 @@ class Fabricated:
 
 
 def fabricate(
-    mesh: GridMesh, rod: Rod, options: Fabrication, *, curvature: Floats | None = None, final: Floats | None = None
-) -> Fabricated:
+    mesh: GridMesh, rod: Rod, options: Fabrication, *, curvature: Floats | None = None, final: Floats | None = None,
+    pattern: Pattern = Pattern(), prestrain: float | None = None,
+) -> Fabricated:  # fmt: skip
     """Cut list, layers, splices, stock and bracing of a grid.
 
     Parameters
     ----------
     curvature : (k,) the sharpest bend that each entry of `rod_nodes` sees [1/m], which splices avoid.
     final : (n, 3) the final shape, for the bracing [m].
+    pattern : of the bracing; default: both diagonals of every cell.
+    prestrain : by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
     """
     rods, crossings = mesh.grid.rods, mesh.grid.crossings
     lengths = np.array([rod_line.length for rod_line in rods])
@@ -158,8 +112,17 @@ def fabricate(
             made, pieces, nesting = longer, others, tried
     bracing: tuple[Diagonal, ...] = ()
     if final is not None:
-        corners = (mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1))
-        bracing = tuple(diagonals(crossings.rods, crossings.at, *corners))
+        flat, there = mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1)
+        pairs = diagonals(mesh.grid, pattern)
+
+        def apart(points: Floats) -> list[float]:
+            distances: list[float] = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).tolist()
+            return distances
+
+        bracing = tuple(
+            Diagonal((a, b), laid, spanned, None if prestrain is None else spanned / (1.0 + prestrain))
+            for (a, b), laid, spanned in zip(pairs.tolist(), apart(flat), apart(there), strict=True)
+        )
     mass = rod.mass_per_length * (cut + _more(mesh, rod, options))
     return Fabricated(
         options, cut, mass, layers(len(rods), crossings.rods.tolist()), made, pieces, nesting, bracing, warnings

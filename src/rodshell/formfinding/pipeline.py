@@ -237,7 +237,8 @@ def find_stages(
             continue
         popped[end] = pop_up(
             footprint, trimmed.boundary, rod,
-            ends=end, warm_start=earlier.get(end), joint=joint, progress=progress,
+            ends=end, warm_start=earlier.get(end), joint=joint, like=next(iter(popped.values()), None),
+            progress=progress,
         )  # fmt: skip
         if popped[end].report.status is Status.OUT_OF_TIME:
             break

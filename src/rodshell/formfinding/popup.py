@@ -27,7 +27,7 @@ from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.path import MOST_STEPS, follow, relax
-from rodshell.solve.problem import Problem, half_width
+from rodshell.solve.problem import Pattern, Problem, half_width
 from rodshell.units import length_text
 from rodshell.validation import choice, instance
 
@@ -100,6 +100,7 @@ def pop_up(
     start: Start = "draped",
     warm_start: PopUp | None = None,
     joint: Joint | Sequence[Joint] | None = None,
+    like: PopUp | None = None,
     progress: Progress = silent,
 ) -> PopUp:
     """Move the rod ends of `footprint` to `boundary` and find the equilibrium of the free grid.
@@ -116,6 +117,8 @@ def pop_up(
     joint : the connection of rods where they cross: one joint for all crossings, or a sequence with one for each;
         ball joints by default. Eccentric joints place the rods in two layers: each rod starts on its own line, half
         of their distance above or below the draped surface, and the boundary's ends lie there.
+    like : a pop-up of the same footprint, such as with other ends. Where its matrices have the same pattern they are
+        not analysed again, which saves time and changes nothing else.
 
     Raises
     ------
@@ -130,6 +133,8 @@ def pop_up(
         raise InputError('an earlier pop-up can only be used with start="draped": leave out warm_start, or start')
     if warm_start is not None and warm_start.ends != ends:
         raise InputError(f"the earlier pop-up has {warm_start.ends} ends, not {ends}: give one with the same ends")
+    if like is not None:
+        instance("like", like, PopUp, "what an earlier rodshell.pop_up returned")
     instance("footprint", footprint, Footprint)
     instance("boundary", boundary, Boundary)
     instance("rod", rod, Rod)
@@ -144,7 +149,8 @@ def pop_up(
             f"the grid's rods lie in two layers {length_text(distance)} apart, and its joints hold them "
             f"{length_text(apart)} apart: drape it with the same joint"
         )
-    stages = _Stages(footprint, boundary, rod, joint, progress)
+    known = like.equilibrium.problem.pattern if like is not None else None
+    stages = _Stages(footprint, boundary, rod, joint, progress, known)
     if start == "draped":
         shell, found = (stages.again(warm_start) if warm_start else None) or stages.release(ends)
     else:
@@ -165,6 +171,7 @@ class _Stages:
     rod: Rod
     joint: Joint | Sequence[Joint]
     progress: Progress
+    pattern: Pattern | None = None
 
     def _counting(self, what: str, most: int) -> Callable[[int, float], None]:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
@@ -192,7 +199,7 @@ class _Stages:
 
     def problem(self, shell: Shell, goals: Floats | None = None) -> Problem:
         """The shell with its ends (and ghost nodes) held at the boundary, or at `goals`."""
-        return Problem.of_shell(shell, self.boundary.points, goals=goals)
+        return Problem.of_shell(shell, self.boundary.points, goals=goals, pattern=self.pattern)
 
     def upright(
         self, shell: Shell, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None

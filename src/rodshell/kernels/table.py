@@ -33,7 +33,7 @@ KERNELS: dict[str, dict[str, str]] = {
         "_fill_pairs": "i2 i1 i1 i1",
         "_find_slots": "i2 i1 i1 i1 i1",
         "_reduce": "f2 f3 i1 i",
-        "_scatter": "f3 i2 i3 i1 i1 f3 f1",
+        "_scatter": "f3 i2 i3 i1 i1 f3 i i f1",
         "_unique_rows": "i1 i1",
     },
     "nets.chebyshev": {
@@ -99,10 +99,11 @@ KERNELS: dict[str, dict[str, str]] = {
         "_add_product": "f3 i2 f2 f2",
     },
     "solve.sparse_ldl": {
+        "_backward": "i1 f1 i1 i1 i1 i1 f1 f1 f1 f1",
+        "_forward": "i1 f1 i1 f1 i1 i1 i1 i1 f1 f1 f1",
         "_dissect": "f2 i2 i1 i1",
         "_numeric": "i1 f1 i1 i1 i1 i1 i1 i2 i1 i1 i1 i1 i1 f1 f1 f1 f1 f1",
         "_residual": "i1 i1 f1 f1 f1",
-        "_solve": "f1 i1 i1 i1 i1 f1 f1 f1 f1",
     },
     "solve.symbolic": {
         "_children": "i1 i1",

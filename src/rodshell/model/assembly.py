@@ -3,12 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints, Longs
 from rodshell.kernels import njit
+from rodshell.threads import in_threads, threads
 from rodshell.validation import brief
+
+WORTHWHILE = 300_000  # values from which on threads share the assembly
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +147,10 @@ class Assembly:
         slots = tuple(_find_slots(blocks, count, start, rows, slot) for blocks in element_blocks)
         return Assembly(indptr, indices, count, above, slots)
 
+    def has_pattern_of(self, other: "Assembly") -> bool:
+        """Whether the matrices of another assembly have the same pattern, whatever elements they are summed from."""
+        return np.array_equal(self.indptr, other.indptr) and np.array_equal(self.indices, other.indices)
+
     def assemble(self, hessians: Sequence[Floats], element_blocks: Sequence[Ints], freedom: Freedom) -> Floats:
         """(nnz,) values of the reduced Hessian, from the element Hessians (m, 3k, 3k) and blocks (m, k) of each set.
 
@@ -152,9 +160,14 @@ class Assembly:
         element_blocks : of each element set, (m, k) blocks of its elements.
         freedom : free directions, as many of each block as in the plan.
         """
-        data = np.zeros(len(self.indices))
-        for index, (hessian, blocks) in enumerate(zip(hessians, element_blocks, strict=True)):
-            self.add(index, hessian, blocks, freedom, data)
+        data, sets = np.zeros(len(self.indices)), list(zip(hessians, element_blocks, self._slots, strict=True))
+        parts = self._parts
+
+        def add(part: int, _: int) -> None:
+            for hessian, blocks, slots in sets:
+                _scatter(hessian, blocks, slots, self._count, self._above, freedom.directions, *parts[part], data)
+
+        in_threads(add, len(parts))
         return data
 
     def add(self, index: int, hessian: Floats, blocks: Ints, freedom: Freedom, data: Floats) -> None:
@@ -169,7 +182,16 @@ class Assembly:
         data : (nnz,) values to which theirs are added.
         """
         if len(blocks):
-            _scatter(hessian, blocks, self._slots[index], self._count, self._above, freedom.directions, data)
+            every = 0, len(self._count)
+            _scatter(hessian, blocks, self._slots[index], self._count, self._above, freedom.directions, *every, data)
+
+    @cached_property
+    def _parts(self) -> list[tuple[int, int]]:
+        """Ranges of blocks in whose columns about as many values are stored, one for each thread."""
+        count = threads() if len(self.indices) >= WORTHWHILE else 1
+        columns = np.searchsorted(self.indptr, np.linspace(0, len(self.indices), count + 1))
+        stops = np.searchsorted(np.cumsum(self._count), columns).tolist()
+        return list(pairwise([0, *stops[1:-1], len(self._count)]))
 
     @property
     def diagonal(self) -> Ints:
@@ -281,13 +303,16 @@ def _find_slots(blocks, count, start, rows, slot):  # type: ignore[no-untyped-de
     return slots
 
 
-@njit(error_model="numpy")
-def _scatter(hessians, blocks, slots, count, above, directions, data):  # type: ignore[no-untyped-def]
-    """Add T' H T of every element; T holds the free directions of its blocks as columns."""
+@njit(error_model="numpy", nogil=True)
+def _scatter(hessians, blocks, slots, count, above, directions, low, high, data):  # type: ignore[no-untyped-def]
+    """Add T' H T of every element, in the columns of blocks from `low` to before `high`; T holds the free directions of
+    its blocks as columns."""
     k = blocks.shape[1]
     for m in range(blocks.shape[0]):
         for b in range(k):
             j = blocks[m, b]
+            if not low <= j < high:
+                continue
             for a in range(k):
                 base = slots[m, a, b]
                 if base < 0:

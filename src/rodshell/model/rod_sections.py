@@ -75,11 +75,15 @@ class RodSections:
 
 def _uniform(rods: Sequence[Rod]) -> Floats:
     """(m, 6) EI1, EI2, GJ, EA, mass and rotary inertia per length of each rod; computed once for each that differs."""
-    known: dict[int, tuple[float, ...]] = {}
-    for rod in {id(rod): rod for rod in rods}.values():
-        bends, twist, mass = rod.bend_stiffnesses, rod.twist_stiffness, rod.mass_per_length
-        known[id(rod)] = (*bends, twist, rod.stretch_stiffness, mass, rod.rotary_inertia)
-    return np.array([known[id(rod)] for rod in rods]).reshape(-1, 6)
+    different = (rods[0],) if rods and rods.count(rods[0]) == len(rods) else tuple(dict.fromkeys(rods))
+    values = np.array([
+        (*rod.bend_stiffnesses, rod.twist_stiffness, rod.stretch_stiffness, rod.mass_per_length, rod.rotary_inertia)
+        for rod in different
+    ]).reshape(-1, 6)  # fmt: skip
+    if len(different) == 1:
+        return np.tile(values, (len(rods), 1))
+    row = {rod: k for k, rod in enumerate(different)}
+    return np.asarray(values[[row[rod] for rod in rods]])
 
 
 def _inverse(rod: Rod, varies: str, factors: Floats) -> Floats:

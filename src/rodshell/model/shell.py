@@ -240,9 +240,9 @@ class _Builder:
         clamped: bool,
         twist: bool | None,
     ) -> None:
-        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
-        for item in self.rods:
+        for item in rod if isinstance(rod, Sequence) else (rod,):
             instance("rod", item, Rod)
+        self.rods = _per_item(rod, len(mesh.grid.rods), "rods")
         self.joints, self.joint_of = _kinds(_per_item(joint or Ball(), len(mesh.grid.crossings), "crossings"))
         if isinstance(joint, Sequence):
             refuse_mixtures(mesh.joint_nodes, joint)
@@ -270,9 +270,9 @@ class _Builder:
         rest = shared + np.arange(len(self.ghosts) + self.angles)
         self.like = np.append(mesh.rod_nodes if self.apart else np.arange(shared), rest)
 
-    def _of_joints(self, value: Callable[[Joint], object]) -> NDArray[Any]:
-        """A value of each joint (c,)."""
-        return np.array([value(joint) for joint in self.joints])[self.joint_of]
+    def _of_joints(self, value: Callable[[Joint], object], kind: type = float) -> NDArray[Any]:
+        """A value of each joint (c,), float or bool."""
+        return np.array([value(joint) for joint in self.joints], dtype=kind)[self.joint_of]
 
     def shell(self) -> Shell:
         mesh, parts = self.mesh, self.parts
@@ -291,7 +291,7 @@ class _Builder:
         """Block of the first twist angle of each rod that could spin about itself."""
         if not (self.isotropic and self.twist):
             return np.empty(0, dtype=np.intp)
-        holding = self._of_joints(lambda joint: joint.holds_normals)
+        holding = self._of_joints(lambda joint: joint.holds_normals, bool)
         held = np.unique(self.mesh.grid.crossings.rods[holding])
         loose = np.setdiff1d(np.arange(len(self.rods)), held)
         return self.first_angle + np.searchsorted(self.mesh.edge_rods, loose)
@@ -343,7 +343,9 @@ class _Builder:
 
     def _elastic(self) -> tuple[Elements, ...]:
         """Joints other than linkers."""
-        crossings = np.flatnonzero(self._of_joints(lambda joint: isinstance(joint, Elastic) and joint.turns_frames))
+        crossings = np.flatnonzero(
+            self._of_joints(lambda joint: isinstance(joint, Elastic) and joint.turns_frames, bool)
+        )
         joints = [self.joints[kind] for kind in self.joint_of[crossings].tolist()]
         return elastic_joints(self.rod_nodes, crossings, joints, self.stiffness, self.size)
 
@@ -384,7 +386,7 @@ class _Builder:
         if not self.apart:
             return []
         eccentricity = self._of_joints(lambda joint: joint.eccentricity)
-        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not isinstance(joint, Linker))
+        centric = (eccentricity == 0.0) & self._of_joints(lambda joint: not isinstance(joint, Linker), bool)
         pairs = self.rod_nodes.blocks[self.rod_nodes.at_crossings[centric]]
         ties = [_ties(pairs, self._penalties()[0])] if centric.any() else []
         return [*ties, *offset_ties(self.rod_nodes, eccentricity, self._offset_stiffness(), self.size)]

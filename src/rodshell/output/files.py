@@ -214,6 +214,7 @@ def _csv(content: Content) -> Files:
         "supports": schedules.supports_table,
     }
     tables |= {"bracing": schedules.bracing_table} if fabrication and fabrication.bracing else {}
+    tables |= {"foundations": schedules.foundations_table} if results.loads else {}
     tables |= {"stock": schedules.stock_table} if fabrication and fabrication.stock else {}
     tables |= {"sections": schedules.sections_table} if any(rod.stiffness for rod in results.rods) else {}
     tables |= {"seams": schedules.seams_table} if results.seams else {}
@@ -301,7 +302,7 @@ KINDS: dict[str, Callable[[Content], Files]] = {
 DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
-_SCHEDULES = ("rods", "joints", "supports", "bracing", "stock", "sections", "seams", "end_paths")
+_SCHEDULES = ("rods", "joints", "supports", "foundations", "bracing", "stock", "sections", "seams", "end_paths")
 _STAGES = ("flat", "stage_[0-9]*", "popped_pinned")
 
 NAMES: dict[str, list[str]] = {

@@ -16,7 +16,8 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.output.grid import GridRod, joints_of, rods_of
 from rodshell.results import Archive, Results
-from rodshell.results.records import Meeting, printable
+from rodshell.results.loaded import LoadedShell
+from rodshell.results.records import Ends, Meeting, printable
 from rodshell.results.verdict import ENDS
 from rodshell.results.wording import FINEST, Rounding, rounding_of
 
@@ -235,12 +236,57 @@ def seams_table(archive: Archive) -> Table:
     return columns, [[*row, *of_row] for row, of_row in zip(rows, forces, strict=True)]
 
 
-def bracing_table(archive: Archive) -> Table:
-    """One row a diagonal."""
-    braces = archive.results.fabrication.bracing if archive.results.fabrication else ()
-    mm = rounding_of(archive.results).mm
+def bracing_table(archive: Archive, *, brief: bool = False) -> Table:
+    """One row a diagonal: its length flat and in the final shape, of cables also free of stress; where loads were
+    checked its axial force under each combination, tension positive, and which leave it slack.
+
+    Parameters
+    ----------
+    brief : only the columns that have room on a sheet.
+    """
+    results, mm = archive.results, rounding_of(archive.results).mm
+    braces = results.fabrication.bracing if results.fabrication else ()
+    columns = ["from", "to", "flat_mm", "final_mm"]
     rows = [[brace.start, brace.end, mm(brace.flat), mm(brace.final)] for brace in braces]
-    return ["from", "to", "flat_mm", "final_mm"], rows
+    cables = any(brace.cut is not None for brace in braces)
+    if cables:
+        columns.append("cut_mm")
+        rows = [[*row, mm(brace.cut)] for row, brace in zip(rows, braces, strict=True)]
+    loaded = {(name, ends): shell.bracing for name, ends, shell in _loaded(results) if shell.bracing}
+    if loaded and not brief:
+        columns += [f"force_N_{ends}_{name}" for name, ends in loaded]
+        rows = [[*row, *(_six(forces[k]) for forces in loaded.values())] for k, row in enumerate(rows)]
+    if loaded and cables:
+        columns.append("slack_under")
+        slack = [
+            [f"{name} ({ends})" for (name, ends), forces in loaded.items() if forces[k] == 0] for k in range(len(rows))
+        ]
+        rows = [[*row, "; ".join(names)] for row, names in zip(rows, slack, strict=True)]
+    return columns, rows
+
+
+def foundations_table(archive: Archive) -> Table:
+    """One row a rod end: its place, and what its support exerts on the shell under each combination of loads, with what
+    it exerts on the unloaded shell; the foundation carries the opposite.
+    """
+    results, mm = archive.results, rounding_of(archive.results).mm
+    columns = ["id", *(f"{axis}_mm" for axis in "xyz")]
+    names = [f"{rod.id}.{end}" for rod in rods_of(archive) for end in (0, 1)]
+    rows = [[name, *map(mm, place)] for name, place in zip(names, results.boundary, strict=True)]
+    for name, ends, shell in _loaded(results):
+        held = {"force": ("N", shell.support_forces)}
+        if any(value for moment in shell.support_moments for value in moment):
+            held["moment"] = ("Nm", shell.support_moments)
+        columns += [f"{what}_{axis}_{unit}_{ends}_{name}" for what, (unit, _) in held.items() for axis in "xyz"]
+        rows = [[*row, *(_six(value) for _, each in held.values() for value in each[k])] for k, row in enumerate(rows)]
+    return columns, rows
+
+
+def _loaded(results: Results) -> Iterator[tuple[str, Ends, LoadedShell]]:
+    """Every combination of loads with each end condition, and the shell under it."""
+    for name, by_ends in results.loads.items():
+        for ends, shell in by_ends.items():
+            yield name, ends, shell
 
 
 def stock_table(archive: Archive) -> Table:

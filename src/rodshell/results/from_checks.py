@@ -303,9 +303,19 @@ def _other_shapes(searched: ShapeSearch) -> OtherShapes:
     )
 
 
-def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fabrication:
+def joint_names(mesh: GridMesh) -> list[str]:
+    """Ids of the joints, the two rods' ids with a slash, in the order of the grid's crossings.
+
+    Parameters
+    ----------
+    mesh : of the flat grid.
+    """
     names = [rod.name for rod in mesh.grid.rods]
-    joints = ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
+    return ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
+
+
+def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fabrication:
+    names, joints = [rod.name for rod in mesh.grid.rods], joint_names(mesh)
     joint_mass = (results.joint.mass if results.joint else None) or 0.0
     stock = dict[str, Any]()
     if fabricated.nesting is not None:
@@ -318,7 +328,13 @@ def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fa
         kerf=fabricated.options.kerf,
         total_mass=float(fabricated.mass.sum()) + len(joints) * joint_mass,
         bracing=tuple(
-            Brace(start=joints[brace.joints[0]], end=joints[brace.joints[1]], flat=brace.flat, final=brace.final)
+            Brace(
+                start=joints[brace.joints[0]],
+                end=joints[brace.joints[1]],
+                flat=brace.flat,
+                final=brace.final,
+                **({} if brace.cut is None else {"cut": brace.cut}),
+            )
             for brace in fabricated.bracing
         ),
         **stock,

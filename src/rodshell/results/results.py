@@ -12,6 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, ValidationError
 
 from rodshell.errors import OutputError
+from rodshell.results.loaded import LoadCases
 from rodshell.results.records import (
     Agreement,
     Bent,
@@ -187,6 +188,7 @@ class Brace(Record):
     end: Text = required("id of the second joint", alias="to")
     flat: Number = key("length in the flat grid", "m")
     final: Number = key("length in the final shape", "m")
+    cut: Number = key("length of a cable free of stress; absent without bracing of cables", "m")
 
 
 class Piece(Record):
@@ -218,7 +220,7 @@ class Fabrication(Record):
     stock_length: Number = key("length of the bars; null: every rod comes in one piece", "m")
     kerf: Number = key("length lost at each saw cut", "m")
     total_mass: Number = key("mass of rods and joints", "kg")
-    bracing: Rows[Brace] = rows("diagonals of the cells, both of a cell in a row")
+    bracing: Rows[Brace] = rows("diagonals of the cells, those of a cell in a row")
     stock: Stock | None = key("the cutting plan")
 
 
@@ -288,6 +290,7 @@ class Results(Record):
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
+    loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
     deployment: Deployment | None = key("the shell from flat to popped up")
     contact: Contact | None = key("contact of rods with each other")
     other_shapes: ByEnds[OtherShapes] = by_ends("other stable shapes on the same supports")
@@ -423,6 +426,14 @@ def contradictions(results: Results) -> Iterator[str]:
     counts = {"footprint": results.footprint, "boundary": results.boundary, "end_tangents": results.end_tangents}
     for support, held in results.reactions.items():
         counts |= {f"reactions.{support}.forces": held.forces, f"reactions.{support}.moments": held.moments}
+    for name, supported in results.loads.items():
+        for support, loaded in supported.items():
+            where = f"loads.{name}.{support}"
+            counts |= {f"{where}.reactions": loaded.reactions, f"{where}.support_forces": loaded.support_forces}
+            counts[f"{where}.support_moments"] = loaded.support_moments
+            braces = len(results.fabrication.bracing) if results.fabrication else 0
+            if len(loaded.bracing) not in (0, braces):
+                yield f"{where}.bracing has {len(loaded.bracing)} entries for {braces} braces"
     for name, points in counts.items():
         if len(points) not in (0, 2 * len(ids)):
             yield f"{name} has {len(points)} points for {len(ids)} rods: there must be two for each"
@@ -437,6 +448,10 @@ def _named_rods(results: Results) -> Iterator[tuple[str, str]]:
             yield from ((f"joint_loads.{support}[{k}].rods", name) for name in load.rods)
     bent = results.bending.shapes() if results.bending else {}
     yield from ((f"bending.{shape}.rod", worst.rod) for shape, worst in bent.items() if worst.rod is not None)
+    for name, supported in results.loads.items():
+        for support, loaded in supported.items():
+            if loaded.governs is not None:
+                yield f"loads.{name}.{support}.governs.rod", loaded.governs.rod
     for shape in ("pinned", "clamped", "deployment"):
         nearest = results.contact.of(shape) if results.contact else None
         yield from ((f"contact.{shape}.rods", name) for name in (nearest.rods if nearest else None) or ())

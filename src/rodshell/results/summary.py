@@ -42,6 +42,7 @@ def summary_text(results: Results) -> str:
     lines += _pop_up(results, length)
     lines += _bending(results, length)
     lines += _weight_and_reactions(results, length)
+    lines += _loads(results, length)
     lines += _deployment(results)
     lines += [f"  dropped   {rod.id}: {rod.reason}" for rod in results.dropped[:MOST_DROPPED]]
     if len(results.dropped) > MOST_DROPPED:
@@ -206,6 +207,23 @@ def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
         yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N unloaded; sums of {sums}"
+
+
+def _loads(results: Results, length: Length) -> Iterator[str]:
+    """What each combination of loads does, a line for each end condition."""
+    for name, by_ends in results.loads.items():
+        for ends, found in by_ends.items():
+            limit = "over 100" if found.limit_factor is None else rounded(found.limit_factor)
+            line = f"  {name:<9} {ends:<8}stable up to {limit} times the loads ({found.limit_kind})"
+            if found.linear_factor is not None:
+                line += f", linear {rounded(found.linear_factor)}"
+            if found.imperfect_factor is not None:
+                line += f", with imperfections {rounded(found.imperfect_factor)}"
+            at = "" if found.at_factor == 1 else f" at {rounded(found.at_factor or 0.0)} times"
+            line += f"; deflection{at} {length(found.max_deflection)}"
+            if found.utilisation is not None:
+                line += f", {percent(found.utilisation)} of the strength"
+            yield line
 
 
 def _deployment(results: Results) -> Iterator[str]:

@@ -110,6 +110,27 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
         yield f"with {ends} ends the shell is unstable{count} and would snap to another shape"
     yield from _contact_faults(results, ends)
     yield from _fibre_faults(results, ends)
+    yield from _load_faults(results, ends)
+
+
+def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
+    """Combinations of loads under which the shell falls or breaks."""
+    for name, by_ends in results.loads.items():
+        found = by_ends.get(ends)
+        if found is None:
+            continue
+        limit, used = found.limit_factor, found.utilisation
+        if found.limit_kind == "unstable unloaded":
+            yield f"with {ends} ends the shell is unstable before the loads of {name} act"
+        elif limit is not None and limit < 1 and found.limit_kind != "not followed":
+            how = "snaps through" if found.limit_kind == "limit point" else "buckles"
+            yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded(limit)} times these loads"
+        if used is not None and used > 1:
+            place = found.governs
+            where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
+            at = "" if found.at_factor == 1 else f" already at {rounded(found.at_factor or 0.0)} times these loads"
+            share = f"{max(101, round(100 * used))} % of their strength"
+            yield f"with {ends} ends the rods would break under {name}{at}: {share}{where}"
 
 
 def _contact_faults(results: Results, shape: str) -> Iterator[str]:
@@ -181,6 +202,15 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
     if any(shells[ends].stable is None for ends in usable):
         yield "whether the shell is stable was not checked"
     yield from _weight(results, usable)
+    for name, by_ends in results.loads.items():
+        for ends in usable:
+            if ends not in by_ends:
+                yield f"{name} with {ends} ends was not checked"
+            elif by_ends[ends].imperfect_factor is not None and (by_ends[ends].imperfect_factor or 0.0) < 1:
+                yield (
+                    f"with {ends} ends and imperfections the shell falls under {name} at "
+                    f"{rounded(by_ends[ends].imperfect_factor or 0.0)} times these loads"
+                )
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
     yield from _rods(results, usable)
@@ -274,10 +304,16 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
         else ""
     )
     yield f"with {' and '.join(usable)} ends the shell is stable and carries {weight} times its own weight{near}"
-    yield (
-        "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
-        "people) and imperfections were not checked"
-    )
+    if not results.loads:
+        yield (
+            "stresses and support forces are those of the unloaded shell; loads other than its own weight (snow, wind, "
+            "people) and imperfections were not checked"
+        )
+    for name, by_ends in results.loads.items():
+        limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
+        least = min((limit for limit in limits if limit is not None), default=None)
+        most = "over 100" if least is None else rounded(least)
+        yield f"under {name} it is stable up to {most} times these loads"
 
 
 def _mm(results: Results, metres: float | None) -> str:

@@ -278,7 +278,7 @@ def _transported(x, stencils, sources, source_directors, source_twist, tangents,
         twist[b] = angle + 2.0 * np.pi * np.floor((source_twist[b] - angle) / (2.0 * np.pi) + 0.5)
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", nogil=True, fastmath={"contract"})
 def _bend_twist(  # type: ignore[no-untyped-def]
     x, stencils, bend, twist, natural, natural_twist, tangents, directors, source_twist, gradient, hessians
 ):

@@ -11,16 +11,19 @@ N0 = 0 is the paper's elastic edge. With a multiplier N0 it is the augmented Lag
 edge: at the solution the strain vanishes and N0 is the axial force.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.kernels import njit
+from rodshell.threads import in_threads
 from rodshell.validation import brief
 
 NO_HESSIANS = np.empty((0, 0, 0))
+WORTHWHILE = 30_000  # elements from which on threads share a set
 
 
 class Elements(Protocol):
@@ -123,6 +126,56 @@ def _exploded(elements: Elements, state: Floats) -> tuple[Elements, Floats]:
     """The elements on blocks of their own, and the state there."""
     rows = np.arange(elements.blocks.size, dtype=elements.blocks.dtype).reshape(elements.blocks.shape)
     return replace(elements, blocks=rows), state[elements.blocks].reshape(-1, 3)  # type: ignore[type-var]
+
+
+def in_parts(elements: Elements, most: int) -> list[Elements]:
+    """Elements cut into parts of at most `most`; their arrays with a row for each are those as long as `blocks`.
+
+    Parameters
+    ----------
+    elements : to be cut; those that cannot be are one part.
+    most : number of elements of a part.
+    """
+    count = len(elements.blocks)
+    if count <= most or not is_dataclass(elements):
+        return [elements]
+    if any(is_dataclass(getattr(elements, field.name)) for field in fields(elements)):  # rows of its own inside
+        return [elements]
+    rows = {field.name: getattr(elements, field.name) for field in fields(elements)}
+    rows = {name: row for name, row in rows.items() if isinstance(row, np.ndarray) and len(row) == count}
+    return [
+        replace(elements, **{name: np.ascontiguousarray(row[k : k + most]) for name, row in rows.items()})
+        for k in range(0, count, most)
+    ]
+
+
+def evaluate_all(sets: Sequence[Elements], state: Floats, gradient: Floats, hessians: Sequence[Floats]) -> None:
+    """Evaluate sets of elements, see `Elements.evaluate`; threads share large ones.
+
+    Each thread has half of every set. The halves have gradients of their own, which are added in the end, so that the
+    sum does not depend on the threads.
+
+    Parameters
+    ----------
+    sets : of elements.
+    state, gradient : (N, 3), see `Elements.evaluate`.
+    hessians : of each set, (m, 3k, 3k) or empty.
+    """
+    if max((len(elements.blocks) for elements in sets), default=0) < WORTHWHILE:
+        for elements, of_set in zip(sets, hessians, strict=True):
+            elements.evaluate(state, gradient, of_set)
+        return
+    halves = [in_parts(elements, (len(elements.blocks) + 1) // 2) for elements in sets]
+    gradients = gradient, np.zeros_like(gradient)
+
+    def evaluate(half: int, _: int) -> None:
+        for parts, of_set in zip(halves, hessians, strict=True):
+            if half < len(parts):
+                first = len(parts[0].blocks)
+                parts[half].evaluate(state, gradients[half], of_set[first:] if half else of_set[:first])
+
+    in_threads(evaluate, 2)
+    gradient += gradients[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +306,7 @@ class Stretch:
         return self
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def _stretch(x, edges, rest, stiffness, multipliers, forces, exact, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_a, x_b) [m]; energies [J], from HQK Eq 1a."""
     wanted = hessians.shape[0] > 0

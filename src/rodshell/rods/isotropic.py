@@ -112,7 +112,7 @@ class IsotropicBendTwist(BendTwist):
         )
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, x_1, x_2) [m]; energies [J]. e = x_1 - x_0, f = x_2 - x_1; s, t their unit vectors."""
     wanted = hessians.shape[0] > 0
@@ -172,7 +172,7 @@ def _isotropic_bend(x, bends, stiffness, gradient, hessians):  # type: ignore[no
     return energy
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit(error_model="numpy", nogil=True, fastmath={"contract"})
 def _isotropic_bend_twist(x, stencils, bend, twist, natural_twist, sources, source_twist, gradient, hessians):  # type: ignore[no-untyped-def]
     """Stencil (x_0, theta_e, x_1, theta_f, x_2) [m, rad]; energies [J].
 

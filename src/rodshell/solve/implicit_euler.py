@@ -23,7 +23,7 @@ can hold slip, with the force of friction held over the rest of the step.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Protocol, Self, TypeVar
 
@@ -33,7 +33,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.kernels import njit
 from rodshell.model import Freedom
-from rodshell.rods.elements import NO_HESSIANS, Elements
+from rodshell.rods.elements import NO_HESSIANS, Elements, in_parts
 from rodshell.solve.newton_matrix import SummedMatrix, narrow_or_sparse
 from rodshell.solve.problem import NO_CURVATURE, Constraint, Damping, Force, ImplicitForce, PointLoads, Supports
 from rodshell.solve.sparse_ldl import SingularError
@@ -127,7 +127,7 @@ class Motion:
         ----------
         most : elements of a set.
         """
-        return replace(self, elements=tuple(part for element in self.elements for part in _parts(element, most)))
+        return replace(self, elements=tuple(part for element in self.elements for part in in_parts(element, most)))
 
 
 @dataclass(frozen=True)
@@ -414,21 +414,6 @@ class _Newton:
 
     def _size(self, motion: Floats) -> float:
         return float(_mass_norm(self.motion.mass.ravel(), motion.ravel()))
-
-
-def _parts(elements: Elements, most: int) -> list[Elements]:
-    """`elements` cut up; the arrays with a row for each element are those as long as `blocks`."""
-    count = len(elements.blocks)
-    if count <= most or not is_dataclass(elements):
-        return [elements]
-    if any(is_dataclass(getattr(elements, field.name)) for field in fields(elements)):  # rows of its own inside
-        return [elements]
-    rows = {field.name: getattr(elements, field.name) for field in fields(elements)}
-    rows = {name: row for name, row in rows.items() if isinstance(row, np.ndarray) and len(row) == count}
-    return [
-        replace(elements, **{name: np.ascontiguousarray(row[k : k + most]) for name, row in rows.items()})
-        for k in range(0, count, most)
-    ]
 
 
 @njit(error_model="numpy")

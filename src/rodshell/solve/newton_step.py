@@ -14,7 +14,7 @@ import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.kernels import njit
-from rodshell.rods.elements import NO_HESSIANS, Elements
+from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
 from rodshell.solve.problem import Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
@@ -129,15 +129,16 @@ class NewtonStep:
         stretch = problem.stretch.with_forces(forces, multipliers=base)
         self._free = free = problem.constraint.freedom(state)
         gradient = np.zeros_like(state) if problem.load is None else -problem.load
-        for element, hessians in zip(self.elements, self._hessians, strict=False):
-            element.evaluate(state, gradient, NO_HESSIANS if self._chord else hessians)
+        count = len(self.elements)
+        hessians = [NO_HESSIANS] * count if self._chord else self._hessians[:count]
+        evaluate_all(self.elements, state, gradient, hessians)
         if self._chord:  # what the edges lack acts along those of the matrix, else strains do not settle
             stretch.add_axial(state, forces, gradient)
             stretch.add_axial(at, base + stretch.stiffness * strains - forces, gradient)
         else:
             by_force = gradient.copy()
             stretch.add_axial(state, forces, by_force)
-            stretch.evaluate(state, gradient, self._hessians[-2])
+            evaluate_all((stretch,), state, gradient, self._hessians[-2:-1])
             curvature = problem.constraint.curvature(state, by_force)
             self._hessians[-1][:] = curvature if len(curvature) else 0.0
         prescribed = problem.constraint.remaining(state)

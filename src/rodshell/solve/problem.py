@@ -152,7 +152,8 @@ class Problem:
     load : (n, 3) dead forces [N], or None.
     flat_coordinates : (n, 2) where the blocks lie in the flat grid [m], from which the order of elimination follows,
         or None.
-    pattern : of a problem that was solved before; where this one has the same, it need not be analysed again.
+    pattern : of a problem that was solved before; where the matrices of this one have the same pattern, they are not
+        analysed again.
     """
 
     elements: tuple[Elements, ...]
@@ -210,7 +211,10 @@ class Problem:
         if self.pattern is not None and self.pattern.serves(blocks, free.count):
             return self.pattern
         assembly = Assembly.of(blocks, free)
-        solver = linear_solver(assembly.indptr, assembly.indices, free, self.flat_coordinates)
+        if self.pattern is not None and assembly.has_pattern_of(self.pattern.assembly):
+            solver = self.pattern.solver
+        else:
+            solver = linear_solver(assembly.indptr, assembly.indices, free, self.flat_coordinates)
         return Pattern(blocks, free.count, assembly, solver)
 
     def refreshed(self, state: Floats) -> Self:

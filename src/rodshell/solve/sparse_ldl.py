@@ -11,8 +11,7 @@ eliminated, what remains is the update matrix for its parent (Duff and Reid 1983
 once per pattern (`symbolic`).
 """
 
-import os
-from threading import Thread
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -23,9 +22,12 @@ from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
 from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
+from rodshell.threads import in_threads, threads
 
 ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
-MOST_THREADS = 4  # the last part is one thread's work
+
+
+NONE_ABOVE, NOTHING = np.empty(0, dtype=np.int64), np.empty(0)
 
 
 class SingularError(ArithmeticError):
@@ -139,6 +141,7 @@ class Multifrontal:
         blocks = blocks_of(indptr, indices, begin)
         order = _minimum_degree(indptr, indices) if coordinates is None else _dissected(coordinates, blocks)
         self.plan = plan_of(indptr, indices, blocks, order)
+        self.parts = self.plan.each
         self._spare = list[_Scratch]()  # scratch memory that no factorisation is using
 
     @property
@@ -158,6 +161,17 @@ class Multifrontal:
         if not regular:
             raise SingularError("a pivot of the factorisation vanishes")
         return MultifrontalFactors(self, data, panels, pivots)
+
+    @cached_property
+    def above(self) -> tuple[Longs, Longs]:
+        """Permuted unknowns (m,) of the plan's last part, if it is not the only one; and the place (n,) of each unknown
+        among them, or -1."""
+        plan, place = self.plan, np.full(len(self.indptr) - 1, -1)
+        *separate, last = self.parts
+        columns = [np.arange(plan.first[s], plan.first[s + 1]) for s in last.tolist()] if separate else []
+        unknowns = np.concatenate([*columns, np.arange(0)])
+        place[unknowns] = np.arange(len(unknowns))
+        return unknowns, place
 
     def _new_scratch(self) -> _Scratch:
         plan = self.plan
@@ -187,10 +201,25 @@ class MultifrontalFactors:
 
     def _substitute(self, right: Floats) -> Floats:
         assert self._memory is not None, GIVEN_AWAY
-        plan = self._solver.plan
-        x = right[plan.order]
-        row, aside = room(plan.largest_front), room(2 * plan.largest_front)
-        _solve(x, plan.first, plan.row_start, plan.rows, plan.panel_start, *self._memory, row, aside)
+        plan, (panels, pivots) = self._solver.plan, self._memory
+        x, parts = right[plan.order], self._solver.parts
+        fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
+        memory = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in range(threads() if last else 1)]
+        above, place = self._solver.above
+        sums = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
+
+        def rise(part: int, thread: int) -> None:
+            _forward(parts[part], x, place, sums[part], *fronts, *memory[thread])
+
+        def descend(part: int, thread: int) -> None:
+            _backward(parts[part], x, *fronts, pivots, *memory[thread])
+
+        if last:
+            in_threads(rise, last, most=len(memory))
+            x[above] += sums.sum(axis=0)
+        _forward(parts[last], x, NONE_ABOVE, NOTHING, *fronts, *memory[0])
+        descend(last, 0)
+        in_threads(descend, last, most=len(memory))
         result = np.empty_like(x)
         result[plan.order] = x
         return result
@@ -199,37 +228,22 @@ class MultifrontalFactors:
 def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats) -> bool:
     """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on the
     threads. False where a pivot vanishes or is not finite."""
-    starts = plan.part_start
-    separate, regular = iter(range(len(starts) - 2)), [True]
+    regular, last = list[bool](), len(plan.each) - 1
 
-    def run(part: int, memory: tuple[Floats, Floats]) -> bool:
-        return bool(
+    def run(part: int, thread: int) -> None:
+        regular.append(
             _numeric(
-                plan.parts[starts[part] : starts[part + 1]], data, plan.first, plan.row_start,
+                plan.each[part], data, plan.first, plan.row_start,
                 plan.child_start, plan.children, plan.run_start, plan.runs,
                 plan.entry_start, plan.entry_source, plan.entry_place,
-                plan.panel_start, plan.update_start, scratch.stacks, *memory, panels, pivots,
+                plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
             )
         )  # fmt: skip
 
-    def work(memory: tuple[Floats, Floats]) -> None:
-        for part in separate:
-            regular.append(run(part, memory))
-
-    others = [Thread(target=work, args=(memory,)) for memory in scratch.threads[1 : len(starts) - 2]]
-    for thread in others:
-        thread.start()
-    work(scratch.threads[0])
-    for thread in others:
-        thread.join()
-    return all(regular) and run(len(starts) - 2, scratch.threads[0])
-
-
-def threads() -> int:
-    """Threads of a factorisation: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
-    asked = os.environ.get("NUMBA_NUM_THREADS", "")
-    processors = os.cpu_count() or 1
-    return min(int(asked) if asked.isdigit() else processors, processors, MOST_THREADS)
+    in_threads(run, last, most=len(scratch.threads))
+    if all(regular):
+        run(last, 0)
+    return all(regular)
 
 
 def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:
@@ -312,11 +326,11 @@ def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
     return residual, largest
 
 
-@njit(error_model="numpy")
-def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
-    """Forward and backward substitution in place, supernode by supernode."""
-    supers = len(first) - 1
-    for s in range(supers):
+@njit(error_model="numpy", nogil=True)
+def _forward(part, x, above, sums, first, row_start, rows, panel_start, panels, local, aside):  # type: ignore[no-untyped-def]
+    """Forward substitution in place, supernode by supernode of a `part`. What goes to unknowns outside of the part is
+    added to `sums` (m,), at the place that `above` (n,) gives them; it is -1 within the part, or empty."""
+    for s in part:
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
@@ -326,8 +340,18 @@ def _solve(x, first, row_start, rows, panel_start, panels, pivots, local, aside)
         for i in range(width):
             x[first[s] + i] = values[i]
         for i in range(width, size):
-            x[rows[row_start[s] + i]] += values[i]
-    for s in range(supers - 1, -1, -1):
+            row = rows[row_start[s] + i]
+            if len(above) > 0 and above[row] >= 0:
+                sums[above[row]] += values[i]
+            else:
+                x[row] += values[i]
+
+
+@njit(error_model="numpy", nogil=True)
+def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, local, aside):  # type: ignore[no-untyped-def]
+    """Backward substitution in place, supernode by supernode of a `part`."""
+    for k in range(len(part) - 1, -1, -1):
+        s = part[k]
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]

@@ -5,6 +5,7 @@ of motion. Tree, supernodes and fronts are found from a graph some ten times sma
 how the fronts share threads and memory.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,12 @@ class Plan(NamedTuple):
     stack_size: int
     largest_front: int
     largest_panel: int
+
+    @property
+    def each(self) -> list[Longs]:
+        """The supernodes of each part."""
+        starts = self.part_start.tolist()
+        return [self.parts[begin:stop] for begin, stop in pairwise(starts)]
 
 
 class Blocks(NamedTuple):

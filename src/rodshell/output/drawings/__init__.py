@@ -62,7 +62,7 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], tuple[float, float]]:
         if name == "supports":
             sheets += table("Supports", supports_table(archive, brief=True), paper)
         elif name == "bracing":
-            sheets += table("Bracing", bracing_table(archive), paper)
+            sheets += table("Bracing", bracing_table(archive, brief=True), paper)
     sheets += table("Rods", rods_table(archive, brief=True), paper)
     sheets += table("Joints", joints_table(archive, brief=True), paper)
     if any(rod.stiffness for rod in results.rods):

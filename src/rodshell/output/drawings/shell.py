@@ -1,6 +1,6 @@
 """Drawings of the shell in space: support plan, elevations, bracing plan, and the stages of its erection."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from rodshell.output.grid import joint_places, outlines_of, rods_of
 from rodshell.output.labels import Room, callouts, closed_segments, outward, runs_through, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive
+from rodshell.results.results import Brace
 from rodshell.results.wording import Rounding, nice_ticks, rounding_of
 
 SUPPORTS_LEGEND = (
@@ -287,20 +288,26 @@ def bracing_drawing(archive: Archive, text: float) -> Drawing:
     seen_from_above(pencil, archive, text)
     joints = joint_places(archive, archive.states[final])
     known = archive.results.fabrication.bracing if archive.results.fabrication else ()
-    cells = zip(known[::2], known[1::2], strict=True)  # both diagonals of a cell follow each other
-    drawn = [cell for cell in cells if all({brace.start, brace.end} <= joints.keys() for brace in cell)]
-    braces = [brace for cell in drawn for brace in cell]
+    braces = [brace for brace in known if {brace.start, brace.end} <= joints.keys()]
     ends = 1e3 * np.array([[joints[end][:2] for end in (brace.start, brace.end)] for brace in braces])
     ends = ends.reshape(-1, 2, 2)
     for brace, line in zip(braces, ends, strict=True):
         pencil.line(line, "DIM", pen=Pen("#b08a2e", 0.07 * text), note=f"{brace.start} to {brace.end}")
-    other = ends.reshape(-1, 2, 2, 2)[:, ::-1].reshape(-1, 2, 2)
+    other = ends[_crossing(braces)]
     mm = rounding_of(archive.results).mm
     found = _numbers([mm(brace.final) for brace in braces], ends, other, text)
     pencil.texts += found
     pencil.leave_out(len(braces) - len(found), len(braces), "lengths of diagonals (table Bracing)")
     axes(pencil, text)
     return pencil.done("bracing", "Bracing, true lengths in the final shape", text)
+
+
+def _crossing(braces: Sequence[Brace]) -> list[int]:
+    """Index of the other diagonal of each brace's cell, which is between the same four rods; its own where there is
+    none."""
+    cells = [frozenset(f"{brace.start}/{brace.end}".split("/")) for brace in braces]
+    near = [[j for j in (k - 1, k + 1) if 0 <= j < len(cells) and cells[j] == cells[k]] for k in range(len(cells))]
+    return [found[0] if found else k for k, found in enumerate(near)]
 
 
 def _numbers(words: list[str], ends: Floats, other: Floats, text: float) -> list[Text]:

@@ -1,0 +1,43 @@
+"""`rodshell check`: a case, or an earlier result, under loads."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from rodshell.case import load_case
+from rodshell.cli.options import CaseCommand, output_options, read_output_options
+from rodshell.cli.reporting import run_and_deliver
+from rodshell.errors import InputError
+from rodshell.units import shown
+
+
+@click.command(cls=CaseCommand)
+@click.argument("source", metavar="DIR|CASE")
+@click.option("--loads", metavar="FILE", help="File with [[loads]] and [[combinations]], in place of the case's own.")
+@output_options("Folder for the results; default DIR, or out/CASE.")
+def command(source: str, loads: str | None, **values: Any) -> int:
+    """Check a shell under loads: deflections, reactions, stability and utilisation under each combination.
+
+    DIR is an earlier result, whose case is run again. CASE is a case file or the name of a built-in case. The loads are
+    those of the case, or of FILE, which has tables [[loads]], [[combinations]], [bracing] and [stability].
+    """
+    output = read_output_options(values)
+    path = Path(source)
+    if path.is_dir() and not (path / "case.toml").is_file():
+        raise InputError(
+            f"{source} has no case.toml that could be run again: give a result of rodshell form, or a case"
+        )
+    case = load_case(path / "case.toml" if path.is_dir() else source, {} if loads is None else {"loads": loads})
+    if case.of_table:
+        raise InputError(f"{shown(source)} comes from a table of rods: without a target no areas for loads are known")
+    if case.built_loads() is None:
+        raise InputError(
+            f"{shown(source)} has no loads: give --loads FILE, or [[loads]] and [[combinations]] in the case"
+        )
+    from rodshell.results.archive import kept_case, read_inputs
+
+    names = kept_case(case.to_toml(), read_inputs(case.to_toml()), Path())[1]
+    if path.is_dir() and output.out is None:
+        output = output.into(source)
+    return run_and_deliver(case, source, output, ["case.toml", *names])

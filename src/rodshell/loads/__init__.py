@@ -1,0 +1,1 @@
+"""Loads and their combinations, and what a shell does under them."""

@@ -1,0 +1,131 @@
+"""Bracing of an erected shell: cables along the diagonals of its cells, stressed when they are put in."""
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.errors import InputError
+from rodshell.layout import GridMesh
+from rodshell.layout.cells import Pattern, diagonals
+from rodshell.loads.structure import Structure
+from rodshell.rods.cable import CableStretch
+from rodshell.rods.section import Rod
+from rodshell.solve.equilibrium import find_equilibrium
+from rodshell.targets import Target
+from rodshell.units import percent_text
+from rodshell.validation import brief, choice, instance, not_negative
+
+AcrossOpenings = Literal["refuse", "leave out"]
+SHARES = (0.25, 0.5, 0.75)  # of a diagonal, where it is looked whether the shell is under it
+STEPS = 8  # in which a prestress is applied that is too much for one
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cables:
+    """Cables that carry tension alone, straight from joint to joint, in the outer layer of rods.
+
+    Parameters
+    ----------
+    rod : section and material of the cables; of their stiffnesses EA counts.
+    pattern : "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
+    prestrain : by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
+        brace nothing: factors without prestress are small.
+    across_openings : what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or they
+        are left out.
+    """
+
+    rod: Rod
+    pattern: str = "both"
+    prestrain: float = 0.0
+    across_openings: AcrossOpenings = "refuse"
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        instance("the bracing's rod", self.rod, Rod)
+        Pattern.of(self.pattern)
+        not_negative("the prestrain", self.prestrain)
+        choice("across_openings", self.across_openings, get_args(AcrossOpenings))
+
+    def brace(self, structure: Structure, target: Target) -> Structure:
+        """The structure with its cables stressed, in the equilibrium that it then finds.
+
+        Parameters
+        ----------
+        structure : erected.
+        target : whose openings the cables must not cross.
+
+        Raises
+        ------
+        InputError : a cable crosses an opening; the shell does not withstand the prestress.
+        """
+        mesh, before = structure.mesh, structure.equilibrium
+        pairs = braced_diagonals(mesh, structure.positions(before), target, self.pattern, self.across_openings)
+        blocks = outer_nodes(mesh)[pairs]
+        lengths = np.linalg.norm(before.state[blocks[:, 1]] - before.state[blocks[:, 0]], axis=1)
+        stiffness = np.full(len(blocks), self.rod.stretch_stiffness)
+
+        def stressed(prestrain: float) -> CableStretch:
+            return CableStretch(blocks, lengths / (1.0 + prestrain), stiffness)
+
+        found = before
+        for count in (1, STEPS):
+            found = before
+            for step in range(1, count + 1):
+                members = stressed(self.prestrain * step / count)
+                elements = (*found.elements[: len(structure.shell.elements)], members)
+                problem = replace(before.problem, elements=elements, pattern=found.problem.pattern)
+                found = find_equilibrium(problem, found.state, found.forces)
+                if not found.report.stable:
+                    break
+            if found.report.stable:
+                break
+        if not found.report.stable:
+            raise InputError(
+                f"the bracing pulls the shell out of its shape: with a prestrain of {percent_text(self.prestrain)} no "
+                "stable equilibrium was found; stress it less (bracing.prestrain), or use thinner cables"
+            )
+        mass = np.zeros(structure.shell.node_count)
+        for side in range(2):
+            np.add.at(mass, blocks[:, side], 0.5 * lengths * self.rod.mass_per_length)
+        shell = structure.shell.with_elements(found.elements[: len(structure.shell.elements)])
+        return replace(structure, shell=shell, equilibrium=found, braced=pairs, bracing_mass=mass, cables=members)
+
+
+def braced_diagonals(
+    mesh: GridMesh, positions: Floats, target: Target, pattern: str, across_openings: AcrossOpenings
+) -> Ints:
+    """(d, 2) crossings that diagonals join.
+
+    Parameters
+    ----------
+    mesh : of the grid.
+    positions : (n, 3) of its nodes [m].
+    target : whose openings the diagonals must not cross.
+    pattern, across_openings : as of `Cables`.
+
+    Raises
+    ------
+    InputError : a diagonal crosses an opening, and that is refused; there is no cell.
+    """
+    pairs = diagonals(mesh.grid, Pattern.of(pattern))
+    if not len(pairs):
+        raise InputError("the grid has no cell of four joints that could be braced: use a smaller spacing")
+    ends = positions[mesh.joint_pairs].mean(axis=1)[pairs]
+    points = np.concatenate([(1 - share) * ends[:, 0] + share * ends[:, 1] for share in SHARES])
+    outside = (target.margin(target.retract(points)) < 0).reshape(len(SHARES), -1).any(axis=0)
+    if outside.any() and across_openings == "refuse":
+        x, y, _ = ends[np.argmax(outside)].mean(axis=0)
+        raise InputError(
+            f"{int(outside.sum())} of {len(pairs)} diagonals of the bracing cross an opening of the shell, the first "
+            f'near ({x:.4g}, {y:.4g}) m: set bracing.across_openings to "leave out", or move the opening or the rods'
+        )
+    return np.asarray(pairs[~outside])
+
+
+def outer_nodes(mesh: GridMesh) -> Ints:
+    """(c,) node of each crossing on the outer of its two rods; of rods that share it, the node of both."""
+    pairs = mesh.joint_pairs
+    return np.asarray(pairs[np.arange(len(pairs)), mesh.heights[pairs].argmax(axis=1)])

@@ -1,0 +1,346 @@
+"""A shell under combinations of loads: where it ends up, how far the loads may grow, and what it then uses.
+
+For each combination and end condition the path of equilibria under t times the combination is followed from the
+unloaded shell. What is read off at t = 1 is what the combination does; where the shell falls before, at the last factor
+at which it is stable. Three factors stand side by side: the linear buckling factor about the unloaded shell, the factor
+at which the path loses its stability, and the same of a shell with imperfections in its lowest modes. All multiply the
+whole combination, with the shell's weight if that is in it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.checks.bending import bending_of
+from rodshell.checks.loads import Reactions
+from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
+from rodshell.formfinding import PatchForm, PopUp
+from rodshell.formfinding.popup import Ends
+from rodshell.formfinding.progress import Progress, silent
+from rodshell.loads.combinations import Loads
+from rodshell.loads.kinds import Forces, LoadedNodes, Settlement, Temperature
+from rodshell.loads.laths import Laths
+from rodshell.loads.structure import Strength, Structure
+from rodshell.loads.tributary import Tributary, tributary_areas
+from rodshell.solve.imperfection import imperfect
+from rodshell.solve.load import Load
+from rodshell.solve.load_path import Limit, load_path
+from rodshell.solve.modes import LinearBuckling, linear_buckling
+from rodshell.solve.sparse_ldl import SingularError
+from rodshell.units import shown
+from rodshell.validation import brief
+
+MOST = 100.0  # times a combination: factors above are not looked for
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedShell:
+    """A shell under one combination of loads.
+
+    Parameters
+    ----------
+    at_factor : of the combination under which all but the factors stands: 1, or the last stable factor where the shell
+        loses its stability before; 0 where it is not stable without loads.
+    limit_factor : up to which the shell is stable, at most 0.2 % below where it loses its stability; None: above
+        `MOST`.
+    limit_kind : what ends the path, see `LoadPath.limit`; "lost": nothing is known above the factor.
+    linear_factor : lowest linear buckling factor about the unloaded shell; None: none up to `MOST`.
+    imperfect_factor : as `limit_factor`, of the shell with imperfections; None: above `MOST`, not asked for, or not
+        found.
+    imperfect_kind : what ends the path of the shell with imperfections; "lost": nothing is known above its factor;
+        None: not asked for.
+    load_sum : (3,) sum of the loads, those on supports included [N].
+    reactions : of the supports, without those of the unloaded shell.
+    support_forces : of the supports, with those of the unloaded shell: what acts on foundations, reversed.
+    displacements : (n, 3) of the mesh's nodes against the unloaded shell [m].
+    positions : (n, 3) of the mesh's nodes [m].
+    stress : (k,) largest stress of bending, axial force and torsion at each entry of `rod_nodes` [Pa]; None: unknown.
+    utilisation : largest stress over the strength; None: one of them is not known.
+    governs : entry of `rod_nodes` with the largest stress.
+    bracing_forces : (d,) axial force of each brace, tension positive, of slack cables exactly 0 [N].
+    bracing_utilisation : as `utilisation`, of the laths of a third layer; None: there are none, or their strength is
+        not known.
+    modes : (j, n, 3) lowest linear buckling modes, the largest component being 1.
+    mode : (n, 3) how the shell gives way at the limit, or None.
+    factorizations : what it took.
+    """
+
+    at_factor: float
+    limit_factor: float | None
+    limit_kind: Limit
+    linear_factor: float | None
+    imperfect_factor: float | None
+    imperfect_kind: Limit | None
+    load_sum: Floats
+    reactions: Reactions
+    support_forces: Reactions
+    displacements: Floats
+    positions: Floats
+    stress: Floats | None
+    utilisation: float | None
+    governs: int | None
+    bracing_forces: Floats
+    bracing_utilisation: float | None
+    modes: Floats
+    mode: Floats | None
+    factorizations: int
+
+    __repr__ = brief
+
+    @property
+    def max_deflection(self) -> float:
+        """Largest displacement of a node [m]."""
+        return float(np.linalg.norm(self.displacements, axis=1).max())
+
+    @property
+    def reaction_sum(self) -> Floats:
+        """(3,) [N]"""
+        return self.reactions.sum_of_forces
+
+
+@dataclass(frozen=True)
+class LoadChecks:
+    """A form under loads.
+
+    Parameters
+    ----------
+    asked : the loads and combinations.
+    shells : by combination and end condition; an end condition whose shell did not converge is left out.
+    braced : (d, 2) crossings that each brace joins; without bracing there are none.
+    stopped, missing : when a time limit came, or "", and which combinations were not reached.
+    """
+
+    asked: Loads
+    shells: Mapping[str, Mapping[Ends, LoadedShell]]
+    braced: Ints
+    stopped: str = ""
+    missing: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        late = f", {self.stopped}" if self.stopped else ""
+        return f"<LoadChecks of {', '.join(self.shells) or 'no combination'}{late}>"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that a user should read."""
+        late = (f"{self.stopped}; not checked: {', '.join(self.missing)}",) if self.stopped else ()
+        lost = tuple(
+            f"under {name} with {ends} ends the path of the loaded shell could not be followed beyond "
+            f"{shell.limit_factor:.3g} times the loads, and nothing is known above"
+            for name, by_ends in self.shells.items()
+            for ends, shell in by_ends.items()
+            if shell.limit_kind == "lost"
+        )
+        imperfect = tuple(
+            f"under {name} with {ends} ends and imperfections "
+            + (
+                "no equilibrium was found, and nothing is known of it"
+                if shell.imperfect_factor is None
+                else f"nothing is known above {shell.imperfect_factor:.3g} times the loads"
+            )
+            for name, by_ends in self.shells.items()
+            for ends, shell in by_ends.items()
+            if shell.imperfect_kind == "lost"
+        )
+        return (*late, *lost, *imperfect)
+
+
+def check_shells(
+    stages: PatchForm, loads: Loads, *, strength: Strength = Strength(), progress: Progress = silent
+) -> LoadChecks:
+    """Check every shell of a form in one piece that converged under each combination.
+
+    Parameters
+    ----------
+    stages : of the form.
+    loads : with their combinations.
+    strength : what stresses are judged by.
+    progress : called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found until
+        then is returned.
+
+    Raises
+    ------
+    InputError : a load does not fit the form.
+    """
+    if stages.from_table:
+        raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
+    areas = tributary_of(stages)
+    done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
+    found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
+    missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
+    stopped, braced = "", np.empty((0, 2), dtype=np.intp)
+    try:
+        for ends, popped in done.items():
+            structure = _locked(popped, ends, loads, stages)
+            braced = structure.braced
+            nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
+            acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
+            for name, load in acting.items():
+                said = partial(_said, progress, f"{name}, {ends} ends")
+                found[name][ends] = loaded_shell(structure, load, loads, strength=strength, progress=said)
+                missing.pop(0)
+    except OutOfTimeError as late:
+        stopped = str(late)
+    return LoadChecks(loads, found, braced, stopped, tuple(missing) if stopped else ())
+
+
+def _said(progress: Progress, where: str, what: str) -> None:
+    progress("loads", f"{where}, {what}", 0.0)
+
+
+def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Structure:
+    """The erected shell with its bracing locked.
+
+    Raises
+    ------
+    InputError : as of the bracing; the supports leave a mechanism.
+    """
+    structure, bracing = Structure.erected(popped, stages.rod), loads.bracing
+    if bracing is not None:
+        fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
+        structure = fitted.brace(structure, stages.target)
+    try:
+        _ = structure.equilibrium.tangent
+    except SingularError:
+        raise InputError(
+            f"with {ends} ends the supports and joints leave the shell a motion without any stiffness (a mechanism), "
+            "so that it cannot carry a load: hold its ends' directions (clamped), use stiffer joints, or more rods"
+        ) from None
+    return structure
+
+
+def tributary_of(stages: PatchForm) -> Tributary:
+    """The areas of the target that each node of a form takes.
+
+    Parameters
+    ----------
+    stages : of a form in one piece that has a target.
+    """
+    layout = stages.layout
+    anchor = stages.draped.anchor or stages.target.summit
+    return tributary_areas(
+        stages.target, stages.trimmed.positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing)
+    )
+
+
+def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mapping[str, float]) -> Load:
+    """One combination as what acts on the structure at its factor 1."""
+    forces = np.zeros((structure.size, 3))
+    strains, motions = np.zeros(len(structure.equilibrium.problem.stretch.blocks)), np.zeros_like(forces)
+    for name, factor in factors.items():
+        load = loads.loads[name]
+        if isinstance(load, Forces):
+            forces[: structure.shell.node_count] += factor * load.forces(nodes)
+        elif isinstance(load, Temperature):
+            strains[: len(structure.mesh.edges)] += factor * load.strain
+        else:
+            _move(structure, load, factor, motions)
+    return Load(
+        forces=forces if forces.any() else None,
+        strains=strains if strains.any() else None,
+        motions=motions if motions.any() else None,
+    )
+
+
+def _move(structure: Structure, load: Settlement, factor: float, motions: Floats) -> None:
+    shell = structure.shell
+    names = [f"{rod.name}.{end}" for rod in shell.mesh.grid.rods for end in (0, 1)]
+    for name in load.supports:
+        if name not in names:
+            raise InputError(
+                f"a settlement moves the support {shown(name)}, which the shell does not have: its supports are "
+                f"{names[0]}, {names[1]} to {names[-1]}"
+            )
+        k = names.index(name)
+        for block in (shell.ends[k], *shell.ghosts[k : k + 1]):
+            motions[block] += factor * np.array(load.move)
+
+
+def loaded_shell(
+    structure: Structure, load: Load, loads: Loads, *,
+    strength: Strength = Strength(), progress: Callable[[str], None] = lambda what: None,
+) -> LoadedShell:  # fmt: skip
+    """A structure under one combination.
+
+    Parameters
+    ----------
+    structure : in equilibrium without the loads.
+    load : what acts at the combination's factor 1.
+    loads : for how stability is looked at.
+    strength : what stresses are judged by.
+    progress : called with what is being done.
+    """
+
+    def following(count: int, factor: float) -> None:
+        progress(f"{factor:.3g} times the loads, {count} factorisations")
+
+    unloaded = structure.equilibrium
+    path = load_path(unloaded, load, most=MOST, progress=following)
+    last = path.last_stable
+    at = path.at(1.0)
+    factor, found = 0.0, unloaded
+    if at is not None:
+        factor, found = 1.0, at
+    elif last is not None:
+        factor, found = last.factor, last.equilibrium
+    buckling = None
+    if path.limit != "unstable unloaded":
+        progress("linear buckling")
+        buckling = linear_buckling(unloaded, load, loads.stability.modes, most=MOST)
+    imperfect_factor, imperfect_kind, more = _with_imperfections(structure, load, loads, buckling, following)
+    n = structure.shell.node_count
+    positions, before = structure.shell.positions(found.state), structure.shell.positions(unloaded.state)
+    bent = bending_of(structure.shell_at(found), found.state, structure.rod, shear_weight=strength.shear_weight)
+    governs = None if bent.stress is None else int(np.argmax(bent.stress))
+    used = None
+    if bent.stress is not None and strength.strength is not None:
+        used = float(bent.stress.max()) / strength.strength
+    total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
+    shapes = np.zeros((0, n, 3)) if buckling is None else buckling.shapes[:, :n]
+    return LoadedShell(
+        at_factor=factor,
+        limit_factor=None if path.limit == "none" else path.factor,
+        limit_kind=path.limit,
+        linear_factor=float(buckling.factors[0]) if buckling is not None and len(buckling.factors) else None,
+        imperfect_factor=imperfect_factor,
+        imperfect_kind=imperfect_kind,
+        load_sum=total,
+        reactions=structure.reactions(found),
+        support_forces=structure.support_forces(found),
+        displacements=positions - before,
+        positions=positions,
+        stress=bent.stress,
+        utilisation=used,
+        governs=governs,
+        bracing_forces=structure.bracing_forces(found),
+        bracing_utilisation=structure.bracing_utilisation(found, strength),
+        modes=shapes,
+        mode=None if path.mode is None else path.mode[:n],
+        factorizations=path.factorizations + more,
+    )
+
+
+def _with_imperfections(
+    structure: Structure, load: Load, loads: Loads, buckling: LinearBuckling | None,
+    progress: Callable[[int, float], None],
+) -> tuple[float | None, Limit | None, int]:  # fmt: skip
+    """The smaller limit factor of the shells with imperfections of either sign, what ends its path, and the
+    factorisations that both took."""
+    points = structure.shell.positions(structure.equilibrium.state)
+    amplitude = loads.stability.amplitude(float(np.ptp(points[:, :2], axis=0).min()))
+    if amplitude is None or buckling is None or not len(buckling.shapes):
+        return None, None, 0
+    ends, work = list[tuple[float, Limit]](), 0
+    for sign in (1.0, -1.0):
+        try:
+            start = imperfect(structure.equilibrium, buckling.shapes, sign * amplitude)
+        except ConvergenceError:
+            return None, "lost", work
+        path = load_path(start, load, most=MOST, stations=(), progress=progress)
+        work += path.factorizations
+        ends.append((np.inf if path.limit == "none" else path.factor, path.limit))
+    least, kind = min(ends)
+    return (None if np.isinf(least) else least), kind, work

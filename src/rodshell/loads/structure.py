@@ -1,0 +1,190 @@
+"""The shell that loads act on: erected, then braced, its model and its equilibrium without loads.
+
+The erected shell is the popped-up one. It has no weight while its bracing is put in: it is held up until then, by the
+scaffold or the crane that erects it. The bracing is fitted to the shell as it stands, and stressed; the shell gives way
+to that, and the equilibrium that it finds is where all loads begin.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from rodshell.arrays import Floats, Ints
+from rodshell.checks.bending import VON_MISES, bending_of
+from rodshell.checks.loads import Reactions, reactions
+from rodshell.formfinding.popup import PopUp
+from rodshell.layout import GridMesh
+from rodshell.model import Shell
+from rodshell.rods.cable import CableStretch
+from rodshell.rods.section import Rod
+from rodshell.solve.equilibrium import Equilibrium
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strength:
+    """What stresses are judged by.
+
+    Parameters
+    ----------
+    strength : of the rods' material [Pa]; None: not known.
+    shear_weight : of the shear stress against the normal stress, see `checks.bending`.
+    """
+
+    strength: float | None = None
+    shear_weight: float = VON_MISES
+
+
+@dataclass(frozen=True, eq=False)
+class LathLayer:
+    """A third layer of laths.
+
+    Parameters
+    ----------
+    shell : the model of the laths alone, each straight when it is free of stress.
+    blocks : (N,) the structure's block that holds each of its blocks.
+    rod : section and material.
+    rows : crossings that each lath runs over.
+    entries : entries of its mesh's `rod_nodes` at these crossings, lath by lath.
+    """
+
+    shell: Shell
+    blocks: Ints
+    rod: Rod
+    rows: tuple[tuple[int, ...], ...]
+    entries: Ints
+
+    @property
+    def pairs(self) -> Ints:
+        """(d, 2) neighbouring crossings on each lath."""
+        return np.array([pair for row in self.rows for pair in pairwise(row)], dtype=np.intp).reshape(-1, 2)
+
+    def forces(self, axial: Floats) -> Floats:
+        """(d,) mean axial force from crossing to crossing [N], tension positive.
+
+        Parameters
+        ----------
+        axial : (e,) forces of the laths' edges [N].
+        """
+        first = self.entries - (np.searchsorted(self.shell.mesh.rod_start, self.entries, side="right") - 1)
+        sums = np.append(0.0, np.cumsum(axial))
+        stops = np.concatenate([np.ones(len(row), dtype=bool) for row in self.rows])
+        ends = np.cumsum([len(row) for row in self.rows]) - 1
+        stops[ends] = False
+        begin = np.flatnonzero(stops)
+        return np.asarray((sums[first[begin + 1]] - sums[first[begin]]) / (first[begin + 1] - first[begin]))
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A shell as loads find it.
+
+    Parameters
+    ----------
+    shell : the model of the grid, its source frames being at the equilibrium.
+    equilibrium : of grid and bracing without loads, its ends held.
+    rod : of the grid.
+    braced : (d, 2) crossings that its bracing joins.
+    bracing_mass : (n,) mass of the bracing, lumped at the mesh's nodes [kg]; None: there is no bracing.
+    cables : its energy; None: there are no cables.
+    laths : its third layer; None: there is none.
+    """
+
+    shell: Shell
+    equilibrium: Equilibrium
+    rod: Rod
+    braced: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.intp))
+    bracing_mass: Floats | None = None
+    cables: CableStretch | None = None
+    laths: LathLayer | None = None
+
+    def __repr__(self) -> str:
+        return f"<Structure: {self.shell}, {self.equilibrium.report.status.value}>"
+
+    @staticmethod
+    def erected(popped: PopUp, rod: Rod) -> "Structure":
+        """The popped-up shell, without bracing.
+
+        Parameters
+        ----------
+        popped : the shell.
+        rod : of the grid.
+        """
+        return Structure(popped.shell, popped.equilibrium, rod)
+
+    @property
+    def mesh(self) -> GridMesh:
+        return self.shell.mesh
+
+    @property
+    def size(self) -> int:
+        """Number of blocks of the state."""
+        return len(self.equilibrium.state)
+
+    @cached_property
+    def mass(self) -> Floats:
+        """(n,) lumped mass of the mesh's nodes, of rods, joints and bracing [kg]."""
+        mass = self.shell.mass[: self.shell.node_count, 2]
+        return np.asarray(mass if self.bracing_mass is None else mass + self.bracing_mass)
+
+    def positions(self, found: Equilibrium) -> Floats:
+        """(n, 3) positions of the mesh's nodes in an equilibrium of the structure [m]."""
+        return self.shell.positions(found.state)
+
+    def bracing_forces(self, found: Equilibrium) -> Floats:
+        """(d,) axial force of the bracing from crossing to crossing in an equilibrium of the structure [N]; tension is
+        positive, and a slack cable has exactly 0."""
+        if self.laths is not None:
+            return self.laths.forces(found.forces[len(self.mesh.edges) :])
+        return np.zeros(0) if self.cables is None else self.cables.forces(found.state)
+
+    def bracing_utilisation(self, found: Equilibrium, strength: Strength) -> float | None:
+        """Largest stress of the laths of a third layer over the strength, in an equilibrium of the structure; None:
+        there are none, or one of both is not known.
+
+        Parameters
+        ----------
+        found : an equilibrium of this structure.
+        strength : of the grid's rods; laths of another material are judged by its own.
+        """
+        if self.laths is None:
+            return None
+        layer, count = self.laths, len(self.shell.elements)
+        of_laths = found.elements[count : count + len(layer.shell.elements)]
+        blocks = [element.blocks for element in layer.shell.elements]
+        alone = tuple(replace(element, blocks=at) for element, at in zip(of_laths, blocks, strict=True))  # type: ignore[type-var]
+        bent = bending_of(
+            layer.shell.with_elements(alone), found.state[layer.blocks], layer.rod, shear_weight=strength.shear_weight
+        )
+        material = layer.rod.material
+        limit = strength.strength if layer.rod == self.rod else None if material is None else material.bending_strength
+        return None if bent.stress is None or limit is None else float(bent.stress.max()) / limit
+
+    def shell_at(self, found: Equilibrium) -> Shell:
+        """The grid's model with its source frames at an equilibrium of the structure.
+
+        Parameters
+        ----------
+        found : an equilibrium of this structure, loaded or not.
+        """
+        return self.shell.with_elements(found.elements[: len(self.shell.elements)])
+
+    def support_forces(self, found: Equilibrium) -> Reactions:
+        """What the supports exert in an equilibrium, with the springing of the bent rods.
+
+        Parameters
+        ----------
+        found : an equilibrium of this structure, loaded or not.
+        """
+        return reactions(self.shell, found)
+
+    def reactions(self, found: Equilibrium) -> Reactions:
+        """What the supports exert in an equilibrium in addition to what they exert without loads.
+
+        Parameters
+        ----------
+        found : an equilibrium of this structure under loads.
+        """
+        loaded, before = self.support_forces(found), self.support_forces(self.equilibrium)
+        return replace(loaded, forces=loaded.forces - before.forces, moments=loaded.moments - before.moments)

@@ -1,0 +1,223 @@
+"""Tributary areas: the part of the target's surface whose loads each node of the rods takes.
+
+The surface is divided into small triangles over its plan, up to its edge: triangles across the edge are cut where it
+is, which is found by bisection. Each corner of a triangle hands a third of its area to the nearest node, in equal
+parts where several are as near. So the areas add up to those of the surface and of its plan, to second order in the
+triangles' size, and those of a symmetric shell are symmetric: the triangles are laid along its rods from its anchor.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from rodshell.arrays import Bools, Floats, Ints
+from rodshell.targets import Target
+from rodshell.validation import brief
+
+if TYPE_CHECKING:
+    from rodshell.targets.freeform import Freeform
+
+ACROSS = 240  # triangles' sides across the surface's larger width, at least
+A_SPACING = 24.0  # sides on the distance of two rods, at least
+MOST_ACROSS = 900
+BISECTIONS = 40
+ON_THE_EDGE = 1e-6  # of the size: a vertex of a mesh so near to its end is inside
+STEEP, MOST_HALVINGS = 2.5, 8  # of the step: where the surface is steep longer sides are halved, so many times
+NEIGHBOURS, AS_NEAR = 4, 1e-6  # nodes that may share a corner, and by what share of the size their distances differ
+
+
+@dataclass(frozen=True, eq=False)
+class Tributary:
+    """What each of the n nodes of a mesh takes of a surface.
+
+    Parameters
+    ----------
+    area : (n,) of the surface [m2].
+    plan : (n,) of its plan [m2].
+    vectors : (n, 3) areas times the unit normals that point up [m2].
+    plan_positions : (n, 2) middle of each node's part of the plan [m]; of a node without one its own place.
+    """
+
+    area: Floats
+    plan: Floats
+    vectors: Floats
+    plan_positions: Floats
+
+    __repr__ = brief
+
+
+def tributary_areas(
+    target: Target, positions: Floats, *, anchor: tuple[float, float], rotate: float, spacing: float
+) -> Tributary:
+    """The areas of a surface that the nodes on it take.
+
+    Parameters
+    ----------
+    target : the surface, up to its end; where parts lie one above the other, the uppermost.
+    positions : (n, 3) of the nodes, on the surface or next to it [m].
+    anchor : point of the plan from which the triangles are laid [m].
+    rotate : angle of their sides [rad].
+    spacing : smallest distance of two neighbouring rods [m].
+    """
+    from rodshell.targets.freeform import Freeform  # few jobs need it
+
+    step = _step(target, spacing)
+    if isinstance(target, Freeform):
+        corners, faces = mesh_triangles(target, step=step)
+    else:
+        corners, faces = surface_triangles(target, anchor=anchor, rotate=rotate, step=step)
+    a, b, c = (corners[faces[:, k]] for k in range(3))
+    vector = 0.5 * np.cross(b - a, c - a)
+    shares = np.column_stack([np.linalg.norm(vector, axis=1), vector]) / 3.0
+    at_corners = np.zeros((len(corners), 4))
+    for k in range(3):
+        np.add.at(at_corners, faces[:, k], shares)
+    wanted = range(1, 1 + min(NEIGHBOURS, len(positions)))
+    distance, nearest = map(np.asarray, cKDTree(positions).query(corners, k=list(wanted)))
+    as_near = distance <= distance[:, :1] + AS_NEAR * target.size
+    weight = as_near / as_near.sum(axis=1, keepdims=True)
+    result, moments = np.zeros((len(positions), 4)), np.zeros((len(positions), 2))
+    for k in range(nearest.shape[1]):
+        part = weight[:, k, None] * at_corners
+        np.add.at(result, nearest[:, k], part)
+        np.add.at(moments, nearest[:, k], part[:, 3:] * corners[:, :2])
+    plan = result[:, 3]
+    middle = np.where(plan[:, None] > 0, moments / np.maximum(plan, 1e-300)[:, None], positions[:, :2])
+    return Tributary(result[:, 0], plan, result[:, 1:], middle)
+
+
+def surface_triangles(
+    target: Target, *, anchor: tuple[float, float], rotate: float, step: float
+) -> tuple[Floats, Ints]:
+    """A surface up to its end in triangles: corners (k, 3) [m], and faces (m, 3), upwards.
+
+    Parameters
+    ----------
+    target : the surface.
+    anchor : point of the plan that is a corner, where it lies inside [m].
+    rotate : angle of the sides [rad].
+    step : their length in plan [m].
+    """
+    reach = 2.5 * target.size + float(np.hypot(*(np.array(anchor) - target.summit)))
+    count = int(np.ceil(reach / step))
+    ticks = step * np.arange(-count, count + 1)
+    turn = np.array([[np.cos(rotate), np.sin(rotate)], [-np.sin(rotate), np.cos(rotate)]])
+    plan = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2) @ turn + anchor
+    z, inside = _lifted(target, plan)
+    index = np.arange(len(plan)).reshape(len(ticks), len(ticks))
+    sw, se, nw, ne = index[:-1, :-1], index[1:, :-1], index[:-1, 1:], index[1:, 1:]
+    used = (inside[sw] | inside[se] | inside[nw] | inside[ne]).ravel()
+    sw, se, nw, ne = (part.ravel()[used] for part in (sw, se, nw, ne))
+    # four triangles a square, about its middle: no direction is preferred
+    middle = len(plan) + np.arange(len(sw))
+    plan = np.vstack([plan, 0.25 * (plan[sw] + plan[se] + plan[nw] + plan[ne])])
+    of_middles, within = _lifted(target, plan[len(z) :])
+    z, inside = np.append(z, of_middles), np.append(inside, within)
+    rim = [(sw, se), (se, ne), (ne, nw), (nw, sw)]
+    faces = np.concatenate([np.column_stack([p, q, middle]) for p, q in rim])
+    return _halved(target, *_cut(target, plan, z, inside, faces), longest=STEEP * step)
+
+
+def mesh_triangles(target: "Freeform", *, step: float) -> tuple[Floats, Ints]:
+    """As `surface_triangles` of a surface that is given in triangles: these, made smaller and cut at its end.
+
+    Parameters
+    ----------
+    target : the surface.
+    step : longest side [m].
+    """
+    faces = target.surface.faces
+    points, faces = _halved(target, target.surface.vertices, faces, longest=step)
+    inside = target.margin(points) >= -ON_THE_EDGE * target.size
+    single, double, sides = _across(inside, faces)
+    low, high = points[sides[:, 0]], points[sides[:, 1]]
+    for _ in range(BISECTIONS):
+        middle = target.retract(0.5 * (low + high))
+        within = target.margin(middle)[:, None] >= 0
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    points, faces = _stitched(target, points, low, faces[inside[faces].all(axis=1)], single, double)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    upwards = np.cross(b - a, c - a)[:, 2].sum() >= 0
+    return points, faces if upwards else faces[:, ::-1]
+
+
+def _step(target: Target, spacing: float) -> float:
+    finest = 2.0 * target.size / MOST_ACROSS
+    return max(finest, min(2.0 * target.size / ACROSS, spacing / A_SPACING))
+
+
+def _lifted(target: Target, plan: Floats) -> tuple[Floats, Bools]:
+    """Height (k,) of the surface over points of the plan, and whether they lie inside its end."""
+    z = target.height_at(plan)
+    known = np.isfinite(z)
+    inside = known.copy()
+    inside[known] = target.margin(np.column_stack([plan[known], z[known]])) >= 0
+    return np.where(known, z, 0.0), inside
+
+
+def _cut(target: Target, plan: Floats, z: Floats, inside: Bools, faces: Ints) -> tuple[Floats, Ints]:
+    """The faces inside the end, those across it cut; corners are counted again."""
+    single, double, sides = _across(inside, faces)
+    ends, height = _ends_of(target, plan, z, sides[:, 0], sides[:, 1])
+    points, there = np.column_stack([plan, z]), np.column_stack([ends, height])
+    return _stitched(target, points, there, faces[inside[faces].all(axis=1)], single, double)
+
+
+def _across(inside: Bools, faces: Ints) -> tuple[Ints, Ints, Ints]:
+    """Faces with one corner inside, which is put first; with two, the one outside put first; and the sides of these
+    that lead out, of the first kind along both sides, then of the second."""
+    count = inside[faces].sum(axis=1)
+    single, double = (faces[count == k] for k in (1, 2))
+    single = np.take_along_axis(single, (inside[single].argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    double = np.take_along_axis(double, ((~inside[double]).argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    return single, double, np.concatenate([single[:, [0, 1]], single[:, [0, 2]], double[:, [1, 0]], double[:, [2, 0]]])
+
+
+def _stitched(
+    target: Target, points: Floats, ends: Floats, whole: Ints, single: Ints, double: Ints
+) -> tuple[Floats, Ints]:
+    """Whole faces, and what is left of those that were cut at the `ends` of their sides."""
+    a, b, c, d = np.split(len(points) + np.arange(len(ends)), np.cumsum([len(single), len(single), len(double)]))
+    points = np.vstack([points, ends])
+    around = [(double[:, 1], double[:, 2]), (double[:, 2], d), (d, c), (c, double[:, 1])]
+    middle = len(points) + np.arange(len(double))
+    points = np.vstack(
+        [points, target.retract(0.25 * (points[double[:, 1]] + points[double[:, 2]] + points[c] + points[d]))]
+    )
+    faces = np.concatenate(
+        [whole, np.column_stack([single[:, 0], a, b]), *(np.column_stack([p, q, middle]) for p, q in around)]
+    )
+    used, again = np.unique(faces, return_inverse=True)
+    return points[used], again.reshape(-1, 3)
+
+
+def _halved(target: Target, points: Floats, faces: Ints, *, longest: float) -> tuple[Floats, Ints]:
+    """The triangles, their sides halved until these are at most `longest` [m]: lifted onto a surface that ends steeply,
+    as a hemisphere does, long triangles lie across it."""
+    for _ in range(MOST_HALVINGS):
+        sides = np.linalg.norm(points[np.roll(faces, -1, axis=1)] - points[faces], axis=2)
+        long = sides.max(axis=1) > longest
+        if not long.any():
+            break
+        a, b, c = faces[long].T
+        pairs = np.concatenate([np.column_stack(pair) for pair in ((a, b), (b, c), (c, a))])
+        key, back = np.unique(pairs.min(axis=1) * len(points) + pairs.max(axis=1), return_inverse=True)
+        ab, bc, ca = np.split(len(points) + back, 3)
+        halves = target.retract(0.5 * (points[key // len(points)] + points[key % len(points)]))
+        points = np.vstack([points, halves])
+        quarters = [np.column_stack(corners) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        faces = np.concatenate([faces[~long], *quarters])
+    return points, faces
+
+
+def _ends_of(target: Target, plan: Floats, z: Floats, inner: Ints, outer: Ints) -> tuple[Floats, Floats]:
+    """Where the sides from inner to outer points meet the surface's end: the last points (k, 2) inside, and heights."""
+    low, high, height = plan[inner].copy(), plan[outer].copy(), z[inner].copy()
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        there, within = _lifted(target, middle)
+        low[within], height[within] = middle[within], there[within]
+        high[~within] = middle[~within]
+    return low, height

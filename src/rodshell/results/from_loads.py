@@ -1,0 +1,96 @@
+"""From checks under loads to what is kept of them: the records of result.json and the arrays of states.npz."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.arrays import Floats, Ints
+from rodshell.layout import GridMesh
+from rodshell.loads.check import LoadChecks
+from rodshell.loads.check import LoadedShell as CheckedShell
+from rodshell.results.from_checks import joint_names
+from rodshell.results.loaded import Governs, LoadedShell
+from rodshell.results.results import Results
+
+
+def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Results:
+    """The results of a form with those under loads.
+
+    Parameters
+    ----------
+    results : of the form.
+    mesh : of the flat grid, its rods in the order of the results.
+    checks : under loads.
+    """
+    found = results.changed(
+        loads={
+            name: {
+                ends: _record(mesh, shell, _in_order(results, mesh, checks.braced, shell.bracing_forces))
+                for ends, shell in by_ends.items()
+            }
+            for name, by_ends in checks.shells.items()
+        },
+        warnings=(*results.warnings, *checks.warnings),
+    )
+    return found.changed(status=checks.stopped) if checks.stopped and found.status == "converged" else found
+
+
+def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
+    """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], and the mode at the limit (n, 3),
+    by end condition and combination, as "loaded_pinned_winter".
+
+    Parameters
+    ----------
+    checks : of the form.
+    """
+    states: dict[str, NDArray[Any]] = {}
+    for name, by_ends in checks.shells.items():
+        for ends, shell in by_ends.items():
+            states[f"loaded_{ends}_{name}"] = shell.positions
+            if shell.stress is not None:
+                states[f"loaded_stress_{ends}_{name}"] = shell.stress
+            if shell.mode is not None:
+                states[f"loaded_mode_{ends}_{name}"] = shell.mode
+    return states
+
+
+_KINDS: dict[str, str] = {"lost": "not followed"}
+
+
+def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) -> tuple[float | None, ...]:
+    """The force of each brace of the fabrication; None of those that are left out."""
+    names = joint_names(mesh)
+    known = {
+        frozenset((names[a], names[b])): force for (a, b), force in zip(braced.tolist(), forces.tolist(), strict=True)
+    }
+    rows = results.fabrication.bracing if results.fabrication else ()
+    return tuple(known.get(frozenset((brace.start, brace.end))) for brace in rows) if known else ()
+
+
+def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ...]) -> LoadedShell:
+    governs = None
+    if shell.governs is not None:
+        rod = int(np.searchsorted(mesh.rod_start, shell.governs, side="right")) - 1
+        line = mesh.grid.rods[rod]
+        governs = Governs(rod=line.name, at=float(mesh.stations[shell.governs]) - line.start)
+    return LoadedShell(
+        at_factor=shell.at_factor,
+        load_sum=shell.load_sum.tolist(),
+        reaction_sum=shell.reaction_sum.tolist(),
+        max_deflection=shell.max_deflection,
+        linear_factor=shell.linear_factor,
+        limit_factor=shell.limit_factor,
+        limit_kind=_KINDS.get(shell.limit_kind, shell.limit_kind),
+        imperfect_factor=shell.imperfect_factor,
+        imperfect_kind=None if shell.imperfect_kind is None else _KINDS.get(shell.imperfect_kind, shell.imperfect_kind),
+        utilisation=shell.utilisation,
+        max_stress=None if shell.stress is None else float(shell.stress.max()),
+        governs=governs,
+        uplift=float(max(0.0, -shell.support_forces.forces[:, 2].min())),
+        reactions=shell.reactions.forces.tolist(),
+        support_forces=shell.support_forces.forces.tolist(),
+        support_moments=shell.support_forces.moments.tolist(),
+        bracing=bracing,
+        bracing_utilisation=shell.bracing_utilisation,
+    )

@@ -1,0 +1,48 @@
+"""Work that threads share. Kernels declared with `nogil` run at the same time; results never depend on the threads."""
+
+import os
+from collections.abc import Callable
+from threading import Thread
+
+MOST_THREADS = 4  # parts of a factorisation stay one thread's work, and memory is as fast as it is
+
+
+def threads() -> int:
+    """Number of threads: NUMBA_NUM_THREADS, by default one per processor, at most `MOST_THREADS`."""
+    asked = os.environ.get("NUMBA_NUM_THREADS", "")
+    processors = os.cpu_count() or 1
+    return max(1, min(int(asked) if asked.isdigit() else processors, processors, MOST_THREADS))
+
+
+def in_threads(work: Callable[[int, int], object], count: int, *, most: int | None = None) -> None:
+    """Do `count` pieces of work, each in whichever thread is free.
+
+    Parameters
+    ----------
+    work : called with the number of a piece and that of the thread, from 0.
+    count : number of pieces.
+    most : number of threads; by default `threads()`.
+
+    Raises
+    ------
+    BaseException : what a piece of work raised; of several one.
+    """
+    if count == 0:
+        return
+    waiting, failures = iter(range(count)), list[BaseException]()
+
+    def run(thread: int) -> None:
+        try:
+            for piece in waiting:
+                work(piece, thread)
+        except BaseException as failure:  # another thread's must not be lost
+            failures.append(failure)
+
+    others = [Thread(target=run, args=(thread,)) for thread in range(1, min(most or threads(), count))]
+    for other in others:
+        other.start()
+    run(0)
+    for other in others:
+        other.join()
+    if failures:
+        raise failures[0]

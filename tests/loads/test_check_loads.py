@@ -1,0 +1,236 @@
+"""Balance, symmetry, superposition and rigid motions of shells under loads; what is refused."""
+
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rodshell as rs
+from rodshell.errors import InputError
+from rodshell.layout.cells import diagonals
+from rodshell.loads.check import _load, tributary_of
+from rodshell.loads.kinds import LoadedNodes
+from rodshell.loads.structure import Structure
+from rodshell.solve.load_path import load_path
+from tests.loads.shells import LARCH, ROPE, TUBE, grid, one, shell
+
+
+def nodes_of(form: rs.Form, ends: str = "pinned") -> LoadedNodes:
+    popped = form.popped[ends]
+    mass = popped.shell.mass[: popped.shell.node_count, 2]
+    return LoadedNodes(popped.positions, mass, tributary_of(form.patches[0]), min(form.layout.spacing))
+
+
+LOADS = {
+    "own": rs.SelfWeight(cladding=2.0),
+    "snow": rs.Snow(150.0),
+    "half": rs.Snow(100.0, "half", 0.3),
+    "drift": rs.Snow(100.0, "drifted", 1.0),
+    "wind": rs.Wind(200.0, "-0.8 + 0.1*x"),
+    "point": rs.PointLoad((1.0, 0.5), (50.0, 0.0, -200.0)),
+    "line": rs.LineLoad(((-3.0, 0.0), (3.0, 1.0)), (0.0, 0.0, -30.0)),
+}
+BRACED = {"none": None, "cables": rs.Cables(rod=ROPE, prestrain=5e-4), "laths": rs.Laths(eccentricity=0.03)}
+
+
+@pytest.mark.parametrize("bracing", BRACED)
+def test_reactions_balance_every_kind_of_load(bracing: str) -> None:
+    """Forces to 1e-9, with two layers of rods, both end conditions and each kind of bracing, all loads at once."""
+    loads = rs.Loads(
+        loads=dict(LOADS), combinations={"all": dict.fromkeys(LOADS, 0.05), "wind": {"wind": 0.3}},
+        bracing=BRACED[bracing], stability=rs.Stability(modes=1),
+    )  # fmt: skip
+    found = rs.check_loads(shell("oval"), loads)
+    assert list(found.shells) == ["all", "wind"]
+    for by_ends in found.shells.values():
+        assert list(by_ends) == ["pinned", "clamped"]
+        for loaded in by_ends.values():
+            assert loaded.at_factor == 1.0
+            size = np.linalg.norm(loaded.load_sum)
+            assert np.abs(loaded.reaction_sum + loaded.load_sum).max() < 1e-9 * size
+
+
+def test_snow_and_wind_have_the_sums_of_their_surface() -> None:
+    """Half the snow on half a disc; of a drift three eighths on a rectangle; pressure on a cap lifts by its plan."""
+    form = shell("tubes")
+    nodes, plan = nodes_of(form), pi * 84.0
+    assert rs.Snow(1.0).forces(nodes).sum(axis=0) == pytest.approx([0, 0, -plan], rel=1e-3)
+    assert rs.Snow(1.0, "half", 0.7).forces(nodes).sum(axis=0)[2] == pytest.approx(-plan / 2, rel=0.01)
+    assert rs.Wind(2.0, -0.5).forces(nodes).sum(axis=0) == pytest.approx([0, 0, plan], abs=1e-3 * plan)
+    roof = rs.HeightField(formula="1 - 0.05*x^2 - 0.04*y^2", domain=rs.Rectangle((6.0, 4.0)))
+    flat = rs.find_form(roof, grid(0.5, 0.25), TUBE, ends="pinned")
+    drift = rs.Snow(1.0, "drifted", 0.0).forces(nodes_of(flat))
+    assert drift[:, 2].sum() == pytest.approx(-24.0 * 3 / 8, rel=0.02)
+    right = flat.popped["pinned"].positions[:, 0] > 0
+    assert drift[right, 2].sum() / drift[~right, 2].sum() == pytest.approx(2.0, rel=0.1)
+
+
+def test_point_and_line_loads_have_their_forces() -> None:
+    nodes = nodes_of(shell("tubes"))
+    assert rs.PointLoad((0.0, 0.0), (1.0, 2.0, -3.0)).forces(nodes).sum(axis=0).tolist() == [1.0, 2.0, -3.0]
+    line = rs.LineLoad(((-3.0, -4.0), (0.0, 0.0), (3.0, 0.0)), (0.0, 1.0, -2.0)).forces(nodes)
+    assert line.sum(axis=0) == pytest.approx([0.0, 8.0, -16.0])
+
+
+def test_self_weight_is_that_of_rods_joints_bracing_and_cladding() -> None:
+    form = shell("tubes")
+    rods = sum(rod.length for rod in form.footprint.rods) * TUBE.mass_per_length
+    cladding = 3.0 * 2 * pi * 10.0 * 6.0
+    found = rs.check_loads(form, one(rs.SelfWeight(cladding=3.0), bracing=BRACED["cables"]))
+    pairs, places = found.braced, form.popped["pinned"].positions[form.footprint.mesh.joint_nodes]
+    ropes = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1).sum() * ROPE.mass_per_length
+    total = -found.shells["all"]["pinned"].load_sum[2] / found.shells["all"]["pinned"].at_factor
+    assert total == pytest.approx(9.81 * (rods + cladding + ropes), rel=1e-3)
+
+
+def test_supports_that_all_settle_alike_stress_nothing() -> None:
+    form = shell("tubes")
+    names = tuple(f"{rod.name}.{end}" for rod in form.footprint.rods for end in (0, 1))
+    found = rs.check_loads(form, one(rs.Settlement(names, (0.02, -0.01, -0.05)))).shells["all"]["pinned"]
+    np.testing.assert_allclose(found.displacements, np.broadcast_to([0.02, -0.01, -0.05], (len(found.positions), 3)))
+    assert np.abs(found.reactions.forces).max() < 1e-6 * np.abs(found.support_forces.forces).max()
+    assert found.limit_factor is None
+
+
+def test_a_shell_that_is_warmed_while_its_supports_move_apart_alike_grows_as_a_whole() -> None:
+    """Rods longer by the strain e between supports farther apart by e: the same shape, larger by e."""
+    form, strain = shell("tubes"), 1e-3
+    points, rods = form.boundary.points, form.footprint.rods
+    loads = {"warm": rs.Temperature(change=100.0, expansion=strain / 100.0)}
+    for k, rod in enumerate(rods):
+        for end in (0, 1):
+            loads[f"{rod.name}.{end}"] = rs.Settlement((f"{rod.name}.{end}",), tuple(strain * points[2 * k + end]))
+    asked = rs.Loads(loads=loads, combinations={"all": dict.fromkeys(loads, 1.0)})
+    found = rs.check_loads(form, asked).shells["all"]["pinned"]
+    before = form.popped["pinned"].positions
+    np.testing.assert_allclose(found.displacements, strain * before, atol=2e-2 * strain * np.abs(before).max())
+
+
+def test_final_state_and_energy_do_not_depend_on_the_order_of_fixed_loads() -> None:
+    """Snow and then wind, wind and then snow, and both at once do the same work, to 1e-8."""
+    form = shell("tubes")
+    structure = Structure.erected(form.popped["pinned"], form.rod)
+    asked = rs.Loads(
+        loads={"snow": rs.Snow(8.0), "wind": rs.Wind(30.0, "-0.5 + 0.05*x")},
+        combinations={"both": {"snow": 1.0, "wind": 1.0}, "snow": {"snow": 1.0}, "wind": {"wind": 1.0}},
+    )
+    loads = {name: _load(structure, nodes_of(form), asked, factors) for name, factors in asked.combinations.items()}
+    ways, unloaded = [], structure.equilibrium
+    for order in (("both",), ("snow", "wind"), ("wind", "snow")):
+        found = unloaded
+        for name in order:
+            reached = load_path(found, loads[name], most=1.5).at(1.0)
+            assert reached is not None
+            found = reached
+        elastic = replace(found.problem, load=None).potential(found.state)
+        work = float(np.sum(loads["both"].forces * (found.state - unloaded.state)))
+        ways.append((found.state, elastic, work))
+    for state, elastic, work in ways[1:]:
+        assert np.abs(state - ways[0][0]).max() < 1e-8
+        assert work == pytest.approx(ways[0][2], rel=1e-8)
+        assert elastic - unloaded.energy == pytest.approx(ways[0][1] - unloaded.energy, rel=1e-8)
+
+
+def test_bracing_of_a_symmetric_shell_is_stressed_symmetrically() -> None:
+    form = shell("tubes")
+    found = rs.check_loads(form, one(rs.Snow(100.0), bracing=BRACED["cables"]))
+    forces = found.shells["all"]["pinned"].bracing_forces
+    middles = form.popped["pinned"].positions[form.footprint.mesh.joint_nodes][found.braced].mean(axis=1)
+    for image in ([-1, 1, 1], [1, -1, 1]):
+        partner = np.linalg.norm(middles[None] - (middles * image)[:, None], axis=2)
+        for k, row in enumerate(partner):
+            same = forces[row < 1e-6 * row.max()]
+            assert np.abs(same - forces[k]).min() < 1e-5 * forces.max()
+
+
+def test_bracing_stiffens_a_shell_and_laths_feel_their_own_bending() -> None:
+    """Cables and laths carry many times what the bare shell does; laths are bent, cables are taut."""
+    form = shell("laths")
+    limits = {}
+    for name, bracing in {"none": None, "cables": BRACED["cables"], "laths": rs.Laths(pattern="both")}.items():
+        found = rs.check_loads(form, one(rs.Snow(1000.0), bracing=bracing)).shells["all"]["pinned"]
+        limits[name] = found.limit_factor
+    assert limits["cables"] > 3 * limits["none"]
+    assert limits["laths"] > 3 * limits["none"]
+
+
+@pytest.mark.parametrize(
+    ("form", "loads", "message"),
+    [
+        ("tubes", one(rs.PointLoad((30.0, 0.0), (0, 0, -1))), "away from the nearest rod"),
+        ("tubes", one(rs.Settlement(("U99.0",), (0, 0, -1))), 'the support "U99.0", which the shell does not have'),
+        ("tubes", one(rs.Wind(1.0, "sqrt(x)")), "give a formula that is finite"),
+        ("tubes", one(rs.Snow(1.0), bracing=rs.Cables(rod=ROPE, prestrain=0.5)), "pulls the shell out of its shape"),
+    ],
+)
+def test_what_does_not_fit_the_form_is_refused_in_one_sentence(form: str, loads: rs.Loads, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        rs.check_loads(shell(form), loads)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: rs.Snow(-1.0), "must be 0 or more, not -1"),
+        (lambda: rs.SelfWeight(cladding=-1.0), "must be 0 or more"),
+        (lambda: rs.Wind(-1.0, 0.5), "must be 0 or more"),
+        (lambda: rs.Wind(1.0, "z"), '"z" is not allowed'),
+        (lambda: rs.Snow(1.0, "quarter"), "must be"),
+        (lambda: rs.Loads(loads={}, combinations={"a": {"b": 1.0}}), "has no loads"),
+        (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={}), "has no combinations"),
+        (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={"a": {"c": 1.0}}), '"c", which is not a load'),
+        (lambda: rs.Loads(loads={"b": rs.Snow(1.0)}, combinations={"a": {"b": -1.0}}), "must be 0 or more"),
+        (lambda: rs.Stability(imperfection="span/0"), "the imperfection must be"),
+        (lambda: rs.Cables(rod=ROPE, pattern="all"), "a pattern of diagonals must be"),
+        (lambda: rs.Cables(rod=ROPE, prestrain=-0.1), "must be 0 or more"),
+    ],
+)
+def test_a_wrong_argument_is_refused_in_one_sentence(make: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()  # type: ignore[operator]
+
+
+def test_rods_without_mass_have_no_weight_to_check() -> None:
+    bare = rs.Rod(rs.GivenSection(EA=1e7, EI1=2e3, EI2=2e3, GJ=1e3))
+    form = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), bare, ends="pinned")
+    with pytest.raises(InputError, match="no mass"):
+        rs.check_loads(form, one(rs.SelfWeight()))
+
+
+def test_bracing_across_an_opening_is_refused_or_leaves_diagonals_out(tmp_path: Path) -> None:
+    """A hole in one cell of a vault, from a mesh."""
+    ticks = np.linspace(-3.0, 3.0, 61)
+    x, y = (part.ravel() for part in np.meshgrid(ticks, ticks, indexing="ij"))
+    inside = np.hypot(x - 0.5, y - 0.5) > 0.28
+    index = np.arange(61 * 61).reshape(61, 61)
+    quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = quads[inside[quads].all(axis=1)]
+    lines = [f"v {a} {b} {1.0 - 0.04 * a * a - 0.05 * b * b}" for a, b in zip(x, y, strict=True)]
+    lines += ["f " + " ".join(str(k + 1) for k in quad) for quad in quads.tolist()]
+    path = tmp_path / "vault.obj"
+    path.write_text("\n".join(lines))
+    job = rs.Job.load(
+        {"target": {"kind": "mesh", "file": str(path), "unit": "m"}, "pop_up": {"ends": "pinned"}}, layout__spacing=1.0,
+        rod__section={"kind": "tube", "radius": 0.02, "thickness": 0.003}, rod__material={"preset": "gfrp"},
+    )  # fmt: skip
+    form = job.run(until="pop-up")
+    with pytest.raises(InputError, match=r"2 of .* diagonals of the bracing cross an opening"):
+        rs.check_loads(form, one(rs.Snow(10.0), bracing=rs.Cables(rod=ROPE, prestrain=1e-4)))
+    left = rs.Cables(rod=ROPE, prestrain=1e-4, across_openings="leave out")
+    found = rs.check_loads(form, one(rs.Snow(10.0), bracing=left))
+    mesh = form.footprint.mesh
+    assert len(found.braced) == len(diagonals(mesh.grid)) - 2
+    places = form.popped["pinned"].positions[mesh.joint_nodes][found.braced].mean(axis=1)
+    assert np.hypot(places[:, 0] - 0.5, places[:, 1] - 0.5).min() > 0.3
+
+
+def test_a_table_of_rods_has_no_areas() -> None:
+    form = shell("tubes")
+    flat = rs.straight_rods([[[0, y], [4, y]] for y in (1.0, 2.0, 3.0)] + [[[x, 0], [x, 4]] for x in (1.0, 2.0, 3.0)])
+    finals = np.array([[[*rod.point(rod.start + 0.02), 0.0], [*rod.point(rod.end - 0.02), 0.0]] for rod in flat.rods])
+    table = rs.pop_up_table(flat, finals, LARCH)
+    assert form is not table
+    with pytest.raises(InputError, match="comes from a table of rods"):
+        rs.check_loads(table, one(rs.Snow(1.0)))
