@@ -17,12 +17,13 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 
-from benchmarks import earlier, factorisation, jobs, kernels, others, sameness, scaling, startup  # noqa: E402
+from benchmarks import beside, earlier, factorisation, jobs, kernels, others, sameness, scaling, startup  # noqa: E402
 from benchmarks.rows import Row, Section, machine  # noqa: E402
 
 SECTIONS: dict[str, Callable[[bool], Section]] = {
     "job": lambda quick: jobs.whole_job(5 if quick else 15),
     "earlier": lambda quick: earlier.earlier(2 if quick else 7),
+    "beside": beside.beside,
     "paper": others.paper,
     "factorisation": factorisation.factorisation,
     "scaling": scaling.scaling,

@@ -26,7 +26,7 @@ from rodshell.formfinding.trim import (
     trim,
     untrimmed,
 )
-from rodshell.geometry.curves import on_curve
+from rodshell.geometry.curves import lagrange
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout, GridMesh, mesh_grid
 from rodshell.layout.gridlayout import EDGES_A_SPAN
@@ -92,11 +92,16 @@ def agreement(popped: PopUp, target: Target) -> Agreement:
 
 def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     """(e, 3) points of the rods halfway along each edge, on the cubic through the nearest nodes of the rod."""
-    result = []
-    for rod in range(len(mesh.grid.rods)):
-        x, s = positions[mesh.nodes_of(rod)], mesh.stations[mesh.rod_slice(rod)]
-        result.append(on_curve(s, x, 0.5 * (s[:-1] + s[1:])))
-    return np.concatenate(result)
+    rods = mesh.edge_rods
+    entry = np.arange(len(rods)) + rods  # of `rod_nodes`: an edge begins there
+    begin, length = mesh.rod_start[rods], (mesh.rod_stop - mesh.rod_start)[rods]
+    middles, result = 0.5 * (mesh.stations[entry] + mesh.stations[entry + 1]), np.empty((len(rods), 3))
+    for count in range(2, 5):
+        here = np.flatnonzero(np.minimum(length, 4) == count)
+        first = np.clip(entry[here] + 1 - count // 2, begin[here], begin[here] + length[here] - count)
+        near = first[:, None] + np.arange(count)
+        result[here] = lagrange(mesh.stations[near], positions[mesh.rod_nodes[near]], middles[here])
+    return result
 
 
 @dataclass(frozen=True)

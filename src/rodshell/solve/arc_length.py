@@ -28,7 +28,7 @@ from rodshell.solve.sparse_ldl import SingularError
 from rodshell.solve.tangent import Tangent, by_projections, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
-MODES_CLOSE, MOST_SWEEPS = 1e-3, 20  # relative change of the lowest eigenvalue: modes only say how far to go
+MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative change of the lowest eigenvalue: modes only say how far to go
 RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
 SMALL = 24  # unknowns up to which LAPACK finds a mode
 MOST_STEPS = 12  # of Newton's method for a point
