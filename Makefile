@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -52,6 +52,9 @@ accept-refine: ## print the table of refinement
 
 accept-house: ## print the table of results before and after, archives, misuses (ten minutes)
 	python -m tests.acceptance.house
+
+accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1000 ten minutes)
+	python -m tests.acceptance.sweep --designs $(or $(DESIGNS),10000)
 
 house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
 	python -m tests.acceptance.house_figures

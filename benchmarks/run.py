@@ -17,7 +17,18 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 
-from benchmarks import beside, earlier, factorisation, jobs, kernels, others, sameness, scaling, startup  # noqa: E402
+from benchmarks import (  # noqa: E402
+    beside,
+    earlier,
+    factorisation,
+    jobs,
+    kernels,
+    others,
+    sameness,
+    scaling,
+    startup,
+    sweeps,
+)
 from benchmarks.rows import Row, Section, machine  # noqa: E402
 
 SECTIONS: dict[str, Callable[[bool], Section]] = {
@@ -31,6 +42,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "warm": lambda quick: jobs.warm(3 if quick else 9),
     "startup": lambda quick: startup.section(3 if quick else 7),
     "sameness": sameness.sameness,
+    "sweeps": lambda quick: sweeps.sweeps(20 if quick else 100),
     "kernels": lambda _: kernels.kernels(),
     "pyelastica": others.pyelastica,
 }

@@ -70,6 +70,7 @@ def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, obje
         "edge": 0.005,
         "rotate": 0.0,
         "offset": (0.0, 0.0),
+        "left_out": (),
     }
     assert case.rod.model_dump(exclude_none=True) == {
         "section": {"kind": "circle", "radius": 0.001},

@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 from numba import config, njit
 
+from rodshell.kernels import COMPILED
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
 from rodshell.solve.simd_kernels import LANES, adding, multiplying
+
+pytestmark = pytest.mark.skipif(
+    COMPILED is not None, reason="parts of kernels, which only Numba calls on their own: RODSHELL_KERNELS=jit"
+)
 
 OWN = (1, 3, 4, 5, 8, 11, 33, 70, 140)
 MORE = (0, 1, 7, 8, 23, 24, 25, 60, 130)

@@ -106,6 +106,14 @@ def test_files_lie_beside_the_sweep_file(tmp_path: Path):
     assert [design.job.case.files for design in designs] == [{str(tmp_path / name)} for name in ("a.obj", "b.obj")]
 
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.mark.parametrize(("name", "count"), [("sweep", 6), ("studies", 12)])
+def test_examples_are_valid(name: str, count: int):
+    assert len(list(read_plan(EXAMPLES / f"{name}.toml").designs())) == count
+
+
 TOO_MANY = {f"layout.{key}": {"from": 0.01, "to": 0.02, "count": 2000} for key in ("edge", "length")}
 
 

@@ -142,6 +142,18 @@ def test_the_table_has_a_row_for_each_finished_design_in_order(tmp_path: Path):
     assert table["joint.kind"].to_pylist() == ["ball", "[13, 11]", None]
 
 
+def test_columns_are_values_lists_counted_and_tables_with_names_of_the_user():
+    assert (
+        read_column("loads.winter.pinned.limit_factor").of({"loads": {"winter": {"pinned": {"limit_factor": 2.0}}}})
+        == 2
+    )
+    assert read_column("loads.winter.pinned.limit_factor").of({"loads": {}}) is None
+    assert read_column("dropped").of({"dropped": [{"id": "U01"}]}) == 1
+    assert read_column("layout.spacing").of({"layout": {"spacing": [0.03, 0.04]}}) == [0.03, 0.04]
+    with pytest.raises(rs.InputError, match=r"loads is a table: name one of its keys, such as loads\.NAME"):
+        read_column("loads")
+
+
 def test_a_folder_without_a_sweep_or_with_a_broken_one_is_refused(tmp_path: Path):
     with pytest.raises(rs.OutputError, match="holds no sweep"):
         rs.read_sweep(tmp_path)

@@ -89,7 +89,7 @@ class Freedom:
         ----------
         q : (size,) values of the reduced DOFs.
         """
-        return np.asarray(_expand(q, self.directions, self.count))
+        return np.asarray(_expand(np.ascontiguousarray(q), self.directions, self.count))
 
     def reduce(self, gradient: Floats) -> Floats:
         """Components (size,) of a gradient (n, 3) in the free directions.
@@ -98,7 +98,7 @@ class Freedom:
         ----------
         gradient : (n, 3) [N].
         """
-        return np.asarray(_reduce(gradient, self.directions, self.count, self.size))
+        return np.asarray(_reduce(np.ascontiguousarray(gradient), self.directions, self.count, self.size))
 
     def reduce_diagonal(self, diagonal: Floats) -> Floats:
         """(size,) diagonal of T' diag(d) T for the components (n, 3) of d, such as masses.

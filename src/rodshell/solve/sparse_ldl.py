@@ -135,6 +135,7 @@ class Multifrontal:
     """
 
     def __init__(self, indptr: Longs, indices: Longs, coordinates: Floats | None = None) -> None:
+        indptr, indices = (np.ascontiguousarray(part, dtype=np.int64) for part in (indptr, indices))
         self.indptr, self.indices = indptr, indices
         size = len(indptr) - 1
         begin = np.arange(size + 1) if coordinates is None else _block_begins(coordinates)
@@ -151,6 +152,7 @@ class Multifrontal:
 
     def factor(self, data: Floats, *, reuse: Factors | None = None) -> "MultifrontalFactors":
         memory = reuse.given_away() if isinstance(reuse, MultifrontalFactors) else None
+        data = np.ascontiguousarray(data, dtype=np.float64)
         panels, pivots = memory or (room(self.fill), np.empty(len(self.indptr) - 1))
         try:  # popped at once: another thread may take the last
             scratch = self._spare.pop()
@@ -193,6 +195,7 @@ class MultifrontalFactors:
         return memory
 
     def solve(self, right: Floats) -> Floats:
+        right = np.ascontiguousarray(right, dtype=np.float64)
         x = self._substitute(right)
         residual, size = _residual(self._solver.indptr, self._solver.indices, self._data, x, right)
         if np.abs(residual).max(initial=0.0) > ACCURATE * size:

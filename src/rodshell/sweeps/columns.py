@@ -17,6 +17,7 @@ from rodshell.units import shown
 STANDARD = ("verdict", "status", "rms_pinned", "rms_clamped", "min_angle_deg", "total_length", "seconds")
 JOB = "job"  # its identity, by which its result folder is called
 CONVERGED = "converged"
+ANY = "NAME"  # in a table whose keys are the user's, such as load combinations
 SHORT = 3  # a list with so many numbers is kept: a point, a pair
 
 Short = dict[str, Any]
@@ -75,14 +76,14 @@ def read_column(name: object) -> Column:
     path = ""
     for part in name.split("."):
         inside = _inside(node)
-        if part not in inside:
+        if part not in inside and ANY not in inside:
             if path in ("target", "rod.section"):  # whose keys depend on its kind
                 return Column(name)
             near = get_close_matches(part, inside, n=1)
             prefix = f"{path}." if path else ""
             hint = f"did you mean {prefix}{near[0]}?" if near else f"{path or 'result.json'} has {', '.join(inside)}"
             raise InputError(f"columns: result.json has no key {name}: {hint}" if inside else _too_deep(name, path))
-        node, path = inside[part], f"{path}.{part}" if path else part
+        node, path = inside.get(part) or inside[ANY], f"{path}.{part}" if path else part
     if inside := _inside(node):
         raise InputError(f"columns: {name} is a table: name one of its keys, such as {name}.{next(iter(inside))}")
     return Column(name, any("items" in choice for choice in _choices(node)))
@@ -106,13 +107,13 @@ def _choices(node: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _inside(node: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of a table of the schema by name; none of a value or a list."""
+    """The keys of a table of the schema by name, `ANY` where users name them; none of a value or a list."""
     found = dict[str, Any]()
     for choice in _choices(node):
         found |= choice.get("properties", {})
         each, names = choice.get("additionalProperties"), choice.get("propertyNames", {})
         if isinstance(each, Mapping):
-            found |= dict.fromkeys(names.get("enum", ()), each)
+            found |= dict.fromkeys(names.get("enum", (ANY,)), each)
     return found
 
 

@@ -114,7 +114,7 @@ def _dask(settings: Settings) -> Iterator[Engine]:
     with ExitStack() as stack:
         address = settings.address
         if address is None:
-            stack.callback(HERE.stop)
+            HERE.open()
             cluster = LocalCluster(
                 n_workers=1, threads_per_worker=settings.workers, processes=False, dashboard_address=None,
                 memory_limit=0,

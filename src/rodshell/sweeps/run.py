@@ -2,11 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from rodshell.errors import OutputError
+from rodshell.errors import OutputError, RodshellError
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.sweeps.columns import CONVERGED, STANDARD
 from rodshell.sweeps.computing import ARCHIVES, Computation, Wanted
@@ -112,6 +113,10 @@ def sweep(
                     _keep_best(plan, store, computation, folder)
                 shapes = best_jobs(store, plan.settings.best)[:SHAPES] if report else []
                 computation.compute(_archived(plan, folder, shapes), "shapes of the report", len(shapes))
+        except RodshellError:
+            with suppress(OutputError):
+                table.write()
+            raise
         except KeyboardInterrupt:
             table.write()
             done = sum(store.outcomes().values())

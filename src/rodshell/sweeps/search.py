@@ -8,6 +8,7 @@ import csv
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import ceil
 from os import PathLike
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.errors import InputError, OutputError
+from rodshell.errors import InputError, OutputError, RodshellError
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.sweeps.asktell import AskTell
 from rodshell.sweeps.axes import drawn_shares
@@ -112,6 +113,10 @@ def optimise(
                 shapes = _some(best, SHAPES) if report else []
                 kept = best if plan.settings.keep == "best" else shapes
                 computation.compute(_archived(plan, store, folder, kept), "best designs", len(kept))
+        except RodshellError:
+            with suppress(OutputError):
+                shown_table.write()
+            raise
         except KeyboardInterrupt:
             shown_table.write()
             raise KeyboardInterrupt(

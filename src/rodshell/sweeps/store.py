@@ -17,8 +17,11 @@ from rodshell.errors import OutputError
 
 STORE, LOCK = "sweep.sqlite", "sweep.lock"
 FORMAT = 1
+CACHE = 500  # kB of the coordinator's memory
+LOG = 200  # pages of SQLite's log, which is then merged into the file
+PAGE = 8192  # B: some rows fit on each, so that little of it is left empty
 TABLES = """
-CREATE TABLE IF NOT EXISTS jobs (id TEXT PRIMARY KEY, outcome TEXT NOT NULL, row BLOB NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS jobs (id TEXT PRIMARY KEY, outcome TEXT NOT NULL, row BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS designs (position INTEGER PRIMARY KEY, job TEXT NOT NULL, keys TEXT NOT NULL);
 CREATE INDEX IF NOT EXISTS design_of_job ON designs (job);
 CREATE TABLE IF NOT EXISTS notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -77,8 +80,11 @@ class Store:
             if self.writing:
                 self._take()
                 self._open(str(self.path))
+                self._connection.execute(f"PRAGMA page_size = {PAGE}")
                 self._connection.execute("PRAGMA journal_mode = WAL")
                 self._connection.execute("PRAGMA synchronous = NORMAL")
+                self._connection.execute(f"PRAGMA cache_size = -{CACHE}")
+                self._connection.execute(f"PRAGMA wal_autocheckpoint = {LOG}")
                 self._connection.executescript(TABLES)
                 self._connection.execute("INSERT OR IGNORE INTO notes VALUES ('format', ?)", (str(FORMAT),))
             elif not self.path.is_file():

@@ -20,11 +20,11 @@ import psutil
 
 import rodshell
 from rodshell.errors import OutputError, RodshellError
-from rodshell.sweeps.worker import READY
 
 TICK = 0.1  # s between two looks at a process
 PROGRAM = "from rodshell.sweeps.worker import main; main()"
 STARTS = 3  # tries to start a process
+PATIENCE = 600.0  # s that a process may take to start, compilation of kernels included
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
 
 Task = dict[str, Any]
@@ -86,18 +86,20 @@ class Worker:
 
     def _start(self) -> None:
         """A process that is ready."""
-        for attempt in range(1, STARTS + 1):
-            if self._process is not None and self._process.poll() is None:
-                return
+        if self._process is not None and self._process.poll() is None:
+            return
+        for _ in range(STARTS):
             if self._over:
                 raise Stopped
             self._process, self._replies = self._spawned()
+            begun = monotonic()
             while (line := self._next(TICK)) == "":
-                pass
-            if line is not None and READY in json.loads(line):
+                if monotonic() - begun > PATIENCE:
+                    self._kill()
+            if line is not None:  # it is ready
                 return
-            if attempt == STARTS:
-                raise EngineError(f"a process for jobs cannot be started: {self._end()}")
+            why = self._end()
+        raise EngineError(f"a process for jobs cannot be started: {why}")
 
     def _spawned(self) -> "tuple[subprocess.Popen[str], SimpleQueue[str | None]]":
         home = str(Path(rodshell.__file__).parents[1])
@@ -180,25 +182,34 @@ class Workers:
     def __init__(self) -> None:
         self._own = threading.local()
         self._all = list[Worker]()
+        self._over = False
 
     def run(self, task: Task, time_limit: float | None, memory_limit: float | None) -> Reply:
         """Run a job in the process of this thread; see `Worker.run`."""
         if getattr(self._own, "worker", None) not in self._all:
             self._own.worker = Worker()
             self._all.append(self._own.worker)
+        if self._over:
+            raise Stopped
         worker: Worker = self._own.worker
         return worker.run(task, time_limit, memory_limit)
 
     def stop(self) -> None:
-        """End all processes."""
+        """End all processes; tasks that come later are refused, until `open`."""
+        self._over = True
         while self._all:
             self._all.pop().stop()
+
+    def open(self) -> None:
+        """Accept tasks again."""
+        self._over = False
 
 
 def _pass_on(process: "subprocess.Popen[str]", replies: "SimpleQueue[str | None]") -> None:
     assert process.stdout is not None
     for line in process.stdout:
-        replies.put(line)
+        if line.endswith("\n"):  # a line without an end is of a process that died while it wrote
+            replies.put(line)
     replies.put(None)
 
 

@@ -12,7 +12,6 @@ from queue import SimpleQueue
 from time import process_time
 from typing import Any, TextIO
 
-READY = "ready"
 SMALL = {"layout.rods": "5x5", "layout.spacing": "80 mm", "layout.edge": "40 mm"}
 
 
@@ -24,7 +23,7 @@ def main() -> None:
     tasks = SimpleQueue[str]()
     threading.Thread(target=_read, args=(tasks,), daemon=True).start()
     _load_kernels()
-    _reply(replies, {READY: True})
+    _reply(replies, {})  # it is ready
     while True:
         _reply(replies, reply_to(json.loads(tasks.get())))
 

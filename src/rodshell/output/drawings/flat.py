@@ -31,9 +31,8 @@ GAP = 0.06  # from an id to a rod, in text sizes
 CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
 STRIPS_LEGEND = (
-    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice. "
-    "Open triangle: support. Arrow: the section's size "
-    "there [mm], or how many laths (L) lie on each other from there on."
+    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice.",
+    "Open triangle: support. Arrow: the section's size there [mm], or from there on the number of laths (L).",
 )
 TALL = 15.0  # text sizes from strip to strip
 
@@ -305,7 +304,8 @@ def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None =
     chosen = plan.rods if rods is None else rods
     for k, rod in enumerate(chosen):
         _strip(pencil, rod, -k * TALL * text, text, layer, plan.rounding.mm)
-    pencil.write(STRIPS_LEGEND, (0.0, -len(chosen) * TALL * text + 5 * text), text, "DIM")
+    for row, line in enumerate(STRIPS_LEGEND):
+        pencil.write(line, (0.0, -len(chosen) * TALL * text + (5.7 - 1.4 * row) * text), text, "DIM")
     return pencil.done("strips", STRIPS_TITLE, text)
 
 
