@@ -15,7 +15,6 @@ from rodshell.formfinding import PatchForm
 from rodshell.formfinding.popup import Ends
 from rodshell.refining.refine import Refinement, refine
 from rodshell.refining.stiffness_families import Taper
-from rodshell.refining.structure import Point
 from rodshell.refining.variables import Family
 from rodshell.rods.isotropic import IsotropicBend
 from tests.acceptance.cases import FURTHER, ROD
@@ -71,11 +70,16 @@ def stages_of(shell: str, ends: Ends, edge: float) -> PatchForm:
     return form.stages
 
 
-def largest_curvature(point: Point) -> float:
+def largest_curvature(popped: rs.PopUp) -> float:
     """[1/m], of round rods."""
-    (bends,) = [element for element in point.edges.shell.elements if isinstance(element, IsotropicBend)]
-    mesh = point.structure.mesh
-    return float(np.max(bends.curvatures(point.state)[: len(mesh.bends)] / mesh.voronoi_lengths))
+    (bends,) = [element for element in popped.equilibrium.elements if isinstance(element, IsotropicBend)]
+    mesh = popped.shell.mesh
+    return float(np.max(bends.curvatures(popped.state)[: len(mesh.bends)] / mesh.voronoi_lengths))
+
+
+def lowest_eigenvalue(popped: rs.PopUp) -> float:
+    """Of the tangent stiffness itself [N/m]."""
+    return float(popped.equilibrium.tangent.lowest_modes(1).values[0])
 
 
 def rows() -> Iterator[Row]:
@@ -86,17 +90,18 @@ def rows() -> Iterator[Row]:
 
 def rows_of(case: Case, found: Refinement) -> Iterator[Row]:
     name = f"{case.shell}, {case.ends}: {case.name}"
-    before, after = found.designs[0].point, found.designs[-1].point
+    after = found.designs[-1].point
     gap = 100 * found.gap_after.rms_relative
     note = f"before {100 * found.gap_before.rms_relative:.3f} %, {len(after.values)} variables"
     yield Row(name, "gap rms over the size", gap, case.gap, "%", note)
     yield Row(name, "factorisations", found.factorizations, case.most, note=f"{len(found.steps)} evaluations")
-    lowest = float(after.modes.values[0] / before.modes.values[0])
+    first, last = (stages.popped[found.ends] for stages in (found.before, found.after))
+    lowest = lowest_eigenvalue(last) / lowest_eigenvalue(first)
     compression = f"N up to {after.euler_share.max():.2f} of Euler's load"
-    yield Row(name, "not stable", float(not found.after.popped[found.ends].report.stable), 0, note=compression)
+    yield Row(name, "not stable", float(not last.report.stable), 0, note=compression)
     if case.vary == ("taper",):
         yield Row(name, "lowest eigenvalue before, over after", 1 / lowest, 1.0)
-        yield Row(name, "largest curvature over before", largest_curvature(after) / largest_curvature(before), 1.15)
+        yield Row(name, "largest curvature over before", largest_curvature(last) / largest_curvature(first), 1.15)
     elif case.ends == "clamped":
         yield Row(name, "lowest eigenvalue before, over after", 1 / lowest, 5.0)
     elif case.vary == ("tails",):

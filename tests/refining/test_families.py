@@ -30,7 +30,9 @@ EVERY: list[tuple[str, Family]] = [
     ("supports", Supports()),
 ]  # fmt: skip
 CASES = [
-    pytest.param(family, laths, id=f"{name}{', laths with pins' * laths}")
+    pytest.param(
+        family, laths, id=f"{name}{', laths with pins' * laths}", marks=[pytest.mark.slow] * (laths and name != "tails")
+    )
     for name, family in EVERY
     for laths in (False, True)
 ]
@@ -108,6 +110,7 @@ def test_states_and_objectives_change_as_their_derivatives_say(family: Family, l
     assert {name: error for name, error in errors(family, laths).items() if error > 1e-6} == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", [Taper(stations=3), Tails(), Clamps()], ids=lambda family: family.name)
 def test_under_its_weight_a_shell_changes_as_its_derivatives_say(family: Family) -> None:
     """The weight follows the design: its sections and its lengths."""

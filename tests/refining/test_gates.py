@@ -169,6 +169,7 @@ def test_a_shell_that_is_not_stable_is_tried_at_no_other_gate() -> None:
 def refused_after(count: int, monkeypatch: pytest.MonkeyPatch, halvings: int = 0) -> list[PatchForm]:
     """Gates that refuse so many designs; after the first that passes, so many between two are tried."""
     monkeypatch.setattr(acceptance, "HALVINGS", halvings)
+    monkeypatch.setattr(acceptance, "FIRMER", ())
     tried = list[PatchForm]()
 
     def some(form: PatchForm, *, all_of_them: bool = True, progress: object = None) -> Gates:

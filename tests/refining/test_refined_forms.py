@@ -52,7 +52,7 @@ def test_the_result_has_the_figures_before_and_after_and_the_refined_rods() -> N
     assert found["after"]["max_relative"] == refined.gap_after.max_relative
     assert list(found["gates"]) == ["flat", "from_flat", "remeshed", "tolerance", "stable"]
     assert all(found["gates"].values())
-    assert all(rod.stiffness is not None and max(rod.stiffness.factors) == 1.0 for rod in results.rods)
+    assert all(rod.stiffness is not None and max(rod.stiffness.factors) > 1.0 - 1e-12 for rod in results.rods)
     assert results.agreement["pinned"].rms == refined.gap_after.rms
 
 

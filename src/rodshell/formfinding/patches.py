@@ -140,12 +140,13 @@ class PatchedForm:
     @cached_property
     def draped(self) -> Floats:
         """(n, 3) all patches on the target [m]."""
-        return np.concatenate([form.trimmed.positions for form in self.patches.values()])
+        shapes = [form.boundary.draped for form in self.patches.values()]
+        return np.concatenate([shape for shape in shapes if shape is not None])
 
     @cached_property
     def boundary(self) -> Boundary:
         """Of all patches, rod by rod."""
-        parts = [form.trimmed.boundary for form in self.patches.values()]
+        parts = [form.boundary for form in self.patches.values()]
         points, tangents = (np.concatenate([getattr(part, what) for part in parts]) for what in ("points", "tangents"))
         return Boundary(points, tangents, self.draped)
 

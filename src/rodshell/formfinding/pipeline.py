@@ -274,6 +274,28 @@ def popped_again(
     )
 
 
+def meshed_again(form: PatchForm, ends: Ends) -> PatchForm:
+    """The same rods on a new mesh with the same longest edge, popped up from the shape that they had.
+
+    Parameters
+    ----------
+    form : of a target, with a pop-up.
+    ends : how the rods' ends are held.
+    """
+    old, positions, boundary = form.footprint.mesh, form.popped[ends].positions, form.boundary
+    mesh, normals = mesh_grid(old.grid, form.layout.edge), None
+    if old.layered:
+        mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
+        assert boundary.normals is not None
+        normals = old.prolong(boundary.normals, mesh)
+    draped = None if boundary.draped is None else old.prolong(boundary.draped, mesh)
+    start = replace(boundary, draped=old.prolong(positions, mesh), normals=normals)
+    again = popped_again(form, Footprint(mesh), start, ends)
+    kept = replace(start, draped=draped)
+    popped = {end: replace(shell, boundary=kept) for end, shell in again.popped.items()}
+    return replace(again, boundary=kept, popped=popped)
+
+
 def pop_up_stages(
     grid: FlatGrid,
     finals: Floats,

@@ -1,8 +1,9 @@
 """A refinement from a form to a form: the last design that passes all gates is what is built.
 
-Where the best design is refused, those accepted before it are tried, and designs between the last two; where none
-passes, the form stays as it was. Each patch of a form is refined by itself: its ends at the seams are supports as any
-others.
+Where the best design is refused, those accepted before it are tried, and designs between two of them. Then it is
+searched again: on the mesh of the grid's spans where meshing changed the gap, with a higher limit of the lowest
+eigenvalue where the shell does not withstand errors or comes to another shape from flat. Where none passes, the form
+stays as it was. Each patch of a form is refined by itself: its ends at the seams are supports as any others.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,16 +11,17 @@ from dataclasses import dataclass, replace
 
 from rodshell.errors import InputError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
-from rodshell.formfinding.pipeline import Agreement, PatchForm
+from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.refining.gates import GATES, Gates, gates
 from rodshell.refining.gauss_newton import Step
-from rodshell.refining.refine import Candidate, Refinement, between, loaded_gap, popped_up, refine
+from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, between, loaded_gap, popped_up, refine
 from rodshell.refining.variables import Family
 from rodshell.units import percent_text
 
 Stages = PatchForm | PatchedForm
+FIRMER = (0.75, 1.0)  # shares of the lowest eigenvalue that are asked for where a shell does not withstand errors
 HALVINGS = 3  # between a design that passes and a better one that does not
 NEARER = 1.0 - 1e-6  # of the gap before: more is not a gain
 
@@ -134,7 +136,37 @@ def _of_piece(
     stages: PatchForm, vary: Sequence[Family], ends: Ends, under_weight: bool, start: Sequence[float] | None,
     progress: Progress,
 ) -> Refined:  # fmt: skip
-    """Of a form in one piece."""
+    """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
+    names = tuple(family.name for family in vary)
+    progress("refine", ", ".join(names), 0.0)
+    if ends in stages.popped and not stages.popped[ends].report.stable:
+        judged = gates(_alone(stages, ends), progress=progress)
+        return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
+    first = best = last = _searched(stages, vary, ends, under_weight, start, LEAST_EIGENVALUE, progress)
+    firmer, again = list(FIRMER), stages
+    while last.refused and not last.stopped:
+        gate = last.refused.partition(":")[0]
+        if gate == "remeshed" and again is stages:
+            again = meshed_again(stages, ends)
+            if not again.popped[ends].report.stable:
+                break
+        elif gate not in ("tolerance", "from_flat") or not firmer:
+            break
+        least = firmer.pop(0) if gate != "remeshed" else LEAST_EIGENVALUE
+        last = _searched(again, vary, ends, under_weight, start, least, progress)
+        made = best.factorizations + last.factorizations, best.gate_factorizations + last.gate_factorizations
+        nearer = last.changed and (not best.changed or last.gap_after.rms < best.gap_after.rms)
+        best = replace(last if nearer else best, factorizations=made[0], gate_factorizations=made[1])
+    if not best.changed:
+        return replace(best, before=stages, after=stages, refused=first.refused, stopped=last.stopped)
+    return replace(best, before=stages, stopped=last.stopped)
+
+
+def _searched(
+    stages: PatchForm, vary: Sequence[Family], ends: Ends, under_weight: bool, start: Sequence[float] | None,
+    least_eigenvalue: float, progress: Progress,
+) -> Refined:  # fmt: skip
+    """One search, and the best of its designs that passes the gates."""
     best = list[Step]()
 
     def searching(step: Step) -> None:
@@ -144,13 +176,11 @@ def _of_piece(
         lowest = "" if step.lowest is None else f", lowest eigenvalue {step.lowest:.2g} of before"
         progress("refine", f"design {step.number}: {gap}{lowest}, step {step.radius:.2g}", 0.0)
 
-    names = tuple(family.name for family in vary)
-    progress("refine", ", ".join(names), 0.0)
-    if ends in stages.popped and not stages.popped[ends].report.stable:
-        judged = gates(_alone(stages, ends), progress=progress)
-        return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
     try:
-        found = refine(stages, vary, ends=ends, under_weight=under_weight, start=start, progress=searching)
+        found = refine(
+            stages, vary, ends=ends, under_weight=under_weight, start=start,
+            least_eigenvalue=least_eigenvalue, progress=searching,
+        )  # fmt: skip
         form, design, judged, refused, made = _accepted(found, silent if found.stopped else progress)
     except KeyboardInterrupt as stopped:
         raise KeyboardInterrupt(_where(best) or str(stopped)) from stopped
@@ -160,7 +190,7 @@ def _of_piece(
         loaded = (before, before if form is None or design is None else loaded_gap(form, design, ends))
     values = () if design is None else tuple(design.point.values.tolist())
     return Refined(
-        names, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
+        found.vary, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
         found.stopped, values, loaded,
     )  # fmt: skip
 

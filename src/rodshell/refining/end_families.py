@@ -39,6 +39,7 @@ class Directions:
     image: Callable[[Operation], Image]
 
     stock = None
+    common = False
 
     def tangents(self, values: Floats) -> Floats:
         """(2m, 3) directions of the clamps.
@@ -134,6 +135,7 @@ class Slides:
     image: Callable[[Operation], Image]
 
     stock = None
+    common = False
 
     def moved(self, values: Floats) -> Floats:
         """(2m, 3) displacements of the rod ends [m].

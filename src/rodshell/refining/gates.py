@@ -17,11 +17,10 @@ from scipy.sparse import coo_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from rodshell.arrays import Floats, Ints
-from rodshell.formfinding.pipeline import PatchForm, agreement, popped_again
+from rodshell.formfinding.pipeline import PatchForm, agreement, meshed_again
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.formfinding.trim import Footprint
-from rodshell.layout import GridMesh, mesh_grid
+from rodshell.layout import GridMesh
 from rodshell.model.edge_properties import EI1, LENGTH, EdgeProperties
 from rodshell.model.rod_sections import RodSections
 from rodshell.solve.equilibrium import find_equilibrium
@@ -34,6 +33,7 @@ SAME_SHAPE = 1e-6  # largest distance of the shape reached from flat
 MISFIT = 5e-4  # largest distance of a joint's two holes in the plane: the workshop's error, see SPAN_ERROR
 REMESHED, REMESHED_LEAST = 0.05, 2e-5  # change of the rms gap: a share of it, or so much
 SAMPLES = 8
+ERROR_STEPS = (0.25, 0.5, 0.75, 1.0)  # shares of the errors, one after the other
 SPAN_ERROR = 0.1e-3 / 0.2  # largest, of each span's length: 0.1 mm where the target's size is 0.2 m
 STIFFNESS_ERROR = 0.05  # largest, of each rod's EI and GJ
 WORSE, WORSE_BY = 1.5, 0.0015  # with errors the rms gap may be so many times its value, and so much more
@@ -105,17 +105,8 @@ def _flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
 
 
 def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
-    """The shape found before is the first guess on the new mesh."""
     (ends,) = form.popped
-    old, positions = form.footprint.mesh, _popped(form).positions
-    mesh = mesh_grid(old.grid, form.layout.edge)
-    normals = None
-    if old.layered:
-        mesh = mesh.in_layers(2 * float(np.abs(old.heights).max()))
-        assert form.boundary.normals is not None
-        normals = old.prolong(form.boundary.normals, mesh)
-    boundary = replace(form.boundary, draped=old.prolong(positions, mesh), normals=normals)
-    again = popped_again(form, Footprint(mesh), boundary, ends)
+    again = meshed_again(form, ends)
     made = _popped(again).report.factorizations
     if not _popped(again).report.stable:
         return "meshed again, the shell is not stable", made
@@ -174,17 +165,24 @@ def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
     table = np.column_stack([sections.stretch, sections.edges, mesh.edge_lengths])
     span = spans(mesh)
     edges, lengths = int(span[-1]) + 1, np.bincount(span, mesh.edge_lengths)
+    exact = EdgeProperties.of(shell, form.joint, table)
     for seed in range(samples):
         random = np.random.default_rng(seed)
-        varied = table.copy()
-        errors = SPAN_ERROR * form.target.size * random.uniform(-1.0, 1.0, edges)
-        varied[:, LENGTH] *= 1.0 + (errors / lengths)[span]
-        softer = 1.0 + STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))
-        varied[:, EI1:LENGTH] *= softer[mesh.edge_rods, None]
-        other = EdgeProperties.of(shell, form.joint, table).varied(varied).shell
-        problem = replace(found.problem, elements=other.elements, stretch=other.stretch)
-        there = find_equilibrium(problem, found.state, found.forces)
-        yield replace(popped, shell=other.with_elements(there.elements), equilibrium=there)
+        errors = (SPAN_ERROR * form.target.size * random.uniform(-1.0, 1.0, edges) / lengths)[span]
+        softer = STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))[mesh.edge_rods, None]
+        here, made = found, 0
+        for share in ERROR_STEPS:  # all at once may lead to an unstable state next to the one that the shell goes to
+            varied = table.copy()
+            varied[:, LENGTH] *= 1.0 + share * errors
+            varied[:, EI1:LENGTH] *= 1.0 + share * softer
+            other = exact.at(here.elements).varied(varied).shell
+            problem = replace(here.problem, elements=other.elements, stretch=other.stretch)
+            here = find_equilibrium(problem, here.state, here.forces)
+            made += here.report.factorizations
+            if not here.report.stable:
+                break
+        report = replace(here.report, factorizations=made)
+        yield replace(popped, shell=other.with_elements(here.elements), equilibrium=replace(here, report=report))
 
 
 def spans(mesh: GridMesh) -> Ints:

@@ -43,6 +43,7 @@ class Stations:
     across: csr_array
 
     stock = None
+    common = False
 
     def change(self, values: Floats) -> Change:
         """What a design does.

@@ -6,6 +6,7 @@ that they describe is popped up again.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
 from rodshell.formfinding.popup import Ends, PopUp
 from rodshell.formfinding.trim import Footprint
+from rodshell.joints.joint import Elastic
 from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Step, gauss_newton
@@ -37,6 +39,7 @@ FAMILIES: dict[str, Family] = {
 """The families of variables by the names that users write."""
 
 STIFFNESSES = ("taper", "double", "sections")  # the others work by compressing rods, too
+STIFFER = 1.02  # of the eigenvalue before, since EA does not follow EI
 LEAST_EIGENVALUE = 0.5  # of the lowest one before
 Progress = Callable[[Step], None]
 
@@ -134,7 +137,7 @@ def refine(
     structure = replace(structure_of(stages, ends), weighs=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
     here, spent = first_point(structure, variables, start)
-    before = float(here.modes.values[0])
+    before = structure.lowest if here.equilibrium.problem.load is None else float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
     goals = [Gap(), *stressed] if objectives is None else list(objectives)
@@ -148,8 +151,7 @@ def refine(
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    grid = Grid(structure.mesh, stages.boundary)
-    designs = tuple(Candidate(point, variables.applied(grid, point.values)) for point in accepted)
+    designs = tuple(Candidate(point, built(variables, point)) for point in accepted)
     after, made = popped_up(stages, designs[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
@@ -183,8 +185,31 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
     point, made = here.tried(values, variables.change(values))
     if point is None:
         return None, made + 1
-    grid = Grid(here.structure.mesh, here.structure.popped.boundary)
-    return Candidate(point, variables.applied(grid, values)), made + 1
+    return Candidate(point, built(variables, point)), made + 1
+
+
+def built(variables: Design, point: Point) -> Grid:
+    """The grid of a design.
+
+    A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
+    thickest place has the section itself, or more where the lowest eigenvalue would else be lower than before.
+
+    Parameters
+    ----------
+    variables : what is varied.
+    point : the design.
+    """
+    structure, values = point.structure, point.values
+    grid = Grid(structure.mesh, structure.popped.boundary)
+    joint = structure.joint
+    given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
+    springs = any(0.0 < stiffness < inf for stiffness in given)
+    if point.equilibrium.problem.load is None and not springs:
+        profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
+        thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
+        least = STIFFER * structure.lowest / float(point.modes.values[0])
+        values = variables.stiffer(values, float(np.log(max(1.0 / thickest, min(1.0, least)))))
+    return variables.applied(grid, values)
 
 
 def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:

@@ -7,7 +7,6 @@ variables have the same profile. The stiffness of the edges by these numbers is 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf
 from typing import Literal, get_args
 
 import numpy as np
@@ -15,7 +14,6 @@ from scipy.sparse import csc_array
 
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
-from rodshell.joints.joint import Elastic
 from rodshell.layout import Profile
 from rodshell.layout.profile import Varies
 from rodshell.refining.change import STIFFNESSES, Change
@@ -41,6 +39,7 @@ class Profiles:
     profile : of r numbers.
     box : of the variables.
     stock : the only values that can be built, ascending; None: all within the box.
+    common : whether adding the same to all of them multiplies every stiffness alike.
     """
 
     structure: Structure
@@ -48,6 +47,7 @@ class Profiles:
     profile: Callable[[Floats], Profile]
     box: Box
     stock: Floats | None = None
+    common: bool = False
 
     def image(self, by: Operation) -> Image:
         """Where an operation maps the variables.
@@ -61,23 +61,14 @@ class Profiles:
         return Image(index, np.ones(len(index)))
 
     def applied(self, grid: Grid, values: Floats) -> Grid:
-        """The grid whose rods have these profiles; a taper such that its thickest place has the section itself.
-
-        A common factor on all stiffnesses changes no unloaded shape, unless joints are springs: it is free.
+        """The grid whose rods have these profiles.
 
         Parameters
         ----------
         grid : before.
         values : (n,) the design.
         """
-        profiles = self.of_rods(values)
-        joint = self.structure.joint
-        given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
-        springs = any(0.0 < stiffness < inf for stiffness in given)
-        if profiles[0].varies != "laths" and not springs:
-            most = max(max(profile.factors) for profile in profiles)
-            profiles = tuple(replace(p, factors=tuple(factor / most for factor in p.factors)) for p in profiles)
-        return replace(grid, mesh=grid.mesh.with_profiles(profiles))
+        return replace(grid, mesh=grid.mesh.with_profiles(self.of_rods(values)))
 
     def of_rods(self, values: Floats) -> tuple[Profile, ...]:
         """The profile of each rod.
@@ -172,7 +163,11 @@ class Taper:
         zero = np.zeros(count)
         box = Box(zero, zero - half, zero + half, zero + 1.0)
         return Profiles(
-            structure, variable_of, lambda logs: Profile.symmetric(np.exp(logs).tolist(), varies=self.varies), box
+            structure,
+            variable_of,
+            lambda logs: Profile.symmetric(np.exp(logs).tolist(), varies=self.varies),
+            box,
+            common=True,
         )
 
 

@@ -129,6 +129,11 @@ class Structure:
         return mass
 
     @cached_property
+    def lowest(self) -> float:
+        """Lowest eigenvalue of the unloaded shell before any design [1/s2]."""
+        return float(self.popped.equilibrium.tangent.lowest_modes(1, mass=self.mass).values[0])
+
+    @cached_property
     def span_edges(self) -> Ints:
         """(e,) number of the span between joints that each edge belongs to."""
         mesh = self.mesh

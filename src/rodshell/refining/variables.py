@@ -80,6 +80,11 @@ class Untied(Variables, Protocol):
         """The only values that can be built, ascending; None: all within the bounds."""
         ...
 
+    @property
+    def common(self) -> bool:
+        """Whether adding the same to all of them multiplies every stiffness alike."""
+        ...
+
     def image(self, by: Operation) -> Image:
         """Where a symmetry maps the variables.
 
@@ -169,6 +174,16 @@ class Design:
     def stock(self) -> list[Floats | None]:
         """Of each variable the only values that can be built, ascending, or None."""
         return [part.whole.stock for part in self.parts for _ in part.box.start]
+
+    def stiffer(self, values: Floats, logarithm: float) -> Floats:
+        """Values with which every stiffness is multiplied by a common factor; unchanged where they cannot do that.
+
+        Parameters
+        ----------
+        values : (n,) of the variables.
+        logarithm : of the factor.
+        """
+        return np.concatenate([some + logarithm * part.whole.common for part, some in self._split(values)])
 
     def change(self, values: Floats) -> Change:
         return Change.together([part.change(some) for part, some in self._split(values)])
