@@ -341,7 +341,7 @@ def _blend(  # type: ignore[no-untyped-def]
         first += count
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-untyped-def]
     """Start the sums of the point `first` and of those after it that can use its list. Returns their number, and the
     distance from its nearest centre up to which centres contribute to any of them, by the triangle inequality."""
@@ -361,7 +361,7 @@ def _take(x, distance, first, centre, radius, width2, work):  # type: ignore[no-
     return count, furthest
 
 
-@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"}, forceinline=True)
 def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
     """Add one cubic to the sums of four points; see `SmoothField._packed` for its numbers."""
     x, y, z = p[0], p[1], p[2]
@@ -406,7 +406,7 @@ def _add(p, centre, width2, second, work):  # type: ignore[no-untyped-def]
             work[_HYZ + m] += 0.5 * (my * tz + mz * ty) - vy * e2 - sy * e5
 
 
-@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"}, forceinline=True)
 def _exponential(fade):  # type: ignore[no-untyped-def]
     """exp(-fade) by arithmetic alone, to 1e-9 up to a fade of 16: the series of its 64th root, squared six times."""
     y = fade / -64.0
