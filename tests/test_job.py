@@ -407,7 +407,7 @@ def test_a_table_of_rods_is_a_job_too(earlier: rs.Form, tmp_path: Path) -> None:
     assert form.agreement == {}
     assert form.archive().case_toml == ""
     assert form.archive().name == "rods"
-    assert job.run(warm_start=form).reused == ("target", "pop-up", "checks", "fabrication")
+    assert job.run(warm_start=form).reused == ("target", "pop-up", "checks", "fabrication", "loads")
     thicker = job.changed(rod__section__radius="1.1 mm").run(warm_start=form)
     assert thicker.reused == ("target",)
     assert thicker.rod.section.radius == 1.1e-3

@@ -80,7 +80,7 @@ def test_millimetres_are_rounded_once(number: object) -> None:
     ],
 )
 def test_a_bad_quantity_is_one_sentence_with_key_reason_and_remedy(value: object, kind: Kind, reason: str) -> None:
-    remedies = {"length": '"200 mm"', "stress": '"25 GPa"', "angle": '"45 deg"', "number": "0.5"}
+    remedies = {"length": '"200 mm"', "stress": '"25 GPa"', "angle": '"45 deg"', "number": "0.5", "force": '"5 kN"'}
     with pytest.raises(InputError) as caught:
         parse_quantity(value, kind, "target.radius")
     message = str(caught.value)

@@ -10,10 +10,13 @@ Kernels that are called from Python have a row in `table`; the others are part o
 
 import os
 from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from importlib.machinery import ExtensionFileLoader, ModuleSpec
 from importlib.util import module_from_spec
 from typing import Any
+
+import numpy as np
 
 from rodshell.errors import InputError
 
@@ -44,9 +47,40 @@ def njit(**options: object) -> Callable[[Kernel], Kernel]:
             from rodshell.kernels.jit import dispatcher
 
             return dispatcher(function, options)
-        return COMPILED.get(name_of(function), function)
+        kernel = COMPILED.get(name_of(function))
+        return function if kernel is None else _taking_any_array(kernel)
 
     return declared
+
+
+def _taking_any_array(kernel: Kernel) -> Kernel:
+    """A compiled kernel that also takes arrays which are not contiguous, or of other numbers, as Numba's do: it then
+    works on copies, which are copied back."""
+
+    @wraps(kernel, assigned=("__doc__",))
+    def call(*given: Any) -> Any:
+        try:
+            return kernel(*given)
+        except TypeError:
+            taken = [_plain(value) for value in given]
+            changed = [k for k, value in enumerate(given) if taken[k] is not value]
+            if not changed:
+                raise
+            result = kernel(*taken)
+            for k in changed:
+                if given[k].flags.writeable:
+                    given[k][...] = taken[k]
+            return result
+
+    return call
+
+
+def _plain(value: Any) -> Any:
+    """An array in C order, of the numbers that kernels have; anything else as it is."""
+    if not isinstance(value, np.ndarray):
+        return value
+    kinds = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_, "c": np.complex128}
+    return np.require(value, kinds.get(value.dtype.kind, value.dtype), ["C", "A"])
 
 
 def name_of(function: Kernel) -> str:
