@@ -1,4 +1,4 @@
-"""Compiled kernels: the same bits as Numba's on one level of the processor, without Numba; other arrays are copied or refused."""
+"""Compiled kernels: the same bits as Numba's on one level, without Numba; other arrays are copied or refused."""
 
 import json
 import os
