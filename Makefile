@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -49,6 +49,9 @@ accept-loads: ## print the table of loads and stability
 
 accept-refine: ## print the table of refinement
 	python -m tests.acceptance.refine
+
+accept-studio: ## print the table of the studio: dragging, sessions, flows in a browser (some minutes)
+	python -m tests.acceptance.studio
 
 accept-house: ## print the table of results before and after, archives, misuses (ten minutes)
 	python -m tests.acceptance.house

@@ -414,9 +414,9 @@ def test_table_is_coloured_by_height_in_the_unit_of_the_axes(larger: float) -> N
 
 
 @pytest.mark.slow
-def test_report_of_60_by_60_rods_stays_below_5_megabytes(tmp_path: Path) -> None:
+def test_report_of_60_by_60_rods_stays_below_6_megabytes(tmp_path: Path) -> None:
     export(sample_archive(60, 6), tmp_path, ["report"])
-    assert (tmp_path / "report.html").stat().st_size < 5e6
+    assert (tmp_path / "report.html").stat().st_size < 6e6  # 0.65 of them are the viewer's script
 
 
 def test_read_gives_back_what_was_written(out: Path, archive: Archive) -> None:

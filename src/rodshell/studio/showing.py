@@ -73,6 +73,33 @@ def _figures(archive: "Archive") -> list[tuple[str, str]]:
             rows.append((f"utilisation, {shape}, unloaded", wording.percent(bent.utilisation)))
     for ends, weight in results.self_weight.items():
         rows.append((f"carries, {ends}", wording.share_of_weight(weight)))
+    return rows + _refinement(archive) + _loads(archive)
+
+
+def _refinement(archive: "Archive") -> list[tuple[str, str]]:
+    """What the refinement gained, and why a design was refused."""
+    found = archive.results.refinement
+    if found is None or found.before is None or found.after is None:
+        return []
+    before, after = (wording.percent(gap.rms_relative) for gap in (found.before, found.after))
+    gain = f"{before} as before" if found.before == found.after else f"{before} before, {after} after"
+    rows = [(f"refined ({', '.join(found.vary)}), gap rms", gain)]
+    return rows + ([("refused", found.refused)] if found.refused else [])
+
+
+def _loads(archive: "Archive") -> list[tuple[str, str]]:
+    """What each combination of loads does."""
+    rows, rounding = [], rounding_of(archive.results)
+    for name, by_ends in archive.results.loads.items():
+        for ends, found in by_ends.items():
+            limit = "over 100" if found.limit_factor is None else wording.rounded(found.limit_factor)
+            rows.append((f"{name}, {ends}: stable up to", f"{limit} times the loads ({found.limit_kind})"))
+            at = "" if found.at_factor == 1 else f" at {wording.rounded(found.at_factor or 0.0)} times"
+            rows.append(
+                (f"{name}, {ends}: deflection{at}", wording.millimetres(found.max_deflection, rounding=rounding))
+            )
+            if found.utilisation is not None:
+                rows.append((f"{name}, {ends}: of the strength{at}", wording.percent(found.utilisation)))
     return rows
 
 

@@ -37,7 +37,7 @@ class Order:
     kind : "form": find the form of a case; "files": the last form's files as a ZIP archive; "job": find the form and
         write its folder.
     case : tables as in a case file.
-    live : somebody drags: start from the form before, and leave the checks out.
+    live : somebody drags: start from the form before, and leave refinement and checks out.
     time_limit : of form finding [s].
     folder : of the result of a "job".
     """
@@ -131,6 +131,7 @@ class _Worker:
         from rodshell.studio.showing import checked_facts, preview
 
         job = Job.load(dict(order.case))
+        plain = job.changed(refine__vary="") if job.case.refine.vary else job
         earlier = self._form if order.live else None
 
         def progress(stage: str, detail: str, residual: float) -> None:
@@ -138,11 +139,14 @@ class _Worker:
                 raise _Superseded
             self._send(order, "progress", {"stage": stage, "detail": detail})
 
-        grid = job.run(warm_start=earlier, progress=progress, time_limit=order.time_limit, until="drape")
+        grid = plain.run(warm_start=earlier, progress=progress, time_limit=order.time_limit, until="drape")
         self._show(order, "drape", *preview(grid, job))
-        form = job.run(warm_start=grid, progress=progress, time_limit=order.time_limit, until="pop-up")
+        form = plain.run(warm_start=grid, progress=progress, time_limit=order.time_limit, until="pop-up")
         self._form = form
         self._show(order, "pop-up", *preview(form, job))
+        if plain is not job and not order.live:
+            form = job.run(warm_start=form, progress=progress, time_limit=order.time_limit, until="pop-up")
+            self._show(order, "refinement", *preview(form, job))
         if not order.live:
             self._form = form = form.finished(progress)
             self._show(order, "checks", *checked_facts(form, job))

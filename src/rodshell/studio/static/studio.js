@@ -45,6 +45,36 @@ function submit(next, live) {
   if (sent || socket?.readyState !== WebSocket.OPEN) waiting = message;  // at most one waits: the newest
   else post(message);
   if (!live) remember();
+  showTools();
+}
+
+// Buttons for what takes longer; each is a part of the case
+
+const DEPLOYMENT = 8;  // equilibria from flat
+
+function showTools() {
+  const press = (name, on) => byId(name).setAttribute("aria-pressed", String(Boolean(on)));
+  press("refine", get(base, "refine.vary")?.length);
+  press("loads", base.loads?.length);
+  press("erection", get(base, "checks.stages") ?? DEPLOYMENT);
+}
+
+function checkLoads({ snow, cladding }) {
+  change(next => {
+    next.loads = [{ name: "own", kind: "self_weight", cladding: cladding.value }, { name: "snow", kind: "snow", value: snow.value }];
+    next.combinations = [{ name: "service", factors: { own: 1, snow: 1 } }];
+  });
+}
+
+function wireTools() {
+  byId("refine").onclick = () => change(next => set(next, "refine.vary", get(next, "refine.vary")?.length ? undefined : ["taper"]));
+  byId("erection").onclick = () => change(next => set(next, "checks.stages", (get(next, "checks.stages") ?? DEPLOYMENT) ? 0 : DEPLOYMENT));
+  const dialog = byId("load-values"), form = dialog.querySelector("form");
+  byId("loads").onclick = () => dialog.showModal();
+  form.onsubmit = ({ submitter }) => {
+    if (submitter.value === "check") checkLoads(form.elements);
+    else change(next => { delete next.loads; delete next.combinations; });
+  };
 }
 
 function post(message) {
@@ -508,6 +538,7 @@ function wire() {
   byId("link").onclick = async () => { await remember(); await navigator.clipboard?.writeText(location.href).catch(() => {}); say("The link is copied: it holds the whole case"); };
   byId("python").onclick = () => { byId("script").querySelector("pre").textContent = script(); byId("script").showModal(); };
   for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button").onclick = () => dialog.close();
+  wireTools();
   byId("seam").onclick = startSeam;
   byId("unseam").onclick = () => change(next => set(next, "seams.lines", undefined));
   byId("keep").onsubmit = event => { event.preventDefault(); order({ kind: "keep", name: byId("name").value || facts?.name || "variant" }); byId("name").value = ""; };
