@@ -63,6 +63,7 @@ class FakeForm:
     refined: None
 
     told: ClassVar = list[OutputOptions]()
+    from_table: ClassVar = True  # which makes no offer to refine it
 
     def finished(self, progress: Callable[[str, str, float], None]) -> "FakeForm":
         return self

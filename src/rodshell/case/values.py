@@ -265,7 +265,9 @@ def iso_date(value: object) -> str:
 def names(value: object) -> tuple[str, ...]:
     """Names: ["U01", "V03"] or "U01, V03"."""
     items = value.split(",") if isinstance(value, str) and value.strip() else value or []
-    if not isinstance(items, list | tuple) or not all(isinstance(item, str) and item.strip() for item in items):
+    if not isinstance(items, list | tuple) or not all(
+        isinstance(item, str) and re.fullmatch(r"[\w.-]+", item.strip()) for item in items
+    ):
         raise ValueError('give names such as ["U01", "V03"], or "U01, V03"')
     return tuple(dict.fromkeys(item.strip() for item in items))
 

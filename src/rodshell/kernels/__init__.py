@@ -16,8 +16,6 @@ from importlib.machinery import ExtensionFileLoader, ModuleSpec
 from importlib.util import module_from_spec
 from typing import Any
 
-import numpy as np
-
 from rodshell.errors import InputError
 
 Kernel = Callable[..., Any]
@@ -77,6 +75,8 @@ def _taking_any_array(kernel: Kernel) -> Kernel:
 
 def _plain(value: Any) -> Any:
     """An array in C order, of the numbers that kernels have; anything else as it is."""
+    import numpy as np  # here, so that the command line's help need not wait for it
+
     if not isinstance(value, np.ndarray):
         return value
     kinds = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_, "c": np.complex128}
