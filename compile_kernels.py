@@ -109,10 +109,42 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
     pythonapi._unboxers.functions[types.Array] = checked_array
     pythonapi.PythonAPI.get_c_object = c_object
     jit.kernels_are_kept = lambda: False
+    optimise_once()
     gc.disable()  # it takes a tenth of the time
     library = Kernels(library_name(level, unit), source_module="rodshell.kernels")
     library.output_dir, library.target_cpu = str(folder), level
     library.compile()
+
+
+def optimise_once() -> None:
+    """Let kernels that kernels call, and parts of Numba, be optimised once, in the library that they become part of:
+    Numba also compiles each on its own, for calls from Python, which takes a fifth of the time."""
+    from numba import _dynfunc
+    from numba.core import codegen, dispatcher
+    from numba.core.registry import cpu_target
+    from numba.core.runtime import rtsys
+
+    def without_wrappers(_, flags):  # type: ignore[no-untyped-def]
+        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        return flags
+
+    def never_called(library, described, environment):  # type: ignore[no-untyped-def]
+        return _dynfunc.make_function(described.lookup_module(), described.qualname, "", 1, environment, (library,))
+
+    def described(library, part):  # type: ignore[no-untyped-def]
+        part.data_layout = library._codegen._data_layout
+
+    rtsys.initialize(cpu_target.target_context)  # what allocates memory is compiled, and called
+    dispatcher._FunctionCompiler._customize_flags = without_wrappers
+    cpu_target.target_context.get_executable = never_called
+    codegen.CPUCodeLibrary._optimize_functions = described
+    optimise = codegen.CPUCodeLibrary._optimize_final_module
+    for kind in (codegen.JITCodeLibrary, codegen.AOTCodeLibrary):
+        kind._optimize_final_module = lambda library: (
+            optimise(library) if library.name.startswith("compiled_") else None
+        )
+    codegen.JITCodeLibrary._finalize_specific = lambda library: None
+    codegen.JITCPUCodegen._add_module = lambda code, module: None
 
 
 def source_of(module: str) -> Path:
