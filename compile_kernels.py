@@ -82,6 +82,10 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
     class Kernels(CC):  # type: ignore[misc, unused-ignore]
         """A library of the kernels that are taken while it is compiled."""
 
+        def _get_extra_cflags(self) -> list[str]:
+            """Numba's C sources, which are compiled along, take twice as long by Python's own options, -O3 -g."""
+            return [*super()._get_extra_cflags(), *(["-O1", "-g0"] if os.name == "posix" else [])]
+
         def _get_extra_ldflags(self) -> list[str]:
             return [*super()._get_extra_ldflags(), *(["-s"] if sys.platform == "linux" else [])]  # without symbols
 
