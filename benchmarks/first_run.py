@@ -48,13 +48,15 @@ def first_run(commit: str, *, jit: bool = False, pip: bool = False) -> FirstRun:
             parts = [part.replace("uv pip", "pip") for part in parts if part != "pip install uv"]
         parts.append(f"{parts[-1]}-again")
         kept = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "NUMBA", "RODSHELL"))}
-        caches = dict.fromkeys(("XDG_CACHE_HOME", "PIP_CACHE_DIR", "UV_CACHE_DIR"), folder)
+        caches = {name: f"{folder}/caches/{name}" for name in ("XDG_CACHE_HOME", "PIP_CACHE_DIR", "UV_CACHE_DIR")}
         script = "\n".join(["at() { echo at $EPOCHREALTIME; times; }", "set -e", "at", *(f"{x}\nat" for x in parts)])
-        said = subprocess.run(
-            ["bash", "-c", script], check=True, cwd=source, capture_output=True, text=True,
+        done = subprocess.run(
+            ["bash", "-c", script], cwd=source, capture_output=True, text=True,
             env=kept | caches | ({"RODSHELL_KERNELS": "jit"} if jit else {}),
-        ).stdout  # fmt: skip
-        *install, first, second = _seconds(said)
+        )  # fmt: skip
+        if done.returncode:
+            raise SystemExit(f"README's command at commit {commit} ended with {done.returncode}:\n{done.stderr}")
+        *install, first, second = _seconds(done.stdout)
         packages = next((source / ".venv" / "lib").glob("python*/site-packages"))
         size = sum(path.stat().st_size for path in packages.rglob("*") if path.is_file() and "pip" not in path.parts)
         clock, processors = (sum(part) for part in zip(*install, strict=True))
@@ -63,7 +65,7 @@ def first_run(commit: str, *, jit: bool = False, pip: bool = False) -> FirstRun:
 
 def command_of(readme: str) -> list[str]:
     """The parts of its first command, which are joined by `&&`."""
-    return re.findall(r"```sh\n(.*?)\n```", readme, re.DOTALL)[0].split(" && ")
+    return str(re.findall(r"```sh\n(.*?)\n```", readme, re.DOTALL)[0]).split(" && ")
 
 
 def _seconds(said: str) -> list[Seconds]:
