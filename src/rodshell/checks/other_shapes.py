@@ -229,7 +229,7 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     -------
     (n, 3) the nodes on that surface [m].
     """
-    from scipy.sparse.linalg import splu  # here, as most forms do not need it
+    from scipy.sparse.linalg import splu  # here, as forms without checks do not need it
 
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]

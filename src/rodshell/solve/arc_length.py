@@ -300,7 +300,7 @@ class ArcLength:
         if size <= SMALL:
             row = np.linalg.eigh(np.array([inverse(unit) for unit in np.eye(size)]))[1][:, 0]
         else:
-            from scipy.sparse.linalg import LinearOperator, eigsh  # here, as most forms do not need it
+            from scipy.sparse.linalg import LinearOperator, eigsh  # here, as forms without checks do not need it
 
             start = np.sin(1.0 + np.arange(size) ** 2)
             operator = LinearOperator((size, size), matvec=inverse, dtype=float)
