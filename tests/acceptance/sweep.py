@@ -14,8 +14,9 @@ import sys
 import tempfile
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -94,39 +95,62 @@ def many_rows(folder: Path, designs: int) -> Iterator[Row]:
 
 
 def killed_rows(folder: Path, designs: int) -> Iterator[Row]:
-    """Workers and coordinators killed at random moments, and the sweep continued each time."""
+    """Workers and coordinators killed in turn at random moments, and the sweep continued after each coordinator.
+
+    A kill counts if its process was alive: for a worker it is waited until there is one.
+    """
     name = f"{designs} designs, {KILLS} kills"
     axes = SMALL + f'"layout.spacing" = {{ from = "50 mm", to = "62 mm", count = {designs} }}'
     file = write_sweep(folder / "kills.toml", axes, 'workers = 2\nuntil = "pop-up"')
     rs.sweep(file, folder / "undisturbed")
     rng, out = random.Random(SEED), folder / "kills"
-    moments = sorted(rng.sample(range(designs // 50, designs - designs // 50, 5), KILLS))
-    kinds, again, seen = Counter[str](), 0, dict[str, float]()
+    moments = sorted(rng.sample(range(0, designs - designs // 50, 5), KILLS))
+    victims = ["worker", "coordinator"] * (KILLS // 2)
+    rng.shuffle(victims)
+    killed, seen = Counter[str](), defaultdict[str, set[float]](set)
+
+    def look() -> int:
+        """Number of recorded designs; notes the processor time of each."""
+        for job, seconds in (now := recorded(out)).items():
+            seen[job].add(seconds)
+        return len(now)
+
     process = _started(file, out)
-    for moment in moments:
-        while process.poll() is None and len(seen := recorded(out)) < moment:
+    for moment, victim in zip(moments, victims, strict=True):
+        while look() < moment and process.poll() is None:
             time.sleep(0.05)
         time.sleep(rng.random() * 0.3)
-        before = seen | recorded(out)
-        workers = psutil.Process(process.pid).children() if process.poll() is None and rng.random() < 0.5 else []
-        if workers:
-            rng.choice(workers).kill()
-            kinds["workers"] += 1
+        if victim == "worker":
+            killed[victim] += _kill_worker(process.pid, rng)
         else:
             process.kill()
-            process.wait()
-            kinds["coordinators"] += 1
+            killed[victim] += process.wait() == -signal.SIGKILL
+            look()
             process = _started(file, out)
-        after = recorded(out)
-        again += sum(after.get(job) != seconds for job, seconds in before.items())
     code = process.wait()
-    seen = before | {job: seconds for job, seconds in recorded(out).items() if job in before}
-    again += sum(seen[job] != seconds for job, seconds in before.items())
+    look()
     first, second = table(folder / "undisturbed"), table(out)
-    note = f"killed {kinds['workers']} workers and {kinds['coordinators']} coordinators"
-    yield Row(name, "exit code of the last run", code, 0, note=note)
+    for victim in ("worker", "coordinator"):
+        yield Row(name, f"{victim}s not killed, of {KILLS // 2}", KILLS // 2 - killed[victim], 0)
+    yield Row(name, "exit code of the last run", code, 0)
     yield Row(name, "rows that differ from undisturbed", _differing(first, second), 0, note=f"of {len(first)}")
-    yield Row(name, "finished jobs computed again", again, 0)
+    yield Row(name, "finished jobs computed again", sum(len(times) > 1 for times in seen.values()), 0)
+    yield Row(name, "finished jobs lost", len(seen.keys() - recorded(out).keys()), 0)
+
+
+def _kill_worker(coordinator: int, rng: random.Random) -> bool:
+    """Kill one of its workers, as soon as it has one; whether one was killed, and not the end of the sweep came first.
+
+    A child that does not run the worker's program yet is one that starts.
+    """
+    while psutil.pid_exists(coordinator) and psutil.Process(coordinator).status() != psutil.STATUS_ZOMBIE:
+        for child in rng.sample(children := psutil.Process(coordinator).children(), len(children)):
+            with suppress(psutil.NoSuchProcess):
+                if child.status() != psutil.STATUS_ZOMBIE:
+                    child.kill()
+                    return True
+        time.sleep(0.02)
+    return False
 
 
 def _started(file: Path, out: Path) -> "subprocess.Popen[bytes]":

@@ -18,6 +18,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.cli import main
+from rodshell.sweeps import watched
 from rodshell.sweeps.store import Store
 from rodshell.sweeps.table import CSV
 
@@ -155,6 +156,58 @@ def watched_children(act: Callable[[psutil.Process], None], times: int) -> Itera
     finally:
         over.set()
         thread.join()
+
+
+STARTS = """
+import pathlib, sys, time
+place = pathlib.Path({place!r})
+place.write_text(place.read_text() + "x")
+tries = len(place.read_text())
+{act}
+from rodshell.sweeps.worker import main
+main()
+"""
+
+
+@pytest.fixture
+def starting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+    """Makes each worker do something before it starts, and note that it did."""
+
+    def starting(act: str) -> Path:
+        (place := tmp_path / "starts").write_text("")
+        monkeypatch.setattr(watched, "PROGRAM", STARTS.format(place=str(place), act=act))
+        return place
+
+    return starting
+
+
+@pytest.mark.parametrize(
+    ("act", "patience", "why"),
+    [
+        ("sys.exit('no room for kernels')", watched.PATIENCE, r"exit code 1 \(no room for kernels\)"),
+        ("time.sleep(60)", 1.0, "it was not ready after 1 s"),
+    ],
+)
+def test_a_process_that_never_starts_ends_the_sweep_after_one_more_try(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    starting: Callable[[str], Path],
+    act: str,
+    patience: float,
+    why: str,
+):
+    starts = starting(act)
+    monkeypatch.setattr(watched, "PATIENCE", patience)
+    with pytest.raises(rs.RodshellError, match=f"a process for jobs cannot be started: .*{why}") as error:
+        rs.sweep(plan(), tmp_path / "out")
+    assert "\n" not in str(error.value)
+    assert starts.read_text() == "xx"
+
+
+def test_a_process_that_dies_once_while_it_starts_is_started_again(tmp_path: Path, starting: Callable[[str], Path]):
+    starts = starting("tries == 1 and sys.exit(1)")
+    assert rs.sweep(plan(axes={"layout.spacing": ["80 mm"]}), tmp_path / "out").verdicts == {"not checked": 1}
+    assert starts.read_text() == "xx"
 
 
 LONG = {"drape.method": ["bound", "paper"]}
