@@ -110,7 +110,7 @@ def test_no_design_may_keep_the_constraints(tmp_path: Path, capsys: pytest.Captu
 
 def test_the_example_is_valid():
     plan = read_search(Path(__file__).parents[2] / "examples" / "optimise.toml")
-    assert plan.keys == ("layout.spacing", "layout.rods")
+    assert plan.keys == ("generation", "layout.spacing", "layout.rods")
 
 
 @pytest.mark.parametrize(

@@ -4,21 +4,19 @@ The charts are plotly's; the page holds its library, the table once, and picture
 """
 
 import json
-import os
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rodshell.errors import InputError, OutputError
+from rodshell.errors import InputError
 from rodshell.output.pictures import picture_svg
 from rodshell.output.svg import inline
 from rodshell.results import read
-from rodshell.sweeps.columns import CONVERGED, JOB, STANDARD
-from rodshell.sweeps.computing import ARCHIVES
-from rodshell.sweeps.store import Store
-from rodshell.sweeps.table import header_of, table_rows
+from rodshell.sweeps.columns import JOB, STANDARD, is_usable
+from rodshell.sweeps.plan import Plan
+from rodshell.sweeps.store import ARCHIVES, Store
+from rodshell.sweeps.table import header_of, in_short, plain, replaced, table_rows
 
 REPORT = "report.html"
 SHAPES = 12  # pictures at most
@@ -30,21 +28,19 @@ class Page:
 
     Parameters
     ----------
-    kind, title : in its heading; summary : lines under it.
+    kind : of the plan, in its heading; plan : whose designs are shown; summary : lines in its heading.
     first : the two columns that are shown first, across and up.
     objectives : whether they are objectives, of which the front is shown.
     shapes : jobs whose shapes are shown, kept in archives/; caption : what they are, in a sentence.
-    command : that makes the report of a design, by the values of its keys; None where there is none.
     """
 
     kind: str
-    title: str
+    plan: Plan
     summary: Sequence[str]
     first: tuple[str, str]
     objectives: bool
     shapes: Sequence[str]
     caption: str
-    command: Callable[[Sequence[Any]], str | None]
 
 
 def require_plotly() -> None:
@@ -75,7 +71,7 @@ def write_report(store: Store, page: Page) -> Path:
     )
     text = environment.get_template("sweep.html.j2").render(
         kind=page.kind,
-        title=page.title,
+        title=page.plan.origin.name,
         summary=page.summary,
         objectives=page.objectives,
         caption=page.caption,
@@ -84,14 +80,8 @@ def write_report(store: Store, page: Page) -> Path:
         data=Markup(_script_json(_data(store, page))),
     )
     file = store.folder / REPORT
-    part = file.with_name(f".{REPORT}.part")
-    try:
+    with replaced(file) as part:
         part.write_text(text, encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise OutputError(f"cannot write {file}: {error.strerror}") from error
     return file
 
 
@@ -101,21 +91,13 @@ def _data(store: Store, page: Page) -> dict[str, Any]:
     names = [*keys, *STANDARD, *(column.name for column in columns)]
     rows = list(table_rows(store, columns))
     designs = [(design.job, design.row) for design in store.finished()]
-    usable = [
-        k
-        for k, (_, row) in enumerate(designs)
-        if row.get("status") == CONVERGED and row.get("verdict") != "unbuildable"
-    ]
-    cells = {name: [_cell(row[k]) for row in rows] for k, name in enumerate(names) if name != JOB}
+    usable = [k for k, (_, row) in enumerate(designs) if is_usable(row)]
+    cells = {name: [plain(row[k]) for row in rows] for k, name in enumerate(names) if name != JOB}
     links = [_link(store, job) for job, _ in designs]
-    commands = [page.command(row[: len(keys)]) for row in rows]
+    commands = [page.plan.command(row[: len(keys)]) for row in rows]
     return {
         "keys": keys, "rows": cells, "links": links, "commands": commands, "usable": usable, "first": list(page.first),
     }  # fmt: skip
-
-
-def _cell(value: Any) -> Any:
-    return value if value is None or isinstance(value, int | float | str) else json.dumps(value)
 
 
 def _link(store: Store, job: str) -> str | None:
@@ -136,13 +118,9 @@ def _shapes(store: Store, page: Page) -> Iterable[dict[str, str]]:
         archive = read(folder)
         if archive.final is not None:
             values = zip(keys, by_job[job].keys, changing, strict=True)
-            given = ", ".join(f"{key} {_shown(value)}" for key, value, changes in values if changes)
+            given = ", ".join(f"{key} {in_short(value)}" for key, value, changes in values if changes)
             link = _link(store, job) or ""
             yield {"svg": inline(picture_svg(archive, archive.final)), "link": link, "caption": given}
-
-
-def _shown(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(_cell(value))
 
 
 def _script_json(content: Any) -> str:
