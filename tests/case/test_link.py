@@ -67,6 +67,7 @@ def test_files_of_a_case_are_named_as_uploads(tmp_path: Path) -> None:
 
 def test_what_no_case_file_can_describe_has_no_link() -> None:
     target = rs.HeightField(function=lambda x, y: 1 - x * x - y * y, domain=rs.Disc(0.9))
-    case = rs.Job(target, rs.GridLayout(rods=(9, 9), spacing=(0.2, 0.2), length=2.0, edge=0.1)).case
+    layout = rs.GridLayout(rods=(9, 9), spacing=(0.2, 0.2), length=2.0, edge=0.1)
+    case = rs.Job(target, layout, rs.Rod(rs.Circle(0.01), rs.Material(1e9, 1e3))).case
     with pytest.raises(InputError, match="the studio cannot hold"):
         studio_link(case)
