@@ -100,7 +100,7 @@ def test_all_forms_are_kept_by_their_job(tmp_path: Path):
     page = (tmp_path / "report.html").read_text()
     data = json.loads(page.partition("const designs = ")[2].partition(";\n")[0])
     assert data["rows"]["rms_pinned"] == [*(float(row["rms_pinned"]) for row in rows_of(tmp_path)[:4]), None, None]
-    assert [link is not None for link in data["links"]] == [True] * 4 + [False] * 2
+    assert [link is not None for link in data["reports"]] == [True] * 4 + [False] * 2
     assert page.count("<figure>") == 4
     assert "http" not in page.partition("</style>")[2].partition("<script>")[0]
 

@@ -78,6 +78,17 @@ class Origin:
         """The first base, by whose case quantities are read."""
         return next(iter(self.bases.values()))
 
+    def source(self, base: str) -> str | None:
+        """By what a command names a base; None for a job that was made in Python."""
+        file = self.folder / base
+        return base if base in BUILT_IN else str(file) if file.is_file() else None
+
+    @property
+    def studio_command(self) -> str:
+        """The command that starts the studio, with the files of the first base that has any."""
+        named = (self.source(name) for name, job in self.bases.items() if job.case.files)
+        return shlex.join(["rodshell", "studio", *[source for source in named if source][:1]])
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -112,10 +123,9 @@ class Plan:
         values : of its keys.
         """
         base, changes = self._changes(values)
-        place = self.origin.folder / base
-        if base not in BUILT_IN and not place.is_file():
+        if (source := self.origin.source(base)) is None:
             return None
-        words = ["rodshell", "form", base if base in BUILT_IN else str(place)]
+        words = ["rodshell", "form", source]
         for key, value in flattened(changes).items():
             words += [f"--{key}", ",".join(map(str, value)) if isinstance(value, list | tuple) else str(value)]
         return shlex.join(words)

@@ -187,7 +187,9 @@ def _page(plan: SweepPlan, found: Swept, shapes: Sequence[str]) -> Page:
         plan=plan,
         summary=found.summary().splitlines(),
         first=(next(numbers, "total_length"), measure),
-        objectives=False,
+        measures=[measure],
+        larger=(),
+        counts=lambda design: is_usable(design.row),
         shapes=shapes,
         caption=f"The designs with the smallest {measure} that converged and can be built. Click one for its report.",
     )

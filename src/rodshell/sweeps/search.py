@@ -111,7 +111,9 @@ def optimise(
                 plan=plan,
                 summary=found.summary().splitlines(),
                 first=(objectives[0], objectives[1]) if len(objectives) > 1 else (GENERATION, objectives[0]),
-                objectives=len(objectives) > 1,
+                measures=objectives,
+                larger=[objective.column for objective in plan.objectives if objective.sign < 0],
+                counts=lambda design: _is_feasible(plan, design),
                 shapes=shapes,
                 caption="Designs of the front, in the order of the first objective. Click one for its report.",
             )
@@ -164,6 +166,11 @@ def _judged(plan: SearchPlan, outcome: str | None, row: Mapping[str, Any]) -> tu
     return signed, [0.0, *broken]
 
 
+def _is_feasible(plan: SearchPlan, design: Finished) -> bool:
+    """Whether a design converged and keeps all constraints."""
+    return max(_judged(plan, design.outcome, design.row)[1]) <= 0
+
+
 def _value(row: Mapping[str, Any], column: str) -> Any:
     return row.get(column) if column in STANDARD else read_column(column).of(row.get("results", {}))
 
@@ -177,11 +184,11 @@ def front_of(plan: SearchPlan, store: Store) -> tuple[list[Finished], int]:
     ----------
     plan : of the search; store : with its designs.
     """
-    kept = list[tuple[list[float], Finished]]()
-    for design in store.finished():
-        values, violations = _judged(plan, design.outcome, design.row)
-        if max(violations) <= 0:
-            kept.append((values, design))
+    kept = [
+        (_judged(plan, design.outcome, design.row)[0], design)
+        for design in store.finished()
+        if _is_feasible(plan, design)
+    ]
     if not kept:
         return [], 0
     all_values = np.array([values for values, _ in kept])

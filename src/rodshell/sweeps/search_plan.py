@@ -90,16 +90,7 @@ class SearchPlan(Plan):
 
 
 def read_search(source: Source) -> SearchPlan:
-    """The plan of a search.
-
-    Parameters
-    ----------
-    source : path of a TOML file, or its content as a mapping.
-
-    Raises
-    ------
-    InputError : it cannot be read or used; in one sentence.
-    """
+    """The plan of a search; `source` and errors as of `read_plan`."""
     origin = read_origin(source, TABLES)
     if len(origin.bases) > 1:
         raise InputError("base: a search has one: choose among targets by a variable such as target.kind")

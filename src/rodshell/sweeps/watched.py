@@ -1,6 +1,6 @@
 """Processes that run jobs, each watched: one that takes too long or too much memory is stopped alone.
 
-A process that dies is tried once more: while it starts, and with its job.
+A process that dies while it starts is started again, and a job whose process dies is run again, both once.
 """
 
 import json
