@@ -321,19 +321,20 @@ def front_rows(folder: Path) -> Iterator[Row]:
 
 
 def study_rows(folder: Path) -> Iterator[Row]:
-    """G0 of the sweep's runs moves against the first as docs/paper/studies says.
+    """The sweep's runs against the paper's figures: G0 over spacing is that of Fig 7, and over E, r and g it moves
+    against the first run as docs/paper/studies says.
 
     A job whose drape has not converged has no G0: such runs are compared by strain and state only.
     """
     rs.sweep(ROOT / "examples" / "studies.toml", folder / "studies")
+    first, *others = table(folder / "studies")
+    base = _ends(folder, first)
+    spaced = [row for row in others if row["layout.spacing"] != first["layout.spacing"]]
+    yield from _spacing_rows({float(row["layout.spacing"]): _ends(folder, row) for row in spaced})
     lines = json.loads((ROOT / "docs/paper/studies/result.json").read_text())["lines"]
     known = {(line["changed"], f"{line['factor']:g}"): line for line in lines}
-    base: dict[str, tuple[float, float]] | None = None
-    worst, strain, rests, compared = 0.0, 0.0, 0, 0
-    for row in table(folder / "studies"):
-        results = rs.read(folder / "studies" / "archives" / row["job"]).results
-        ends = {rod.id: (rod.start, rod.end) for rod in results.rods}
-        base = base or ends
+    worst, strain, rests, compared = 0.0, 0.0, 0, Counter[str]()
+    for row in [row for row in (first, *others) if row not in spaced]:
         factors = {
             "E": float(row["rod.material.youngs_modulus"]) / 1e6,
             "r": float(row["rod.section.radius"]) / 1e-3,
@@ -344,15 +345,42 @@ def study_rows(folder: Path) -> Iterator[Row]:
         strain = max(strain, abs(float(row["drape.max_strain"]) / line["strain"] - 1))
         rests += row["drape.status"] != line["rests"]
         if row["drape.status"] == "converged":
+            ends = _ends(folder, row)
             moved = np.concatenate([np.subtract(ends[name], base[name]) for name in ends if name in base])
             rms, largest = float(np.sqrt(np.mean(moved**2))), float(np.abs(moved).max())
             worst = max(worst, abs(rms - line["change_rms"]), abs(largest - line["change_max"]))
-            compared += 1
-    name, note = "the paper's studies of E, r and g", f"{compared} of 12 runs, whose drape converged"
+            compared[changed] += 1
+    name = "the paper's studies of E, r and g"
+    note = f"{', '.join(f'{count} of {of}' for of, count in compared.items())}, whose drape converged"
     yield Row(name, "change of G0 off docs/paper/studies", 1e3 * worst, 1e-3, "mm", note)
-    yield Row(name, "runs compared, at least", -compared, -7)
+    yield Row(name, "runs compared, at least", -compared.total(), -7)
     yield Row(name, "largest strain, relative", strain, 1e-5, note="12 runs")
     yield Row(name, "states of rest that differ", rests, 0, note="12 runs")
+
+
+def _ends(folder: Path, row: dict[str, str]) -> dict[str, tuple[float, float]]:
+    """G0 of a run: where each rod ends."""
+    results = rs.read(folder / "studies" / "archives" / row["job"]).results
+    return {rod.id: (rod.start, rod.end) for rod in results.rods}
+
+
+def _spacing_rows(found: dict[float, dict[str, tuple[float, float]]]) -> Iterator[Row]:
+    """G0 by spacing [m]."""
+    name = "the paper's study of spacing"
+    drapes = json.loads((ROOT / "docs/paper/fig7/result.json").read_text())["drapes"]
+    known = {
+        drape["spacing"]: {rod["id"]: (rod["start"], rod["end"]) for rod in drape["rods"]}
+        for drape in drapes
+        if drape["method"] == "gravity"
+    }
+    yield Row(name, "runs and rods that are not those", float(_names(found) != _names(known)), 0)
+    apart = [np.subtract(end, known[spacing][rod]) for spacing, ends in found.items() for rod, end in ends.items()]
+    note = f"{len(apart)} rods at {', '.join(f'{1e3 * spacing:g}' for spacing in found)} mm"
+    yield Row(name, "ends of G0 off docs/paper/fig7", 1e3 * float(np.abs(apart).max()), 1e-3, "mm", note)
+
+
+def _names(ends: dict[float, dict[str, tuple[float, float]]]) -> dict[float, set[str]]:
+    return {spacing: set(rods) for spacing, rods in ends.items()}
 
 
 def all_rows(designs: int, only: str | None) -> Iterator[Row]:

@@ -109,7 +109,7 @@ def test_files_lie_beside_the_sweep_file(tmp_path: Path):
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-@pytest.mark.parametrize(("name", "count"), [("sweep", 6), ("studies", 12)])
+@pytest.mark.parametrize(("name", "count"), [("sweep", 6), ("studies", 14)])
 def test_examples_are_valid(name: str, count: int):
     assert len(list(read_plan(EXAMPLES / f"{name}.toml").designs())) == count
 

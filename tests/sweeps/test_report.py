@@ -28,7 +28,8 @@ def test_points_of_a_search_open_their_report_or_the_studio_and_the_front_is_tha
     from playwright.sync_api import sync_playwright
 
     wanted = {"minimise": ["rms_pinned"], "maximise": ["total_length"]}
-    search = plan(objectives=wanted, constraints={"total_length": {"max": 5.5}}, run={"until": "pop-up"})
+    few = {"population": 6, "generations": 1, "seed": 3}
+    search = plan(objectives=wanted, constraints={"total_length": {"max": 5.5}}, search=few)
     found = rs.optimise(search, tmp_path / "out", report=True)
     assert 0 < found.feasible < found.designs
     said = list[str]()

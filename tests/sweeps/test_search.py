@@ -84,7 +84,7 @@ def test_the_lightest_rod_that_is_stiff_enough_is_found(tmp_path: Path):
             variables={"rod.section.radius": {"from": "0.5 mm", "to": "2 mm"}},
             objectives={"minimise": ["rod.mass_per_length"]},
             constraints={"rod.EI": {"min": stiffness}},
-            search={"population": 8, "generations": 10, "seed": 1},
+            search={"population": 8, "generations": 7, "seed": 1},
         ),
         tmp_path,
     )
