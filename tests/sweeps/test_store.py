@@ -141,6 +141,7 @@ def test_the_table_has_a_row_for_each_finished_design_in_order(tmp_path: Path):
     table = rs.read_sweep(tmp_path, ["fabrication.total_mass"])
     assert table.column_names == [*head, "fabrication.total_mass"]
     assert table["rms_pinned"].to_pylist() == [0.0125, None, 0.0125]
+    assert str(table["rods"].type) == "int64"
     assert table["joint.kind"].to_pylist() == ["ball", "[13, 11]", None]
 
 

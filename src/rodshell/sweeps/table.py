@@ -185,9 +185,9 @@ def arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Tab
 
 
 def _alike(values: list[Any]) -> list[Any]:
-    """Cells of one type: numbers, truth values, or text."""
+    """Cells of one type: truth values, whole numbers, numbers, or text."""
     known = [value for value in values if value is not None]
-    if all(isinstance(value, bool) for value in known) or all(isinstance(value, str) for value in known):
+    if any(all(type(value) is kind for value in known) for kind in (bool, int, str)):
         return values
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
         return [None if value is None else float(value) for value in values]
