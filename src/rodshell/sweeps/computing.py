@@ -16,7 +16,7 @@ from rodshell.sweeps.identity import job_identity, program_version
 from rodshell.sweeps.plan import Plan
 from rodshell.sweeps.report import REPORT
 from rodshell.sweeps.store import ARCHIVES, FOUND, LOST, STORE, Store
-from rodshell.sweeps.table import CSV, PARQUET, Table, write_parquet
+from rodshell.sweeps.table import CSV, PARQUET, Table, replaced, write_parquet
 from rodshell.sweeps.watched import Reply
 
 COPY = "sweep.toml"
@@ -59,14 +59,13 @@ class Computation:
         self._running = dict[Future[Reply], str]()
         self._begun = monotonic()
 
-    def wanted(self, values: Sequence[Any], *, kept: bool) -> Wanted:
-        """The job of a design, by the values of its keys; kept : whether its result folder is wanted.
+    def wanted(self, job: Job, *, kept: bool) -> Wanted:
+        """A job as it is wanted; kept : with its result folder in archives/.
 
         Raises
         ------
-        InputError : no case can have these values, or a file of it cannot be read.
+        InputError : a file of its case cannot be read.
         """
-        job = self._plan.job(values)
         name = job_identity(job, self._plan.settings.until)
         return Wanted(name, job, self.store.folder / ARCHIVES / name if kept else None)
 
@@ -100,6 +99,11 @@ class Computation:
                     self._record(future)  # what has finished meanwhile
             self._running.clear()
             raise
+
+    def archived(self, jobs: Sequence[str]) -> list[Wanted]:
+        """Finished jobs, in this order, wanted with their result folders in archives/."""
+        keys = {design.job: design.keys for design in self.store.finished() if design.job in jobs}
+        return [self.wanted(self._plan.job(keys[job]), kept=True) for job in jobs]
 
     def is_finished(self, wanted: Wanted) -> bool:
         """Whether nothing has to be computed for a job."""
@@ -138,12 +142,6 @@ def _time_text(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def archived(computation: Computation, jobs: Sequence[str]) -> list[Wanted]:
-    """Finished jobs, in this order, their result folders wanted."""
-    keys = {design.job: design.keys for design in computation.store.finished() if design.job in jobs}
-    return [computation.wanted(keys[job], kept=True) for job in jobs]
-
-
 @contextmanager
 def opened_computation(plan: Plan, folder: Path, progress: Progress, *, retry: bool) -> Iterator[Computation]:
     """A computation into a folder, in which the table shows what is finished however this is left.
@@ -160,7 +158,8 @@ def opened_computation(plan: Plan, folder: Path, progress: Progress, *, retry: b
     _require_own(folder)
     with Store(folder, writing=True) as store:
         if plan.origin.text:
-            (folder / COPY).write_text(plan.origin.text, encoding="utf-8")
+            with replaced(folder / COPY) as part:
+                part.write_text(plan.origin.text, encoding="utf-8")
         table = Table(store)
         try:
             with opened_engine(plan.settings) as engine:

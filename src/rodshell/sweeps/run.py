@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.sweeps.columns import CONVERGED, STANDARD, is_usable
-from rodshell.sweeps.computing import Computation, Wanted, archived, opened_computation
+from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.identity import job_identity
 from rodshell.sweeps.plan import Source, SweepPlan, read_plan
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
@@ -103,7 +103,7 @@ def sweep(
             _keep_best(plan, computation)
         if report:
             shapes = best_jobs(store, plan.settings.best)[:SHAPES]
-            computation.compute(archived(computation, shapes), "shapes of the report", len(shapes))
+            computation.compute(computation.archived(shapes), "shapes of the report", len(shapes))
             write_report(store, _page(plan, found, shapes))
     return found
 
@@ -148,7 +148,7 @@ def swept(store: Store, computed: int) -> Swept:
 
 
 def _wanted(plan: SweepPlan, computation: Computation) -> Iterator[Wanted]:
-    return (computation.wanted(values, kept=plan.settings.keep == "all") for values, _ in plan.designs())
+    return (computation.wanted(job, kept=plan.settings.keep == "all") for _, job in plan.designs())
 
 
 def _keep_best(plan: SweepPlan, computation: Computation) -> None:
@@ -157,7 +157,7 @@ def _keep_best(plan: SweepPlan, computation: Computation) -> None:
     best = next(iter(best_jobs(store, plan.settings.best)), None)
     if best is None or (store.note(BEST) == best and (store.folder / BEST / "result.json").is_file()):
         return
-    (wanted,) = archived(computation, [best])
+    (wanted,) = computation.archived([best])
     computation.compute([replace(wanted, archive=store.folder / BEST, again=True)], "best design", 1)
     store.take_note(BEST, best)
 

@@ -19,7 +19,7 @@ from rodshell.formfinding.progress import Progress, silent
 from rodshell.sweeps.asktell import AskTell
 from rodshell.sweeps.axes import drawn_shares
 from rodshell.sweeps.columns import CONVERGED, STANDARD, read_column
-from rodshell.sweeps.computing import Computation, Wanted, archived, opened_computation
+from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.plan import GENERATION, Source
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.search_plan import FAR, SearchPlan, read_search
@@ -100,7 +100,7 @@ def optimise(
         best = [design.job for design in front]
         shapes = _some(best, SHAPES) if report else []
         kept = best if plan.settings.keep == "best" else shapes
-        computation.compute(archived(computation, kept), "best designs", len(kept))
+        computation.compute(computation.archived(kept), "best designs", len(kept))
         rows = tuple(_front_row(plan, design) for design in front)
         names = [*plan.keys[1:], *objectives]
         write_csv(folder / FRONT, names, ([row[name] for name in names] for row in rows))
@@ -144,7 +144,7 @@ def _generation(plan: SearchPlan, number: int, algorithm: AskTell, computation: 
     names, wanted = list[str](), list[Wanted]()
     for values in designs:
         try:
-            wanted.append(computation.wanted(values, kept=plan.settings.keep == "all"))
+            wanted.append(computation.wanted(plan.job(values), kept=plan.settings.keep == "all"))
             names.append(wanted[-1].id)
         except InputError as error:  # values that no case can have together
             names.append(f"no case {json.dumps(values[1:])}")
