@@ -213,10 +213,10 @@ def fault_rows(folder: Path) -> Iterator[Row]:
             found = rs.sweep(file, folder / what)
         yield Row(f"a worker {what}", "not said", float(found.failures != ((sentence, 1),)), 0, note=sentence)
         yield Row(f"a worker {what}", "other designs lost", 1 - found.verdicts.get("not checked", 0), 0)
-    sizes = '"layout.rods, layout.spacing, layout.edge" = [["5x5", 0.08, 0.04], ["33x33", 0.012, 0.0015]]'
-    file = write_sweep(folder / "fault.toml", sizes, 'until = "pop-up"\nmemory_limit = "320 MB"')
+    sizes = '"layout.rods, layout.spacing, layout.edge" = [["5x5", 0.08, 0.04], ["33x33", 0.012, 0.0008]]'
+    file = write_sweep(folder / "fault.toml", sizes, 'until = "pop-up"\nmemory_limit = "250 MB"')
     found = rs.sweep(file, folder / "memory")
-    sentence = "stopped: it took more memory than the limit of 320 MB"
+    sentence = "stopped: it took more memory than the limit of 250 MB"
     yield Row("a worker eats memory", "not said", float(found.failures != ((sentence, 1),)), 0, note=sentence)
     yield Row("a worker eats memory", "other designs lost", 1 - found.verdicts.get("not checked", 0), 0)
     yield from _disk_rows(folder)
