@@ -152,7 +152,7 @@ class Case(Table):
         return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.permanent_strength)
 
     def permanent_strength(self, material: "Material") -> float | None:
-        """What rods of a material withstand permanently [Pa]: as given, or as building codes have it of a preset."""
+        """What rods of a material withstand permanently [Pa]: as given, or by the building code of a preset."""
         from rodshell.rods.design_strength import permanent_strength
 
         given = self.strength.permanent or self.checks.strength

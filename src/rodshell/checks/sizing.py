@@ -127,7 +127,7 @@ class Fit:
 
         Parameters
         ----------
-        strength : permanent [Pa]; None: the preset's, as building codes have it.
+        strength : permanent [Pa]; None: the preset's by its building code.
         shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
 
         Raises
