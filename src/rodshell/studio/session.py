@@ -17,13 +17,12 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from rodshell.case.load import BUILT_IN, BY_SUFFIX, FILE_KEYS
+from rodshell.case.link import UPLOAD
+from rodshell.case.load import BUILT_IN, FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.studio.worker import News, Order, run_worker
 from rodshell.units import shown
 
-UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
-UPLOADS = (*(suffix for suffix in BY_SUFFIX if suffix != ".gltf"), ".dxf")  # a .gltf names further files
 ENDED = "the job was ended by the system, perhaps for lack of memory: use fewer rods, or longer edges"
 GRACE = 30.0  # s beyond the time limit after which a worker that says nothing is ended
 MOST_CASES = 500  # of a session's history
@@ -285,24 +284,6 @@ def with_uploads(case: Mapping[str, Any], uploads: Mapping[str, Path]) -> dict[s
     if dotted or (isinstance(frames, dict) and frames.get("frames") is not None):
         raise InputError("a case in the studio has tables in place of dotted keys, and no drape.frames")
     return found
-
-
-def upload_name(name: str) -> str:
-    """A plain file name for an upload.
-
-    Parameters
-    ----------
-    name : as the browser gave it.
-
-    Raises
-    ------
-    InputError : not the name of a file that the studio reads.
-    """
-    plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")[-100:]
-    suffix = Path(plain).suffix.lower()
-    if suffix not in UPLOADS or not Path(plain).stem:
-        raise InputError(f"{shown(name)}: the studio reads {', '.join(UPLOADS)}")
-    return plain
 
 
 class Sessions:
