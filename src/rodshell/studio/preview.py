@@ -135,8 +135,8 @@ def plan(form: "Form") -> list[dict[str, Any]]:
     mesh, allowance = form.footprint.mesh, form.options.fabrication.end_allowance
     ends = mesh.flat[mesh.ends.ravel(), :2].reshape(-1, 4).tolist()
     return [
-        {"id": rod.name, "family": rod.family, "ends": places, "length": rod.length + 2 * allowance}
-        for rod, places in zip(mesh.grid.rods, ends, strict=True)
+        {"id": rod.name, "family": rod.family, "ends": both, "length": rod.length + 2 * allowance}
+        for rod, both in zip(mesh.grid.rods, ends, strict=True)
     ]
 
 
