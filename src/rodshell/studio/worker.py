@@ -4,8 +4,8 @@ It takes orders from a pipe and sends back what it finds as it is found: first t
 popped-up shells, then checks and verdict. While somebody drags, each order starts from the form before; the last one,
 after the release, is run as the command line runs it, from nothing.
 
-A newer order ends an older one: at any iteration, but while somebody drags only once the grid of the older one was
-shown, so that every order that is begun is seen.
+A newer order ends an older one, which a word in the pipe asks for (None): at any iteration, but while somebody drags
+only once the grid of the older one was shown, so that every order that is begun is seen.
 """
 
 import resource
@@ -57,7 +57,8 @@ class News:
 
     Parameters
     ----------
-    serial : of the order; kind : "taken", "progress", "stage", "files", "done", or "failed".
+    serial : of the order; kind : "taken", "progress", "stage", "files"; at its end "done", "failed", or "left", for a
+        newer one.
     facts : plain values for the page; content : a scene, or a file.
     """
 
@@ -88,7 +89,8 @@ def run_worker(connection: Connection, memory: int = MEMORY) -> None:
             order = connection.recv()
         except (EOFError, OSError):
             return
-        worker.obey(order)
+        if order is not None:  # else a word about an order that came after the one that it was to end
+            worker.obey(order)
 
 
 def _import_all() -> None:
@@ -109,7 +111,7 @@ class _Worker:
         try:
             {"form": self._find, "files": self._files, "job": self._job}[order.kind](order)
         except _Superseded:
-            return
+            self._send(order, "left")
         except RodshellError as error:
             self._send(order, "failed", {"sentence": str(error)})
         except MemoryError:
@@ -136,11 +138,11 @@ class _Worker:
         self._preview = show = self._preview or Preview()
         job = Job.load(dict(order.case))
         plain = job.changed(refine__vary="") if job.case.refine.vary else job
-        earlier, said = self._form if order.live else None, monotonic()
+        earlier, said, shown = self._form if order.live else None, monotonic(), False
 
         def progress(stage: str, detail: str, residual: float) -> None:
             nonlocal said
-            if not order.live and self._connection.poll():
+            if (shown or not order.live) and self._connection.poll():
                 raise _Superseded
             if monotonic() > said + PAUSE:
                 said = monotonic()
@@ -148,6 +150,7 @@ class _Worker:
 
         grid = plain.run(warm_start=earlier, progress=progress, time_limit=order.time_limit, until="drape")
         self._show(order, "drape", *show.of(grid))
+        shown = True
         form = plain.run(warm_start=grid, progress=progress, time_limit=order.time_limit, until="pop-up")
         self._form = form
         self._show(order, "pop-up", *show.of(form))

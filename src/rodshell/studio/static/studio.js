@@ -29,7 +29,7 @@ const IDLE = ["drape.frames", "target.file", "target.boundary", "seams.file"];  
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
 
 let start, session, socket, viewer, gui, drawn;
-let base = {}, resolved = null, serial = 0, sent = 0, waiting = null, shown = 0, facts = null, stage = "", history = { at: -1, cases: [], variants: [] };
+let base = {}, resolved = null, serial = Date.now(), waiting = null, shown = 0, facts = null, stage = "", history = { at: -1, cases: [], variants: [] };
 
 // The case, and what is sent
 
@@ -41,9 +41,11 @@ function change(edit, live = false) {
 
 function submit(next, live) {
   base = next;
-  const message = { kind: "case", serial: ++serial, case: base, live };
-  if (sent || socket?.readyState !== WebSocket.OPEN) waiting = message;  // at most one waits: the newest
-  else post(message);
+  const soon = waiting;
+  serial = Math.max(serial, shown) + 1;
+  waiting = { kind: "case", serial, case: base, live };  // at most one waits: the newest
+  if (!live) post();
+  else if (!soon) requestAnimationFrame(post);  // at most one a frame
   if (!live) remember();
   showTools();
 }
@@ -77,9 +79,10 @@ function wireTools() {
   };
 }
 
-function post(message) {
-  sent = message.serial;
-  socket.send(JSON.stringify(message));
+function post() {
+  if (!waiting || socket?.readyState !== WebSocket.OPEN) return;
+  socket.send(JSON.stringify(waiting));
+  waiting = null;
 }
 
 function order(message) {
@@ -91,7 +94,7 @@ function connect() {
   socket = new WebSocket(`${scheme}://${location.host}/api/sessions/${session}/live`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
-  socket.onopen = () => { sent = 0; };
+  socket.onopen = post;
   socket.onclose = ({ code }) => {
     if (code === 4404) { localStorage.removeItem("rodshell-session"); return open(); }
     say("The server does not answer; trying again", true);
@@ -114,11 +117,6 @@ async function open() {
 
 function hear(news) {
   if (news.kind === "session") return restore(news);
-  if (news.kind === "taken" && news.serial >= sent) {
-    sent = 0;
-    if (waiting) { const next = waiting; waiting = null; post(next); }
-    return;
-  }
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
   if (news.kind === "stage" && news.serial >= shown) {
     shown = news.serial;
@@ -129,7 +127,6 @@ function hear(news) {
   }
   if (news.kind === "done" && news.serial === serial) say("");
   if (news.kind === "failed" && (news.serial === serial || news.serial < 0 || !news.serial)) failed(news.sentence);
-  if (news.kind === "failed" && news.serial >= sent) sent = 0;
 }
 
 function see(bytes) {
