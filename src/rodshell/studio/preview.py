@@ -141,12 +141,16 @@ def plan(form: "Form") -> list[dict[str, Any]]:
 
 
 def handles(form: "Form") -> Mapping[str, Any] | None:
-    """Where the handles of anchor and heading stand; None for a form in patches."""
+    """Where the handles of anchor, heading and base plane stand; None for a form in patches."""
     if form.seams:
         return None
     anchor = form.case.drape.anchor or form.target.summit
     place = form.target.lift(np.array([anchor], dtype=float))[0]
-    return {"anchor": place.tolist(), "heading": form.layout.rotate, "size": form.target.size}
+    found = {"anchor": place.tolist(), "heading": form.layout.rotate, "size": form.target.size}
+    if "base" in type(form.case.target).model_fields:  # its plane can be moved
+        ends = form.boundary.points
+        found["base"] = ends[int(ends[:, 0].argmax())].tolist()
+    return found
 
 
 def _joints(mesh: GridMesh) -> tuple[list[str], Ints]:

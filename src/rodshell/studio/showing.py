@@ -33,9 +33,17 @@ def checked(form: "Form", job: "Job") -> tuple[dict[str, Any], bytes]:
         "verdict": {"level": verdict.level, "headline": verdict.headline, "reasons": list(verdict.reasons)},
         "facts": facts_of(archive.results),
         "case": job.to_toml(),
-        "resolved": form.case.model_dump(mode="json", exclude_none=True),
+        "resolved": _resolved(form),
     }
     return facts, b"" if scene is None else scene.content()
+
+
+def _resolved(form: "Form") -> dict[str, Any]:
+    """The case with the values that were chosen where it says "auto"."""
+    tables = form.case.model_dump(mode="json", exclude_none=True)
+    chosen = form.layout.parameters()
+    tables["layout"] = {name: chosen.get(name, now) if now == "auto" else now for name, now in tables["layout"].items()}
+    return tables
 
 
 def _checked(archive: "Archive") -> Figures:

@@ -138,7 +138,7 @@ class _Worker:
         self._preview = show = self._preview or Preview()
         job = Job.load(dict(order.case))
         plain = job.changed(refine__vary="") if job.case.refine.vary else job
-        earlier, said, shown = self._form if order.live else None, monotonic(), False
+        earlier, said, shown = self._form if order.live else None, monotonic() if order.live else 0.0, False
 
         def progress(stage: str, detail: str, residual: float) -> None:
             nonlocal said
