@@ -24,7 +24,8 @@ SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f2
 STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
 HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
-STRESSES = ("stress_pinned", "stress_clamped")
+STAGES = "history_stress"
+STRESSES = ("stress_pinned", "stress_clamped", STAGES)
 CURVATURES = ("curvature_pinned", "curvature_clamped", "history_curvature")
 FORCES = ("force_pinned", "force_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
@@ -137,16 +138,19 @@ def length_unit(largest: float) -> tuple[float, str]:
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     """Utilisation where the strength is known, else the stress in a unit of its size."""
     assert shape.stress is not None
-    strength = archive.results.bending.strength if archive.results.bending else None
-    known = [values for name, values in archive.states.items() if name == "history_stress" or name in STRESSES]
-    top = max(float(np.max(values)) for values in known)
-    if strength:
-        unit, caption = strength / 100, "utilisation in %"
+    bending, final = archive.results.bending, shape.name in SHELLS
+    strength = bending.strength if bending else None
+    erection = (bending.erection_strength if bending else None) or strength
+    known = [(name, float(np.max(values))) for name, values in archive.states.items() if name in STRESSES]
+    if strength and erection:
+        unit, caption = (strength if final else erection) / 100, "utilisation in %"
+        top = max(100 * largest / (erection if name == STAGES else strength) for name, largest in known)
     else:
+        top = max(largest for _, largest in known)
         unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
-        caption = f"stress in {name}"
+        caption, top = f"stress in {name}", top / unit
     largest = float(np.max(shape.stress)) / unit
-    limit = _rounded_up(max(top / unit, FINEST))
+    limit = _rounded_up(max(top, FINEST))
     return Scale(shape.stress / unit, 0.0, limit, STRESS, f"{caption}, here up to {largest:.3g}")
 
 
