@@ -70,7 +70,8 @@ class Run:
         self.pops_up = pops_up
         self.asked, self.target, self.progress = case, target, progress
         self.announce, self.frames_in = announce, frames_in
-        self.inputs = read_inputs(case.text()) if inputs is None else dict(inputs)
+        named = read_inputs(case.text()) if inputs is None and case.files else {}
+        self.inputs = named if inputs is None else dict(inputs)
         self.options = case.output_options()
         self.earlier = warm_start
         if warm_start is not None and warm_start.from_table != case.of_table:

@@ -57,7 +57,7 @@ class Scale:
 
     @property
     def palette(self) -> list[str]:
-        return hex_colours(self.colours, np.linspace(0, 1, BINS))
+        return list(_palette(self.colours))
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
@@ -78,16 +78,25 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
     if colour == "force":
         return None if shape.force is None else _force_scale(archive, shape)
     if shape.gap is not None:
-        largest = _largest_of_all_gaps(archive)
-        factor, unit = length_unit(largest)
-        limit = _rounded_up(max(largest, FINEST) / factor)
-        caption = f"gap to target in {unit}, + outside"
-        return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
+        return gap_scale(shape.gap[nodes], _largest_of_all_gaps(archive))
     if shape.flat or archive.results.target:
         return None
     heights = 1e3 * shape.positions[nodes, 2]  # mm, as at the axes of the picture
     low, high = float(heights.min()), float(heights.max())
     return Scale(heights, low, max(high, low + FINEST), HEIGHT, "height in mm")
+
+
+def gap_scale(gaps: Floats, largest: float) -> Scale:
+    """The scale of signed distances to the target.
+
+    Parameters
+    ----------
+    gaps : (k,) at each entry of `rod_nodes` [m].
+    largest : of all shapes that have the scale [mm].
+    """
+    factor, unit = length_unit(largest)
+    limit = _rounded_up(max(largest, FINEST) / factor)
+    return Scale(1e3 / factor * gaps, -limit, limit, SIGNED, f"gap to target in {unit}, + outside")
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
@@ -114,6 +123,11 @@ def _largest_of_all_gaps(archive: Archive) -> float:
     """The largest gap [mm], without its sign, of all shapes that have one."""
     shapes = [shape_of(archive, name) for name in SHELLS if name in archive.states]
     return max((abs(largest_gap(archive, shape)[0]) for shape in shapes if shape.gap is not None), default=0.0)
+
+
+@lru_cache(maxsize=8)
+def _palette(colours: tuple[str, ...]) -> list[str]:
+    return hex_colours(colours, np.linspace(0, 1, BINS))
 
 
 def length_unit(largest: float) -> tuple[float, str]:
