@@ -15,7 +15,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.bending import require_known_stress, rod_frames
-from rodshell.checks.loads import Reactions
+from rodshell.checks.reactions import Reactions
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding import PatchForm, PopUp
 from rodshell.formfinding.popup import Ends

@@ -24,7 +24,7 @@ import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.checks.bending import VON_MISES, Bending, bending_of
-from rodshell.checks.loads import cut_forces
+from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
 from rodshell.layout import GridMesh

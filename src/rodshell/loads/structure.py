@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks.loads import Reactions, reactions
+from rodshell.checks.reactions import Reactions, reactions
 from rodshell.formfinding.popup import PopUp
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
