@@ -68,6 +68,7 @@ class LoadedShell:
     bracing_forces : (d,) axial force of each brace, tension positive, of slack cables exactly 0 [N].
     bracing_utilisation : of the laths of a third layer, or of the cables in tension; None: there are none, or their
         strength is not known.
+    joint_moments : (c,) moment of each locked joint about its normal [N m]; empty: none is locked.
     mode_factors : (j,) linear buckling factors of `modes`.
     modes : (j, n, 3) lowest linear buckling modes, the largest component being 1.
     mode : (n, 3) how the shell gives way at the limit, or None.
@@ -90,6 +91,7 @@ class LoadedShell:
     used: Utilisation
     bracing_forces: Floats
     bracing_utilisation: float | None
+    joint_moments: Floats
     modes: Floats
     mode_factors: Floats
     mode: Floats | None
@@ -200,6 +202,8 @@ def check_shells(
     """
     if stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
+    if loads.locked_joints is not None:
+        loads.locked_joints.require_pins(stages.joint)
     areas = tributary_of(stages)
     done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
@@ -229,7 +233,7 @@ def _said(progress: Progress, where: str, what: str) -> None:
 
 
 def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Structure:
-    """The erected shell with its bracing locked.
+    """The erected shell with its bracing locked, and then its joints.
 
     Raises
     ------
@@ -239,6 +243,8 @@ def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Struc
     if bracing is not None:
         fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
         structure = fitted.brace(structure, stages.target)
+    if loads.locked_joints is not None:
+        structure = loads.locked_joints.lock(structure)
     try:
         _ = structure.equilibrium.tangent
     except SingularError:
@@ -336,7 +342,9 @@ def loaded_shell(
     shell, forces = structure.shell_at(found), found.forces[:edges]
     bent = bending_under(shell, found.state, structure.rod, forces, limits)
     judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
-    used = judged(shell, found.state, forces=forces, duration=duration, bent=bent)
+    moments = structure.locked_moments(found)
+    slip = None if loads.locked_joints is None else loads.locked_joints.slip
+    used = judged(shell, found.state, forces=forces, duration=duration, bent=bent, moments=moments, slip_moment=slip)
     erected = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
     shapes = np.zeros((0, n, 3)) if buckling is None else buckling.shapes[:, :n]
@@ -357,6 +365,7 @@ def loaded_shell(
         used=used.with_permanent(erected),
         bracing_forces=structure.bracing_forces(found),
         bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
+        joint_moments=moments,
         modes=shapes,
         mode_factors=np.zeros(0) if buckling is None else buckling.factors,
         mode=None if path.mode is None else path.mode[:n],
