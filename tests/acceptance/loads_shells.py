@@ -215,6 +215,19 @@ VAULT = ROOF.replace('kind = "paraboloid"\nradius = 6.0\nheight = 3.0', MESH).re
 ROPES = (
     '[bracing]\nkind = "cables"\nsection = { kind = "circle", radius = 0.003 }\nmaterial = { youngs_modulus = 160e9 }\n'
 )
+PLANE = """[target]
+kind = "heightfield"
+formula = "1 + 0*x"
+domain = "rectangle"
+size = [8.0, 6.0]
+[layout]
+spacing = 1.5
+[pop_up]
+ends = "clamped"
+[rod]
+section = { kind = "rectangle", width = 0.035, height = 0.05 }
+material = { preset = "larch" }
+"""
 BAD = {
     "a negative load": (ROOF + TUBES, SNOWY.replace("0.5", "-0.5") + WINTER, "must not be negative"),
     "a load's unknown kind": (ROOF + TUBES, SNOWY.replace('"snow"\nv', '"hail"\nv') + WINTER, "loads.0.kind must be"),
@@ -234,6 +247,7 @@ BAD = {
     "locked joints that are balls": (
         ROOF + TUBES, SNOWY + WINTER + '[locked_joints]\nshear = "2 kN m/rad"\n', "ball joints cannot be locked",
     ),
+    "supports that leave a mechanism": (PLANE, SNOWY + WINTER, "turning about itself (a mechanism)"),
     "no such file": (ROOF + TUBES, None, "there is no such file"),
 }  # fmt: skip
 

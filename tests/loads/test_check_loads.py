@@ -9,8 +9,9 @@ import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.formfinding.popup import Ends
 from rodshell.layout.cells import diagonals
-from rodshell.loads.check import _load, tributary_of
+from rodshell.loads.check import _load, mechanism, tributary_of
 from rodshell.loads.kinds import LoadedNodes
 from rodshell.loads.structure import Structure
 from rodshell.solve.load_path import load_path
@@ -192,6 +193,32 @@ def test_what_does_not_fit_the_form_is_refused_in_one_sentence(form: str, loads:
 def test_a_wrong_argument_is_refused_in_one_sentence(make: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         make()  # type: ignore[operator]
+
+
+PLANE = rs.HeightField(formula="1 + 0*x", domain=rs.Rectangle((8.0, 6.0)))
+
+
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+@pytest.mark.parametrize("edge", [0.75, 0.1])
+def test_straight_laths_on_ball_joints_are_a_mechanism(ends: Ends, edge: float) -> None:
+    """They turn about themselves without any moment, whatever holds their ends; by round-off alone pivots may be
+    zero, positive or negative. Pins hold them, and so does the least curvature."""
+    form = rs.find_form(PLANE, grid(1.5, edge), LARCH, ends=ends)
+    with pytest.raises(InputError, match=rf"with {ends} ends nothing keeps [UV]0\d from turning about itself"):
+        rs.check_loads(form, one(rs.Snow(10.0)))
+    vault = rs.HeightField(formula="1 - 0.08*y^2", domain=rs.Rectangle((8.0, 6.0)))
+    for target, joint in ((PLANE, rs.Pin()), (vault, None)):
+        held = rs.find_form(target, grid(1.5, edge), LARCH, ends=ends, joint=joint)
+        assert mechanism(Structure.erected(held.popped[ends], LARCH)) is None
+
+
+def test_a_load_across_a_plane_grid_has_no_buckling_factor() -> None:
+    """It bends the rods, and draws them in the second order only."""
+    form = rs.find_form(PLANE, grid(1.5, 0.75), TUBE, ends="pinned")
+    found = rs.check_loads(form, one(rs.Snow(10.0))).shells["all"]["pinned"]
+    assert found.linear_factor is None
+    assert found.limit_kind == "none"
+    assert found.max_deflection > 1e-3
 
 
 def test_rods_without_mass_have_no_weight_to_check() -> None:

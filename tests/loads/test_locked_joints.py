@@ -9,6 +9,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.loads.check import mechanism
 from rodshell.loads.strength import Limits, utilisation
 from rodshell.loads.structure import Structure
 from rodshell.model import Shell
@@ -87,6 +88,14 @@ def test_locked_corners_of_rods_that_bend_follow_slope_deflection_to_second_orde
     assert off[-1] < 3e-3
     for coarse, fine in pairwise(off):
         assert coarse / fine == pytest.approx(4.0, rel=1e-3)
+
+
+def test_a_square_of_rods_on_pins_is_a_mechanism_until_they_are_locked() -> None:
+    bare, _ = frame(given(10.0, 1e4), 0.2)
+    said = mechanism(bare)
+    assert said is not None
+    assert "largest near" in said
+    assert mechanism(rs.LockedJoints(shear=1.0).lock(bare)) is None
 
 
 def test_locking_changes_no_force_of_the_erected_shell() -> None:

@@ -32,12 +32,12 @@ from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
-from rodshell.solve.modes import LinearBuckling, linear_buckling
-from rodshell.solve.sparse_ldl import SingularError
+from rodshell.solve.modes import LinearBuckling, linear_buckling, softest_motion
 from rodshell.units import shown
 from rodshell.validation import brief
 
 PERMANENT: Duration = "permanent"
+ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -245,14 +245,35 @@ def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Struc
         structure = fitted.brace(structure, stages.target)
     if loads.locked_joints is not None:
         structure = loads.locked_joints.lock(structure)
-    try:
-        _ = structure.equilibrium.tangent
-    except SingularError:
-        raise InputError(
-            f"with {ends} ends the supports and joints leave the shell a motion without any stiffness (a mechanism), "
-            "so that it cannot carry a load: hold its ends' directions (clamped), use stiffer joints, or more rods"
-        ) from None
+    if (reason := mechanism(structure)) is not None:
+        raise InputError(f"with {ends} ends {reason}")
     return structure
+
+
+def mechanism(structure: Structure) -> str | None:
+    """Which motion has no stiffness, and what to do, in words; None: every motion has one.
+
+    Parameters
+    ----------
+    structure : in equilibrium without loads.
+    """
+    stiffness, motion = softest_motion(structure.equilibrium)
+    if abs(stiffness) > ROUND_OFF:
+        return None
+    shell = structure.shell
+    block = int(np.argmax(np.linalg.norm(motion, axis=1)))
+    edge = block - shell.first_angle
+    if 0 <= edge < len(shell.mesh.edges):
+        name = shell.mesh.grid.rods[int(shell.mesh.edge_rods[edge])].name
+        return (
+            f"nothing keeps {name} from turning about itself (a mechanism), so that the shell cannot carry a load: use "
+            'joints that hold it, such as pins (joint.kind = "pin")'
+        )
+    x, y, _ = structure.equilibrium.state[block]
+    return (
+        f"supports and joints leave the shell a motion without any stiffness (a mechanism), largest near ({x:.4g}, "
+        f"{y:.4g}) m, so that it cannot carry a load: use pins or rigid joints, more rods, or clamped ends"
+    )
 
 
 def tributary_of(stages: PatchForm) -> Tributary:
