@@ -202,6 +202,7 @@ class Form:
             final=shape,
             pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
             prestrain=getattr(self.case.bracing, "prestrain", None),
+            to_supports=getattr(self.case.bracing, "ends_at", "joints") == "supports",
         )
 
     @cached_property

@@ -136,6 +136,31 @@ def test_final_state_and_energy_do_not_depend_on_the_order_of_fixed_loads() -> N
         assert elastic - unloaded.energy == pytest.approx(ways[0][1] - unloaded.energy, rel=1e-8)
 
 
+@pytest.mark.parametrize("pattern", ["both", "one"])
+def test_cables_to_the_supports_are_anchored_there(pattern: str) -> None:
+    """The same cables and more, whose pull the supports carry: forces balance with them and without loads."""
+    form = shell("tubes")
+    reach = rs.Cables(rod=ROPE, prestrain=5e-4, pattern=pattern, ends_at="supports")
+    inner = replace(reach, ends_at="joints")
+    loads = one(rs.Snow(100.0), stability=rs.Stability(modes=1))
+    found, less = (rs.check_loads(form, replace(loads, bracing=bracing)) for bracing in (reach, inner))
+    shells = found.shells["all"]["pinned"]
+    joints = len(form.footprint.mesh.grid.crossings)
+    at_supports = found.braced[:, 1] >= joints
+    np.testing.assert_array_equal(found.braced[~at_supports], less.braced)
+    assert at_supports.sum() > 0
+    assert np.abs(shells.reaction_sum + shells.load_sum).max() < 1e-9 * np.linalg.norm(shells.load_sum)
+    structure = Structure.erected(form.popped["pinned"], form.rod)
+    braced = reach.brace(structure, form.target)
+    places = np.vstack(
+        [structure.positions(structure.equilibrium)[form.footprint.mesh.joint_nodes], form.boundary.points]
+    )
+    lengths = np.linalg.norm(np.diff(places[braced.braced], axis=1)[:, 0], axis=1)
+    assert braced.bracing_mass.sum() == pytest.approx(lengths.sum() * ROPE.mass_per_length)
+    pulls = braced.support_forces(braced.equilibrium)
+    assert np.abs(pulls.sum_of_forces).max() < 1e-9 * np.abs(pulls.forces).max()
+
+
 def test_bracing_of_a_symmetric_shell_is_stressed_symmetrically() -> None:
     form = shell("tubes")
     found = rs.check_loads(form, one(rs.Snow(100.0), bracing=BRACED["cables"]))

@@ -261,6 +261,9 @@ class CablesTable(BracingTable):
     kind: Literal["cables"] = "cables"
     pattern: DiagonalPattern = Field(default="both", description='diagonals: "both" of a cell, "one", or "every = n"')
     prestrain: Share = Field(default=0.0, description="strain by which cables are shortened when they are put in")
+    ends_at: Literal["joints", "supports"] = Field(
+        default="joints", description="where lines of cables end: at the outermost joints, or at the supports beyond"
+    )
     across_openings: Literal["refuse", "leave out"] = Field(
         default="refuse", description="what becomes of diagonals across an opening"
     )

@@ -128,7 +128,7 @@ class LoadChecks:
     ----------
     asked : the loads and combinations.
     shells : by combination and end condition; an end condition whose shell did not converge is left out.
-    braced : (d, 2) crossings that each brace joins; without bracing there are none.
+    braced : (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are none.
     limits : what the rods are judged by.
     stopped, missing : when a time limit came, or "", and which combinations were not reached.
     """

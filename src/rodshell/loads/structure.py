@@ -71,7 +71,7 @@ class Structure:
     shell : the model of the grid, its source frames being at the equilibrium.
     equilibrium : of grid and bracing without loads, its ends held.
     rod : of the grid.
-    braced : (d, 2) crossings that its bracing joins.
+    braced : (d, 2) crossings that its bracing joins, the rod ends counted on from them.
     bracing_mass : (n,) mass of the bracing, lumped at the mesh's nodes [kg]; None: there is no bracing.
     cables : its energy; None: there are no cables.
     laths : its third layer; None: there is none.

@@ -10,7 +10,7 @@ from rodshell.joints.crossings import RodNodes
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.check import LoadedShell as CheckedShell
-from rodshell.results.from_checks import joint_names
+from rodshell.results.from_checks import joint_names, support_names
 from rodshell.results.loaded import DesignStrength, Governs, LoadedShell, Utilisations
 from rodshell.results.results import Results
 
@@ -64,7 +64,7 @@ _KINDS: dict[str, str] = {"lost": "not followed"}
 
 def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) -> tuple[float | None, ...]:
     """The force of each brace of the fabrication; None of those that are left out."""
-    names = joint_names(mesh)
+    names = [*joint_names(mesh), *support_names(mesh)]
     known = {
         frozenset((names[a], names[b])): force for (a, b), force in zip(braced.tolist(), forces.tolist(), strict=True)
     }
