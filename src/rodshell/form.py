@@ -415,7 +415,7 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
 
     Raises
     ------
-    InputError : a load does not fit the form; the form is in patches, or comes from a table of rods.
+    InputError : a load does not fit the form; the form comes from a table of rods.
     """
     from rodshell.loads.check import check_shells  # most forms have no loads
     from rodshell.loads.combinations import Loads
@@ -423,8 +423,6 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
-    if isinstance(form.stages, PatchedForm):
-        raise InputError("a form in patches cannot be checked under loads: leave out the seams, or the loads")
     judged_by = form.options.judged_by(form.rod)
     limits = Limits.of(
         form.rod, loads.strength,

@@ -220,6 +220,54 @@ def test_a_wrong_argument_is_refused_in_one_sentence(make: object, message: str)
         make()  # type: ignore[operator]
 
 
+def test_patches_carry_what_each_carries_alone() -> None:
+    """A cap cut in two: the limit is that of its weaker half, to what encloses it; loads have the sums of the whole."""
+    seam = [[[-12.0, 1.0], [12.0, 1.0]]]
+    both = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends="pinned", seams=seam)
+    loads = one(rs.Snow(20.0), stability=rs.Stability(modes=2))
+    found = rs.check_loads(both, loads).shells["all"]["pinned"]
+    assert found.load_sum[2] / found.at_factor == pytest.approx(-20.0 * 84 * pi, rel=1e-3)
+    assert np.abs(found.reaction_sum + found.load_sum).max() < 1e-9 * np.linalg.norm(found.load_sum)
+    forces = rs.Snow(20.0).forces(
+        LoadedNodes(both.popped["pinned"].positions, np.zeros(0), tributary_of(both.stages), 3.0)
+    )
+    limits, first = list[float](), 0
+    for patch in both.patches:
+        structure = Structure.erected(patch.popped["pinned"], TUBE)
+        count = structure.shell.node_count
+        alone = np.zeros((structure.size, 3))
+        alone[:count] = forces[first : first + count]
+        limits.append(load_path(structure.equilibrium, alone).factor)
+        first += count
+    assert first == len(forces)
+    assert found.limit_factor == pytest.approx(min(limits), rel=4e-3)  # each within 0.2 %
+    assert max(limits) > 1.05 * min(limits)
+
+
+@pytest.mark.slow
+def test_the_report_of_patches_says_that_their_seams_are_held(tmp_path: Path) -> None:
+    case = {
+        "target": {"kind": "cap", "radius": 10.0, "base": 4.0}, "layout": {"spacing": 3.0, "edge": 1.5},
+        "rod": {"section": {"kind": "tube", "radius": 0.021, "thickness": 0.0035}, "material": {"preset": "gfrp"}},
+        "pop_up": {"ends": "pinned"}, "checks": {"stages": 0}, "seams": {"lines": [[[-12.0, 1.0], [12.0, 1.0]]]},
+        "loads": [{"name": "snow", "kind": "snow", "value": "0.02 kN/m2"}],
+        "combinations": [{"name": "winter", "factors": {"snow": 1.0}}],
+        "bracing": {
+            "kind": "cables", "prestrain": 5e-4, "ends_at": "supports", "section": {"kind": "circle", "radius": 0.003},
+            "material": {"youngs_modulus": "160 GPa", "density": 7850},
+        },
+    }  # fmt: skip
+    form = rs.Job.load(case).run()
+    found = form.archive().results.loads["winter"]["pinned"]
+    assert len(found.bracing) == len(form.fabrication.bracing)
+    assert None not in found.bracing
+    assert len(found.support_forces) == 2 * len(form.footprint.rods)
+    folder = form.save(tmp_path / "out", kinds="report, csv")
+    assert "The seams between patches are held" in (folder / "report.html").read_text(encoding="utf-8")
+    rows = (folder / "schedule" / "bracing.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + len(found.bracing)
+
+
 PLANE = rs.HeightField(formula="1 + 0*x", domain=rs.Rectangle((8.0, 6.0)))
 
 

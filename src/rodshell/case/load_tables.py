@@ -262,7 +262,7 @@ class CablesTable(BracingTable):
     pattern: DiagonalPattern = Field(default="both", description='diagonals: "both" of a cell, "one", or "every = n"')
     prestrain: Share = Field(default=0.0, description="strain by which cables are shortened when they are put in")
     ends_at: Literal["joints", "supports"] = Field(
-        default="joints", description="where lines of cables end: at the outermost joints, or at the supports beyond"
+        default="joints", description="where cables end: at the outermost joints, or at the supports"
     )
     across_openings: Literal["refuse", "leave out"] = Field(
         default="refuse", description="what becomes of diagonals across an opening"
@@ -314,7 +314,7 @@ BracingKinds = NoBracingTable | CablesTable | LathsTable
 class LockedJointsTable(Table):
     shear: Stiffness | None = Field(
         default=None,
-        description="stiffness of pins tightened after erection, about their normal; default: none is",
+        description="stiffness about the normal of pins tightened after erection",
     )
     slip: SlipMoment | None = Field(default=None, description="moment at which they slip; default: not checked")
 

@@ -17,7 +17,8 @@ from rodshell.arrays import Floats, Ints
 from rodshell.checks.bending import require_known_stress, rod_frames
 from rodshell.checks.reactions import Reactions
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
-from rodshell.formfinding import PatchForm, PopUp
+from rodshell.formfinding import PatchForm, PopUp, pop_up
+from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.loads.bracing import Cables
@@ -38,6 +39,7 @@ from rodshell.validation import brief
 
 PERMANENT: Duration = "permanent"
 ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
+SAME_SHAPE = 1e-4  # of the size: patches together are where each is alone
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -184,13 +186,14 @@ class LoadChecks:
 
 
 def check_shells(
-    stages: PatchForm, loads: Loads, *, limits: Limits = Limits(bending={}), progress: Progress = silent
-) -> LoadChecks:
-    """Check every shell of a form in one piece that converged under each combination.
+    stages: PatchForm | PatchedForm, loads: Loads, *,
+    limits: Limits = Limits(bending={}), progress: Progress = silent,
+) -> LoadChecks:  # fmt: skip
+    """Check every shell of a form that converged under each combination.
 
     Parameters
     ----------
-    stages : of the form.
+    stages : of the form; of one in patches these are loaded together, their seams held as supports are.
     loads : with their combinations.
     limits : of the rods.
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found until
@@ -200,12 +203,12 @@ def check_shells(
     ------
     InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
-    if stages.from_table:
+    if isinstance(stages, PatchForm) and stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
     if loads.locked_joints is not None:
         loads.locked_joints.require_pins(stages.joint)
     areas = tributary_of(stages)
-    done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
+    done = {ends: popped for ends, popped in _popped_up(stages).items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
     stopped, braced = "", np.empty((0, 2), dtype=np.intp)
@@ -232,7 +235,30 @@ def _said(progress: Progress, where: str, what: str) -> None:
     progress("loads", f"{where}, {what}", 0.0)
 
 
-def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Structure:
+def _popped_up(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
+    """The popped-up shells; those of patches as one model of all, found again from the draped state.
+
+    Raises
+    ------
+    ConvergenceError : the model of all patches has another shape than each of them alone.
+    """
+    if isinstance(stages, PatchForm):
+        return dict(stages.popped)
+    found = dict[Ends, PopUp]()
+    for ends, alone in stages.popped.items():
+        if not alone.report.converged:
+            continue
+        found[ends] = pop_up(stages.footprint, stages.boundary, stages.rod, ends=ends, joint=stages.joint)
+        off = float(np.abs(found[ends].positions - alone.positions).max())
+        if not found[ends].report.converged or off > SAME_SHAPE * stages.target.size:
+            raise ConvergenceError(
+                f"with {ends} ends the patches take another shape together than each alone, and cannot be checked "
+                "under loads: check each patch as a case of its own"
+            )
+    return found
+
+
+def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | PatchedForm) -> Structure:
     """The erected shell with its bracing locked, and then its joints.
 
     Raises
@@ -276,18 +302,19 @@ def mechanism(structure: Structure) -> str | None:
     )
 
 
-def tributary_of(stages: PatchForm) -> Tributary:
+def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
     """The areas of the target that each node of a form takes.
 
     Parameters
     ----------
-    stages : of a form in one piece that has a target.
+    stages : of a form that has a target.
     """
-    layout = stages.layout
-    anchor = stages.draped.anchor or stages.target.summit
-    return tributary_areas(
-        stages.target, stages.trimmed.positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing)
-    )
+    layout, anchor = stages.layout, stages.target.summit
+    if isinstance(stages, PatchForm):
+        positions, anchor = stages.trimmed.positions, stages.draped.anchor or anchor
+    else:
+        positions = np.concatenate([patch.trimmed.positions for patch in stages.patches.values()])
+    return tributary_areas(stages.target, positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing))
 
 
 def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mapping[str, float]) -> Load:

@@ -32,6 +32,10 @@ STATED = (
     "Stiffness is the mean one, and not reduced: neither by partial factors nor by creep. Relaxation of bent rods, "
     "pressure at bolts, cladding and its stiffness, fatigue, fire and accidental loads are not checked.",
 )
+SEAMS = (
+    "The seams between patches are held in place, as supports are: what carries them has to withstand the forces "
+    "there, which are among those of the foundations, and its own stiffness is not in these figures."
+)
 
 
 def loads_page(archive: Archive) -> dict[str, Any] | None:
@@ -52,7 +56,7 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
         for caption, ends, state in _modes(archive, shells)
     ]
     return {
-        "assumptions": [*_strengths(results), *STATED],
+        "assumptions": [*_strengths(results), *STATED, *([SEAMS] if results.patches else [])],
         "strength": [_strength(results, *each) for each in shells],
         "deflection": [_deflection(results, *each) for each in shells],
         "stability": [_stability(*each) for each in shells],
