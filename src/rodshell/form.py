@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from rodshell.loads.check import LoadChecks
     from rodshell.loads.combinations import Loads
+    from rodshell.loads.strength import Limits, Strength
     from rodshell.refining.acceptance import Refined
 
 Stages = PatchForm | PatchedForm
@@ -389,7 +390,8 @@ class Form:
             results = with_seam_forces(results, self.stages, checks)
         results = checked_results(
             results, self.footprint.mesh, checks, self.fabrication,
-            strength=strengths.strength, shear_strength=strengths.shear_strength, strength_of=strengths.strength_of,
+            limits=_limits(self, self.case.strength.build()), shear_strength=strengths.shear_strength,
+            strength=strengths.strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
             from rodshell.results.from_loads import loaded_results
@@ -419,14 +421,19 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
     """
     from rodshell.loads.check import check_shells  # most forms have no loads
     from rodshell.loads.combinations import Loads
-    from rodshell.loads.strength import Limits
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
+    return check_shells(form.stages, loads, limits=_limits(form, loads.strength), progress=progress)
+
+
+def _limits(form: Form, asked: "Strength") -> "Limits":
+    """What a form's rods are judged by, with loads and without."""
+    from rodshell.loads.strength import Limits
+
     judged_by = form.options.judged_by(form.rod)
-    limits = Limits.of(
-        form.rod, loads.strength,
+    return Limits.of(
+        form.rod, asked,
         characteristic=judged_by.strength, of_preset=form.options.strength is None,
         shear_weight=judged_by.shear_weight,
     )  # fmt: skip
-    return check_shells(form.stages, loads, limits=limits, progress=progress)

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from rodshell.layout import GridLayout
     from rodshell.loads.combinations import Loads
     from rodshell.output.options import OutputOptions
+    from rodshell.rods.materials import Material
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -150,7 +151,14 @@ class Case(Table):
         if self.rod.held is not None:
             rod: Rod = self.rod.held.value
             return rod
-        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.checks.strength)
+        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.permanent_strength)
+
+    def permanent_strength(self, material: "Material") -> float | None:
+        """What rods of a material withstand permanently [Pa]: as given, or by the building code of a preset."""
+        from rodshell.rods.design_strength import permanent_strength
+
+        given = self.strength.permanent or self.checks.strength
+        return given or permanent_strength(material, self.strength.service_class)
 
     def fit_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Fit":
         """What a rod that is left to the target has to fit."""

@@ -95,6 +95,7 @@ class Limits:
     cracked : share of the section that carries shear forces.
     creep : growth of deflections under permanent loads, k_def; None: not known.
     source : of these figures, in words.
+    given : whether they were given in place of a preset's.
     """
 
     bending: dict[Duration, float]
@@ -104,6 +105,7 @@ class Limits:
     cracked: float = 1.0
     creep: float | None = None
     source: str = "no strength is known"
+    given: bool = False
 
     @staticmethod
     def of(
@@ -161,6 +163,7 @@ class Limits:
             cracked=factors.cracked if factors is not None else 1.0,
             creep=creep,
             source=source,
+            given=bool(asked.given) or not of_preset,
         )
 
 

@@ -11,7 +11,7 @@ from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.check import LoadedShell as CheckedShell
 from rodshell.results.from_checks import joint_names, support_names
-from rodshell.results.loaded import DesignStrength, Governs, LoadedShell, Utilisations
+from rodshell.results.loaded import Governs, LoadedShell, Utilisations
 from rodshell.results.results import Results
 
 
@@ -25,7 +25,6 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
     checks : under loads.
     """
     found = results.changed(
-        strength=_strength(results, checks),
         loads={
             name: {
                 ends: _record(mesh, shell, _in_order(results, mesh, checks.braced, shell.bracing_forces))
@@ -118,19 +117,3 @@ def _place(mesh: GridMesh, entry: int, by: str | None = None) -> Governs:
     """The place of an entry of the mesh's `rod_nodes`."""
     line = mesh.grid.rods[int(np.searchsorted(mesh.rod_start, entry, side="right")) - 1]
     return Governs(rod=line.name, at=float(mesh.stations[entry]) - line.start, by=by)
-
-
-def _strength(results: Results, checks: LoadChecks) -> DesignStrength:
-    """What was judged by, and the deployment judged by it."""
-    limits, shapes = checks.limits, results.bending.shapes() if results.bending else {}
-    stress = shapes["deployment"].max_stress if "deployment" in shapes else None
-    used = None if stress is None or limits.erection is None else stress / limits.erection
-    return DesignStrength(
-        **limits.bending,
-        erection=limits.erection,
-        axial=limits.axial,
-        shear=1.0 / limits.shear_weight,
-        creep=limits.creep,
-        erection_utilisation=used,
-        source=limits.source,
-    )

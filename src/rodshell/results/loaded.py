@@ -23,18 +23,18 @@ class Utilisations(Record):
 
 
 class DesignStrength(Record):
-    """What the rods are judged by under loads; null: not known."""
+    """What the rods are judged by, unloaded and under loads; null: not known."""
 
     permanent: Number = key("design strength in bending under permanent loads", "Pa")
     long: Number = key("under loads of months", "Pa")
     medium: Number = key("under loads of weeks", "Pa")
     short: Number = key("under loads of days", "Pa")
     instantaneous: Number = key("under gusts", "Pa")
-    erection: Number = key("during deployment", "Pa")
+    erection: Number = key("during the deployment", "Pa")
     axial: Number = key("axial strength over bending strength")
     shear: Number = key("shear strength over bending strength")
     creep: Number = key("by how much deflections under permanent loads grow, over what they are at first")
-    erection_utilisation: Number = key("largest stress of the deployment over its strength")
+    erection_utilisation: Number = key("largest stress of the deployment over that strength")
     source: Text | None = key("where they are from")
 
 
