@@ -118,7 +118,7 @@ def braced_diagonals(
     positions : (n, 3) of its nodes [m].
     target : whose openings the diagonals must not cross.
     pattern, across_openings : as of `Cables`.
-    to_supports : whether cables go on to the supports.
+    to_supports : whether cables continue to the supports.
 
     Raises
     ------

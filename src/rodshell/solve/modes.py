@@ -146,8 +146,8 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
     except SingularError:
         assembly = TangentAssembly(equilibrium.problem, equilibrium.state)
         freedom, values = assembly.values(equilibrium.elements, equilibrium.state, equilibrium.forces)
-        own = np.abs(_diagonal(assembly.pattern, values))
-        scale = np.sqrt(own + (own == 0) * own.mean())
+        stiffness_alone = np.abs(_diagonal(assembly.pattern, values))
+        scale = np.sqrt(stiffness_alone + (stiffness_alone == 0) * stiffness_alone.mean())
         shifted = values.copy()
         shifted[assembly.pattern.assembly.diagonal] += ROUND_OFF * scale**2
         factors = assembly.pattern.solver.factor(shifted)
