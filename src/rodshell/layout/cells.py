@@ -182,7 +182,9 @@ def flat_joints(grid: FlatGrid) -> Floats:
 def _rows(grid: FlatGrid) -> dict[int, list[int]]:
     """The joints on each rod, in their order along it."""
     along: dict[int, list[tuple[float, int]]] = {}
-    for joint, (pair, stations) in enumerate(zip(grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True)):
+    for joint, (pair, stations) in enumerate(
+        zip(grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True)
+    ):
         for rod, place in zip(pair, stations, strict=True):
             along.setdefault(rod, []).append((place, joint))
     return {rod: [joint for _, joint in sorted(on_rod)] for rod, on_rod in along.items()}
