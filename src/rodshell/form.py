@@ -203,6 +203,7 @@ class Form:
             final=shape,
             pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
             prestrain=getattr(self.case.bracing, "prestrain", None),
+            to_supports=getattr(self.case.bracing, "ends_at", "joints") == "supports",
         )
 
     @cached_property
@@ -416,15 +417,13 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
 
     Raises
     ------
-    InputError : a load does not fit the form; the form is in patches, or comes from a table of rods.
+    InputError : a load does not fit the form; the form comes from a table of rods.
     """
     from rodshell.loads.check import check_shells  # most forms have no loads
     from rodshell.loads.combinations import Loads
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
-    if isinstance(form.stages, PatchedForm):
-        raise InputError("a form in patches cannot be checked under loads: leave out the seams, or the loads")
     return check_shells(form.stages, loads, limits=_limits(form, loads.strength), progress=progress)
 
 

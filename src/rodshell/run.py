@@ -37,7 +37,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "refine": ("refine",),
     "checks": ("checks",),
     "fabrication": ("fabrication", "bracing"),
-    "loads": ("loads", "combinations", "stability", "strength"),
+    "loads": ("loads", "combinations", "locked_joints", "stability", "strength"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks.loads import cut_forces, reactions
+from rodshell.checks.reactions import cut_forces, reactions
 from rodshell.loads.strength import Limits, Spans, Utilisation, net_section, preset_limits
 from tests.loads.shells import ROPE, TUBE, grid, one, shell
 
