@@ -153,6 +153,7 @@ async function open() {
 
 function hear(news) {
   if (news.kind === "session") return restore(news);
+  if (news.kind === "history") return showHistory(news);
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
   if (news.kind === "stage" && news.serial >= shown) {
     shown = news.serial;
@@ -177,9 +178,7 @@ let pending = true;  // a new target: the view begins anew
 function restore(state) {
   history = state;
   const from = state.cases[state.at];
-  byId("undo").disabled = state.at <= 0;
-  byId("redo").disabled = state.at >= state.cases.length - 1;
-  byId("tries").hidden = state.cases.length > 2;
+  showHistory({ at: state.at, count: state.cases.length });
   showVariants();
   if (restore.known && JSON.stringify(from) === JSON.stringify(base)) return;
   const linked = restore.known ? null : restore.linked;
@@ -188,6 +187,12 @@ function restore(state) {
   pending = pending || JSON.stringify(next.target) !== JSON.stringify(base.target);
   submit(clone(next), false);
   buildControls();
+}
+
+function showHistory({ at, count }) {
+  byId("undo").disabled = at <= 0;
+  byId("redo").disabled = at >= count - 1;
+  byId("tries").hidden = count > 2;
 }
 
 function say(text, wrong = false) {
