@@ -111,7 +111,7 @@ function wireTools() {
   byId("loads").onclick = showLoads;
   form.onsubmit = ({ submitter }) => {
     if (submitter.value === "check") checkLoads(form.elements);
-    else change(next => { delete next.loads; delete next.combinations; });
+    if (submitter.value === "without") change(next => { delete next.loads; delete next.combinations; });
   };
 }
 
@@ -201,13 +201,29 @@ function say(text, wrong = false) {
 }
 
 function failed(sentence) {
-  say(sentence, true);
-  const box = byId("verdict");
+  say("");
+  const box = byId("verdict"), key = named(sentence);
   box.className = "failed";
   box.replaceChildren(make("strong", { textContent: sentence }));
+  if (key) box.append(make("button", { type: "button", textContent: `Go to ${key.path}`, onclick: () => goTo(key) }));
+  document.body.classList.add("old");  // the shapes are those of a case before
+}
+
+// The key that a sentence asks for, as in a case file (target.unit) or as an option (--unit).
+function named(sentence) {
+  const usable = start.keys.filter(key => !IDLE.includes(key.path) && (!key.path.startsWith("target.") || !key.kinds.length || key.kinds.includes(base.target?.kind)));
+  return usable.find(({ path }) => sentence.includes(path)) || usable.find(({ path }) => new RegExp(`--${path.split(".").pop()}\\b`).test(sentence));
+}
+
+function goTo({ path }) {
+  const fields = [...byId("controls").querySelectorAll(`[data-path="${path}"]`)], field = fields.at(-1);
+  gui.folders.find(({ _title }) => _title === `[${path.split(".")[0]}]`)?.open();
+  field?.focus();
+  field?.scrollIntoView({ block: "center" });
 }
 
 function showFacts() {
+  document.body.classList.remove("old");
   byId("figures").tBodies[0].replaceChildren(...facts.figures.map(([name, value]) => make("tr", {}, make("th", { textContent: name, scope: "row" }), make("td", { textContent: value }))));
   const box = byId("verdict");
   if (facts.verdict) {
@@ -613,8 +629,12 @@ function wire() {
   byId("undo").onclick = () => order({ kind: "step", by: -1 });
   byId("redo").onclick = () => order({ kind: "step", by: 1 });
   byId("link").onclick = async () => { await remember(); await navigator.clipboard?.writeText(location.href).catch(() => {}); say("The link is copied: it holds the whole case"); };
-  byId("python").onclick = () => { byId("script").querySelector("pre").textContent = script(); byId("script").showModal(); };
-  for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button").onclick = () => dialog.close();
+  byId("python").onclick = () => {
+    const files = [get(base, "target.file"), get(base, "target.boundary")].filter(Boolean).map(name => name.replace("upload:", ""));
+    byId("needs").textContent = files.length ? `Run it in a folder with ${files.join(" and ")}; the download has it in inputs/.` : "";
+    byId("script").querySelector("pre").textContent = script(); byId("script").showModal();
+  };
+  for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button")?.addEventListener("click", () => dialog.close());
   wireTools();
   const controls = byId("controls");
   for (const begin of ["input", "pointerdown"]) controls.addEventListener(begin, () => { typing = true; });
