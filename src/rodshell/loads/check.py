@@ -453,14 +453,15 @@ def _with_imperfections(
     amplitude = loads.stability.amplitude(float(np.ptp(points[:, :2], axis=0).min()))
     if amplitude is None or buckling is None or not len(buckling.shapes):
         return None, None, 0
-    ends, work = list[tuple[float, Limit]](), 0
-    for sign in (1.0, -1.0):
-        try:
-            start = imperfect(structure.equilibrium, buckling.shapes, sign * amplitude)
-        except ConvergenceError:
-            return None, "lost", work
-        path = load_path(start, load, most=MOST, stations=(), progress=progress)
+    try:
+        starts = [imperfect(structure.equilibrium, buckling.shapes, sign * amplitude) for sign in (1.0, -1.0)]
+    except ConvergenceError:
+        return None, "lost", 0
+    kind: Limit = "none"
+    least, work = np.inf, 0
+    for start in starts:  # the second only as far as it could be the smaller
+        path = load_path(start, load, most=min(MOST, least), stations=(), progress=progress)
         work += path.factorizations
-        ends.append((np.inf if path.limit == "none" else path.factor, path.limit))
-    least, kind = min(ends)
+        if path.limit != "none" and path.factor < least:
+            least, kind = path.factor, path.limit
     return (None if np.isinf(least) else least), kind, work
