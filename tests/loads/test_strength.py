@@ -7,6 +7,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks.reactions import cut_forces, reactions
+from rodshell.errors import InputError
 from rodshell.loads.strength import Limits, Spans, Utilisation, net_section, preset_limits
 from tests.loads.shells import ROPE, TUBE, grid, one, shell
 
@@ -200,3 +201,14 @@ def test_a_strength_of_rods_without_fibres_is_refused_in_one_sentence() -> None:
 def test_a_wrong_argument_is_refused_in_one_sentence(make: object, message: str) -> None:
     with pytest.raises(rs.InputError, match=message):
         make()  # type: ignore[operator]
+
+
+def test_what_does_not_suit_the_rod_is_refused_before_anything_is_formed() -> None:
+    """A service class of GFRP, and a bolt as wide as the tube."""
+    tube = {"section": {"kind": "tube", "radius": 0.02, "thickness": 0.003}, "material": {"preset": "gfrp"}}
+    lath = {"section": {"kind": "rectangle", "width": 0.035, "height": 0.05}, "material": {"preset": "larch"}}
+    case = {"target": {"kind": "cap", "radius": 10.0, "base": 4.0}}
+    for strength, words in (({"service_class": 2}, "only the strengths of timber"), ({"hole": 0.04}, "leaves nothing")):
+        with pytest.raises(InputError, match=words):
+            rs.Job.load({**case, "rod": tube, "strength": strength}).case.build()
+        rs.Job.load({**case, "rod": lath, "strength": strength}).case.build()

@@ -143,8 +143,8 @@ def test_a_ring_leaves_its_circle_under_pressure() -> None:
 
 
 def test_michells_ring_leaves_its_plane_by_a_bifurcation() -> None:
-    """Of a fine ring and to a fifth of the usual distance, where round-off hides the last digits of Newton's steps: its
-    plane path is found without solving for them again and again. Two modes, turned by a right angle, vanish together."""
+    """A fine ring, to a tenth of the usual distance: round-off hides the last digits of Newton's steps, which are not
+    solved for again and again. Two modes, a right angle apart, vanish together."""
     ring = known.michells_ring(192)
     path = load_path(ring.unloaded, ring.load, most=3.0, close=2e-4)
     assert path.limit == "bifurcation"

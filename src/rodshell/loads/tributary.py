@@ -85,10 +85,10 @@ def tributary_areas(
     return Tributary(result[:, 0], plan, result[:, 1:], middle)
 
 
-def _sums(places: Ints, parts: Sequence[Floats], count: int) -> Floats:
-    """(count, j) sums of the rows of each of the `parts` (k, n, j) by their `places` (k, n)."""
+def _sums(indices: Ints, parts: Sequence[Floats], count: int) -> Floats:
+    """(count, j) sums of the rows of each of the `parts` (k, n, j) by their `indices` (k, n)."""
     columns = range(parts[0].shape[1])
-    each = [[np.bincount(at, part[:, j], count) for j in columns] for at, part in zip(places, parts, strict=True)]
+    each = [[np.bincount(at, part[:, j], count) for j in columns] for at, part in zip(indices, parts, strict=True)]
     return np.asarray(np.sum(each, axis=0).T)
 
 
