@@ -193,7 +193,7 @@ def refused_after(count: int, monkeypatch: pytest.MonkeyPatch, halvings: int = 0
     monkeypatch.setattr(acceptance, "FIRMER", ())
     tried = list[PatchForm]()
 
-    def some(form: PatchForm, *, all_of_them: bool = True, progress: object = None) -> Gates:
+    def some(form: PatchForm, *, all_of_them: bool = True, span_error: object = None, progress: object = None) -> Gates:
         tried.append(form)
         good = len(tried) > count
         return Gates(dict.fromkeys(GATES, good), "" if good else f"tolerance: number {len(tried)}", 7)
@@ -260,7 +260,8 @@ def test_where_none_passes_the_form_stays_as_it_was(monkeypatch: pytest.MonkeyPa
     tried = refused_after(99, monkeypatch)
     found = acceptance.refined(stages(), (refine.FAMILIES["taper"],))
     assert found.after is stages()
-    assert found.refused == "tolerance: number 1"
+    assert found.refused.startswith("tolerance: number 1; the form as it is then has up to ")
+    assert found.refused.endswith("give the largest error as refine.tolerance")
     assert found.gap_after == found.gap_before
     assert not any(found.gates.values())
     assert found.gate_factorizations >= 7 * len(tried)

@@ -213,6 +213,11 @@ class Case(Table):
         self._require_stock(layout)
         self.bracing.build()
         self.built_loads()
+        if self.refine.under not in ("nothing", "weight", *self.combination_names):
+            known = ", ".join(("nothing", "weight", *self.combination_names))
+            raise InputError(
+                f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
+            )
         rod = self.rod_on(target, layout, anchor=anchor)
         self.output_options().require_known_stress(rod, joint)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
@@ -240,6 +245,11 @@ class Case(Table):
         ):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")
+
+    @property
+    def combination_names(self) -> tuple[str, ...]:
+        """Names of the combinations of loads."""
+        return tuple(row.name for row in self.combinations)
 
     def built_loads(self) -> "Loads | None":
         """What the shell is to be checked under; None where the case has no loads.

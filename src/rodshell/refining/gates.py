@@ -26,7 +26,7 @@ from rodshell.model.rod_sections import RodSections
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
 from rodshell.solve.problem import Problem
 from rodshell.solve.sensitivity import Parameters, Sensitivity
-from rodshell.units import percent_text
+from rodshell.units import length_text, percent_text
 
 GATES = ("stable", "flat", "remeshed", "tolerance", "from_flat")
 """In the order in which they are tried: those that take the least work first."""
@@ -65,19 +65,25 @@ class Gates:
         return not self.reason
 
 
-def gates(form: PatchForm, *, all_of_them: bool = True, progress: Progress = silent) -> Gates:
+def gates(
+    form: PatchForm, *, all_of_them: bool = True, span_error: float | None = None, progress: Progress = silent
+) -> Gates:
     """Try a design at every gate.
 
     Parameters
     ----------
     form : the design, popped up with one end condition.
     all_of_them : try the others too after a gate has refused it.
+    span_error : largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
     progress : called as progress(stage, detail, residual).
     """
     passed, first, factorizations = dict[str, bool](), "", 0
     for name in GATES:
         progress("refine", f"gate {name}", 0.0)
-        reason, made = _TRIALS[name](form, progress)
+        if name == "tolerance":
+            reason, made = _tolerance(form, span_error, progress)
+        else:
+            reason, made = _TRIALS[name](form, progress)
         passed[name], factorizations = not reason, factorizations + made
         if reason and not first:
             first = f"{name}: {reason}"
@@ -120,17 +126,39 @@ def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return f"meshed again, its gap is {percent_text(after)} rms and not {percent_text(before)}", made
 
 
-def _tolerance(form: PatchForm, progress: Progress) -> tuple[str, int]:
-    most, worst, made = WORSE * _rms(form) + WORSE_BY, 0.0, 0
-    for sample, popped in enumerate(with_errors(form), start=1):
+def _tolerance(form: PatchForm, span_error: float | None, progress: Progress) -> tuple[str, int]:
+    error = SPAN_ERROR * form.target.size if span_error is None else span_error
+    built = f"built with errors of up to {length_text(error)} in every span"
+    most = WORSE * _rms(form) + WORSE_BY
+    worst, made = worst_with_errors(form, error, progress)
+    if worst is None:
+        return f"{built}, the shell has no stable state nearby", made
+    if worst <= most:
+        return "", made
+    return f"{built}, its gap is up to {percent_text(worst)} rms, more than {percent_text(most)}", made
+
+
+def worst_with_errors(form: PatchForm, span_error: float, progress: Progress = silent) -> tuple[float | None, int]:
+    """The largest rms gap of the shell built with errors, over the target's size, and the factorisations that it took.
+
+    Parameters
+    ----------
+    form : the design, popped up with one end condition.
+    span_error : largest error of each span's length [m].
+    progress : called as progress(stage, detail, residual).
+
+    Returns
+    -------
+    None in place of the gap where one of them has no stable state nearby.
+    """
+    worst, made = 0.0, 0
+    for sample, popped in enumerate(with_errors(form, span_error=span_error), start=1):
         progress("refine", f"gate tolerance, sample {sample} of {SAMPLES}", 0.0)
         made += popped.report.factorizations
         if not popped.report.stable:
-            return "built with errors, the shell has no stable state nearby", made
+            return None, made
         worst = max(worst, agreement(popped, form.target).rms_relative)
-    if worst <= most:
-        return "", made
-    return f"built with errors, its gap is up to {percent_text(worst)} rms, more than {percent_text(most)}", made
+    return worst, made
 
 
 def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
@@ -153,12 +181,10 @@ def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return f"pushed up from flat, it comes to another shape, {percent_text(apart)} of the size away", made
 
 
-_TRIALS = {
-    "stable": _stable, "flat": _flat, "remeshed": _remeshed, "tolerance": _tolerance, "from_flat": _from_flat,
-}  # fmt: skip
+_TRIALS = {"stable": _stable, "flat": _flat, "remeshed": _remeshed, "from_flat": _from_flat}
 
 
-def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
+def with_errors(form: PatchForm, samples: int = SAMPLES, *, span_error: float | None = None) -> Iterator[PopUp]:
     """The shell built with errors: each span is too long or too short, each rod too stiff or too soft, by chance.
 
     It is solved from the state that is foreseen to first order. Where that does not lead to a stable equilibrium, the
@@ -168,13 +194,14 @@ def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
     ----------
     form : the design, popped up with one end condition.
     samples : of a random generator with the seeds 0, 1, ...
+    span_error : largest error of each span's length [m]; None: `SPAN_ERROR` of the target's size.
     """
     popped = _popped(form)
     mesh, shell, found = popped.shell.mesh, popped.shell, popped.equilibrium
     sections = RodSections.of(mesh, [form.rod] * len(mesh.grid.rods))
     table = np.column_stack([sections.stretch, sections.edges, mesh.edge_lengths])
     exact = EdgeProperties.of(shell, form.joint, table)
-    errors = np.stack([_errors(form, seed) for seed in range(samples)])
+    errors = np.stack([_errors(form, span_error, seed) for seed in range(samples)])
     by_errors = np.log1p(errors).reshape(samples, -1).T
     foreseen = Sensitivity(found, exact).response(Parameters(csc_array(by_errors)))
     for sample, error in enumerate(errors):
@@ -199,12 +226,13 @@ def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
         yield replace(popped, shell=other.with_elements(here.elements), equilibrium=replace(here, report=report))
 
 
-def _errors(form: PatchForm, seed: int) -> Floats:
+def _errors(form: PatchForm, span_error: float | None, seed: int) -> Floats:
     """(e, 5) relative errors of the edges' properties: of the lengths of spans, and of the EI and GJ of rods."""
     mesh, random = form.footprint.mesh, np.random.default_rng(seed)
     span = spans(mesh)
     result = np.zeros((len(span), PROPERTIES))
-    longer = SPAN_ERROR * form.target.size * random.uniform(-1.0, 1.0, int(span[-1]) + 1)
+    error = SPAN_ERROR * form.target.size if span_error is None else span_error
+    longer = error * random.uniform(-1.0, 1.0, int(span[-1]) + 1)
     result[:, LENGTH] = (longer / np.bincount(span, mesh.edge_lengths))[span]
     result[:, EI1:LENGTH] = STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))[mesh.edge_rods, None]
     return result

@@ -112,7 +112,7 @@ def refine(
     ends: Ends | None = None,
     objectives: Sequence[Objective] | None = None,
     least_eigenvalue: float = LEAST_EIGENVALUE,
-    under_weight: bool = False,
+    under_weight: float = 0.0,
     dead_loads: Floats | None = None,
     start: Sequence[float] | None = None,
     most_evaluations: int = 60,
@@ -127,7 +127,8 @@ def refine(
     ends : how the rods' ends are held; None: as first asked for.
     objectives : what is made small; None: the mean square of the gap and, where not only stiffness varies, compression.
     least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
-    under_weight : bring the shell that carries its own weight to the target; unloaded it then stands above.
+    under_weight : factor on its own weight with which the shell is brought to the target, such as 1.0; unloaded it then
+        stands above.
     dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
     start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
     most_evaluations : designs that are tried; where only lengths, clamps or supports vary, twice as many.
@@ -140,7 +141,7 @@ def refine(
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
-    structure = replace(structure_of(stages, ends), weighs=under_weight, dead_loads=dead_loads)
+    structure = replace(structure_of(stages, ends), weight=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
     here, spent = first_point(structure, variables, start)
     before = structure.lowest if here.equilibrium.problem.load is None else float(here.modes.values[0])
@@ -356,10 +357,10 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     shell = shell.with_elements(tuple(map(_with_frames, shell.elements, here.elements)))
     problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
     if here.problem.load is None:
-        found = find_equilibrium(problem, here.state, here.forces)
+        found, made = find_equilibrium(problem, here.state, here.forces), 0
     else:
         found = find_equilibrium(replace(problem, load=here.problem.load), here.state, here.forces)
-        unloaded, _ = under_load(found, np.zeros_like(here.state))
+        unloaded, made = under_load(found, np.zeros_like(here.state))
         found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
     shell = shell.with_elements(found.elements)
     footprint = Footprint(grid.mesh)
@@ -368,7 +369,7 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
         stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
     )  # fmt: skip
-    return result, found.report.factorizations
+    return result, found.report.factorizations + made
 
 
 def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
@@ -383,8 +384,8 @@ def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
     popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
     load = np.zeros_like(popped.state)
     nodes = slice(0, popped.shell.first_angle)
-    if structure.weighs:
-        load[nodes, 2] = -STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
+    if structure.weight:
+        load[nodes, 2] = -structure.weight * STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
     if structure.dead_loads is not None:
         load[: len(structure.dead_loads)] += structure.dead_loads
     shell = popped.shell.with_elements(tuple(map(_with_frames, popped.shell.elements, here.elements)))
