@@ -51,17 +51,17 @@ def gallery() -> dict[str, Piece]:
     lath = rs.Rod(rs.RectangularSection(width=10 * MM, height=30 * MM), LARCH)
     return {
         "garden pavilion": Piece(rs.Paraboloid(radius=4.5, height=1.8), lath, 0.6, 0.003, 0.0001),
-        "dome": Piece(rs.Hemisphere(radius=5.0), tube(25, 3), 0.8, 0.0105, 0.0001),
-        "barrel vault": Piece(vault, tube(38, 3.5), 0.9, 0.007, 0.003, rotate=pi / 4),
+        "dome": Piece(rs.Hemisphere(radius=5.0), tube(16, 2.5), 0.8, 0.0105, 0.0001),
+        "barrel vault": Piece(vault, tube(20, 2.5), 0.9, 0.007, 0.003, rotate=pi / 4),
         "saddle": Piece(rs.HeightField(formula="(x^2 - y^2)/16", domain=disc), tube(25, 3), 0.8, 0.0004, 0.0001),
         "monkey saddle": Piece(
             rs.HeightField(formula="(x^3 - 3*x*y^2)/90", domain=disc), tube(12, 2), 0.8, 0.0025, 0.0005
         ),
         "two bumps": Piece(rs.HeightField(formula=bumps, domain=disc), tube(16, 2.5), 0.8, 0.032, 0.031),
-        "freeform, OBJ": Piece(rs.surface_from(DATA / "freeform.obj", unit=MM), tube(20, 2.5), 0.9, 0.0012, 0.0009),
-        "freeform, 3dm": Piece(rs.surface_from(DATA / "freeform.3dm"), tube(20, 2.5), 0.9, 0.0012, 0.0009),
+        "freeform, OBJ": Piece(rs.surface_from(DATA / "freeform.obj", unit=MM), tube(16, 2.5), 0.9, 0.0012, 0.0009),
+        "freeform, 3dm": Piece(rs.surface_from(DATA / "freeform.3dm"), tube(16, 2.5), 0.9, 0.0012, 0.0009),
         "ball below its equator": Piece(
-            rs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), tube(25, 3), 0.6, 0.0145, 0.0003
+            rs.surface_from(DATA / "ball.obj", unit=MM, base=-1.0), tube(12, 2), 0.6, 0.0145, 0.0003
         ),
         "torus": Piece(rs.surface_from(DATA / "torus.obj", unit=MM), tube(16, 2.5), 0.7, 0.002, 0.0002),
         "tent with an oculus": Piece(

@@ -37,7 +37,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "refine": ("refine",),
     "checks": ("checks",),
     "fabrication": ("fabrication", "bracing"),
-    "loads": ("loads", "combinations", "stability", "strength"),
+    "loads": ("loads", "combinations", "locked_joints", "stability", "strength"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
@@ -70,7 +70,8 @@ class Run:
         self.pops_up = pops_up
         self.asked, self.target, self.progress = case, target, progress
         self.announce, self.frames_in = announce, frames_in
-        self.inputs = read_inputs(case.text()) if inputs is None else dict(inputs)
+        named = read_inputs(case.text()) if inputs is None and case.files else {}
+        self.inputs = named if inputs is None else dict(inputs)
         self.options = case.output_options()
         self.earlier = warm_start
         if warm_start is not None and warm_start.from_table != case.of_table:
@@ -100,7 +101,7 @@ class Run:
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
         fit = partial(Fit.between, ends.lengths, ends.final, ends.grid.joint_counts())
-        rod = case.rod.held.value if case.rod.held else case.rod.build(fit, strength=case.checks.strength)
+        rod = case.rod.held.value if case.rod.held else case.rod.build(fit, strength=case.permanent_strength)
         self._announce_rod(rod, fit)
         case = case.with_rod(rod)
         same = self._unchanged(case)
@@ -240,11 +241,12 @@ class Run:
 
     def _announce_rod(self, rod: Rod, fit: Callable[[], Fit]) -> None:
         """A rod of which the case left something open, and what decided its size."""
-        left_open, strength = self.asked.rod.left_open, self.asked.checks.strength
+        left_open = self.asked.rod.left_open
         if not left_open or self.announce is None:
             return
         said = f"rod: {rod_text(rod_type(rod))}; {chosen(left_open)}"
         if "section" in left_open and rod.material and not isinstance(rod.section, GivenSection):
+            strength = self.asked.permanent_strength(rod.material)
             why = fit().reason(rod.section, rod.material, strength=strength, shape=self.asked.rod.shape)
             said += f", {why}"
         self.announce(said)

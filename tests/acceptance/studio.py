@@ -37,6 +37,7 @@ DOME: dict[str, Any] = {
     "checks": {"stages": 0},
 }
 INPUTS = 300
+LATENCY = 0.1  # s that a message may take on a busy machine
 Kept = list[dict[str, Any]]
 
 
@@ -76,27 +77,23 @@ def server(folder: Path, *options: str) -> Iterator[tuple[str, subprocess.Popen[
 
 
 class Page:
-    """What the page does: it sends a case, keeps one that waits, and hears what is found."""
+    """What the page does: it sends cases, and hears what is found."""
 
     def __init__(self, address: str, session: str = "") -> None:
         self.address = address.partition("?")[0]
         self.session = session or httpx.post(f"{self.address}api/sessions", timeout=60).json()["id"]
         self.heard: Kept = []
-        self.sent, self.waiting, self.most_waiting, self.serial = 0, None, 0, 0
-        self.socket: ClientConnection = connect(
-            f"{self.address.replace('http', 'ws')}api/sessions/{self.session}/live", max_size=None
-        )
+        self.sent = dict[int, float]()  # when, by serial
+        self.serial = 0
+        place = f"{self.address.replace('http', 'ws')}api/sessions/{self.session}/live"
+        self.socket: ClientConnection = connect(place, max_size=None)
         self.state = json.loads(self.socket.recv(timeout=60))
 
     def show(self, case: dict[str, Any], *, live: bool = False) -> int:
-        """Send a case, or let it wait until the one before it was taken."""
+        """Send a case."""
         self.serial += 1
-        message = {"kind": "case", "serial": self.serial, "case": case, "live": live}
-        if self.sent:
-            self.waiting = message
-            self.most_waiting = 1
-        else:
-            self._post(message)
+        self.sent[self.serial] = time.monotonic()
+        self.order(kind="case", serial=self.serial, case=case, live=live)
         return self.serial
 
     def order(self, **message: Any) -> None:
@@ -111,14 +108,7 @@ class Page:
         if isinstance(content, bytes):
             return None
         message: dict[str, Any] = json.loads(content)
-        self.heard.append(message)
-        if message["kind"] == "taken" and message["serial"] >= self.sent:
-            self.sent = 0
-            if self.waiting:
-                waiting, self.waiting = self.waiting, None
-                self._post(waiting)
-        if message["kind"] == "failed":
-            self.sent = 0
+        self.heard.append(message | {"at": time.monotonic()})
         return message
 
     def until(self, *kinds: str, serial: int = 0, seconds: float = 240) -> dict[str, Any]:
@@ -126,7 +116,7 @@ class Page:
         stop = time.monotonic() + seconds
         while time.monotonic() < stop:
             message = self.hear(1.0)
-            if message and message["kind"] in kinds and serial in (0, message["serial"]):
+            if message and message["kind"] in kinds and serial in (0, message.get("serial")):
                 return message
         raise AssertionError(f"no {kinds} in {seconds} s")
 
@@ -147,9 +137,14 @@ class Page:
             place = f"{self.address}api/sessions/{self.session}/uploads"
             return httpx.post(place, params={"name": path.name}, content=file, timeout=120)
 
-    def _post(self, message: dict[str, Any]) -> None:
-        self.sent = message["serial"]
-        self.order(**message)
+    def passed(self, heard: Kept) -> list[int]:
+        """Inputs that were begun although a newer one had been sent some time before."""
+        begun = [message for message in heard if message["kind"] == "taken"]
+        return [
+            message["serial"]
+            for message in begun
+            if (newer := self.sent.get(message["serial"] + 1)) is not None and message["at"] - newer > LATENCY
+        ]
 
 
 def drag(page: Page, *, pause: float, count: int = INPUTS) -> None:
@@ -175,7 +170,8 @@ def drag_rows(folder: Path) -> Iterator[Row]:
         stages = [message["serial"] for message in heard if message["kind"] == "stage"]
         wrong = sum(a > b for serials in (taken, stages) for a, b in pairwise(serials))
         note = f"{len(taken)} of {INPUTS} begun"
-        yield Row("drag of 300 inputs", "inputs that wait, most", page.most_waiting, 1, note=note)
+        passed = len(page.passed(heard))
+        yield Row("drag of 300 inputs", "begun although a newer one waited", passed, 0, note=note)
         yield Row("", "shown or begun out of order", wrong, 0)
         unseen = len(set(taken) - set(stages))
         yield Row("", "begun, and nothing shown of it", unseen, 0)
@@ -220,6 +216,16 @@ class _Quiet:
         return self.waits
 
 
+def least(work: Callable[[], object], times: int = 3) -> float:
+    """CPU time of some work [s]: the least of several runs, which other programs have disturbed least."""
+    spent = []
+    for _ in range(times):
+        start = time.process_time()
+        work()
+        spent.append(time.process_time() - start)
+    return min(spent)
+
+
 def update_rows() -> Iterator[Row]:
     """CPU time of an update beside that of net and drape alone; and how near a dragged form is to a cold one."""
     quiet = _Quiet()
@@ -227,19 +233,15 @@ def update_rows() -> Iterator[Row]:
     quiet.waits = False
     worker.obey(Order(0, "form", DOME, True))
     quiet.waits = True
-    shown = range(0, INPUTS, 15)
-    laid = [rs.Job.load(dragged(k)).case.build(None) for k in shown]
-    ratios = []
-    for _ in range(2):
-        start = time.process_time()
-        for k in shown:
-            worker.obey(Order(k, "form", dragged(k), True))
-        middle = time.process_time()
-        for built in laid:
-            drape(built.layout, built.rod, built.target, anchor=built.anchor)
-        ratios.append((middle - start) / (time.process_time() - middle))
-    note = "; ".join(f"{ratio:.2f}" for ratio in ratios)
-    yield Row("update of the 17 x 17 dome", "CPU over that of net and drape", min(ratios), 1.3, "times", note)
+    updates, bare = [], []
+    for k in range(0, INPUTS, 15):
+        built = rs.Job.load(dragged(k)).case.build(None)
+        updates.append(least(lambda k=k: worker.obey(Order(k, "form", dragged(k), True))))
+        bare.append(least(lambda at=built: drape(at.layout, at.rod, at.target, anchor=at.anchor)))
+    note = f"{1e3 * np.mean(updates):.1f} over {1e3 * np.mean(bare):.1f} ms"
+    yield Row(
+        "update of the 17 x 17 dome", "CPU over that of net and drape", sum(updates) / sum(bare), 1.3, "times", note
+    )
     quiet.waits, apart = False, 0.0
     for k in (40, 100, 150, 200, 250, 299):
         worker.obey(Order(k, "form", dragged(k), True))
@@ -369,16 +371,19 @@ def bad_input_rows(folder: Path) -> Iterator[Row]:
         left = sum(path.stat().st_size for path in (folder / "sessions").rglob("*") if path.is_file())
         yield Row("mesh of 300 MB", "not refused", float(not sentence), 0, note=sentence)
         yield Row("", "left on the disk", left / 1e6, 100, "MB")
-        slow = "+".join(f"sin({k}*x)*cos({k}*y)*exp(-x*x*{k})" for k in range(1, 400))
+        terms = "+".join(f"sin({k}*x)*cos({k}*y)*exp(-x*x*{k})/{k * k}" for k in range(1, 90))
         case = {
-            "target": {"kind": "heightfield", "formula": slow, "domain": "disc", "radius": 1},
-            "layout": {"spacing": "10 mm"},
+            "target": {"kind": "heightfield", "formula": f"0.3*({terms})", "domain": "disc", "radius": 1},
+            "layout": {"spacing": "40 mm"},
         }
         serial = page.show(case)
         updates = other.show(dragged(20), live=True)
         disturbed = other.until("stage", "failed", serial=updates)["kind"] != "stage"
         said = page.until("done", "failed", serial=serial, seconds=120)
-        yield Row("formula that takes for ever", "did not end", 0, 0, note=said.get("sentence", said["kind"])[:100])
+        sentence = said.get("sentence", said["kind"])
+        yield Row(
+            "formula that takes for ever", "not ended in time", float("out of time" not in sentence), 0, note=sentence
+        )
         yield Row("", "another session was disturbed", float(disturbed), 0)
 
 

@@ -38,6 +38,13 @@ def errors(said: list[str]) -> list[str]:
     return [text for text in said if not re.search(r"GPU stall|swiftshader|WebGL.*(fallback|performance)", text, re.I)]
 
 
+CAPTION = """(part, k) => new Promise(done => {
+  part.value = k;
+  part.dispatchEvent(new Event("input"));
+  requestAnimationFrame(() => requestAnimationFrame(() => done(document.querySelector("#view .caption").textContent)));
+})"""  # of a stage of the view, once it was drawn
+
+
 class Robot:
     """Clicks through the studio and keeps a picture of each step."""
 
@@ -198,8 +205,7 @@ def report_rows(folder: Path) -> Iterator[Row]:
         page.wait_for_selector("#view canvas")
         slider, found = page.locator("#view input.stages"), []
         for k in range(int(slider.get_attribute("max") or 0) + 1):
-            slider.evaluate("(part, k) => { part.value = k; part.dispatchEvent(new Event('input')); }", k)
-            found.append(page.inner_text("#view .caption"))
+            found.append(slider.evaluate(CAPTION, k))
     from rodshell.output.grid import shape_names, shape_of
 
     names = list(shape_names(archive))

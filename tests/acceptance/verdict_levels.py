@@ -56,7 +56,7 @@ def said_of(*words: str) -> Said:
 
 CASES: dict[str, tuple[str, list[str], str]] = {  # level, words of the command line, what the first sentence says
     "20 mm rods on the hemisphere": ("unbuildable", ["hemisphere", "--rod.section.radius", "10 mm"], "touch"),
-    "strength exceeded": ("unbuildable", ["hemisphere", "--checks.strength", "1 kPa"], "would break"),
+    "strength exceeded": ("unbuildable", ["hemisphere", "--checks.strength", "1 kPa"], "of the given strength"),
     "unstable": ("unbuildable", ["hemisphere"], "unstable (2 buckling modes)"),
     "the README's pavilion": ("good", ["pavilion"], "is stable and carries at least"),
     "the paper's hemisphere": ("check", ["hemisphere"], "its own weight"),

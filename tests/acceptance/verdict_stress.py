@@ -134,7 +134,7 @@ def strength_rows() -> Iterator[Row]:
         used = result["bending"]["pinned"]["utilisation"]
         case = f"laths, strength {share:g} of the stress"
         yield Row(case, "utilisation off", abs(used * share - 1), 1e-6, "", f"{100 * used:.0f} %")
-        words = [word for word in result["verdict"]["reasons"] if "would break" in word and "ends" in word]
+        words = [word for word in result["verdict"]["reasons"] if "the given strength" in word and "ends" in word]
         said = len(words) == 1 and says in words[0] if says else not words
         yield Row(case, "said wrongly", float(not said), 0)
     given = rs.Rod(rs.GivenSection(EA=1e5, EI1=1.0, EI2=1.0, GJ=0.7))

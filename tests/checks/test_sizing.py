@@ -44,9 +44,16 @@ def test_on_a_cylinder_a_rod_bends_by_its_heading() -> None:
     assert bends.geodesic.max() < 1e-3 / 5
 
 
+# Over the characteristic strength: k_mod / gamma_M of covered timber, a third of GFRP's, half where no code was cited
+PERMANENT = {
+    "larch": 0.6 / 1.3, "oak": 0.6 / 1.3, "plywood": 0.6 / 1.2, "gfrp": 1 / 3, "spring-steel": 1.0, "bamboo": 0.5,
+    "petg": 0.5,
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("name", ["larch", "oak", "bamboo", "gfrp", "plywood", "petg", "spring-steel"])
 @pytest.mark.parametrize("radius", [0.1, 5.0])
-def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_use_more(
+def test_bends_use_at_most_three_quarters_of_the_permanent_strength_and_the_next_stock_size_would_use_more(
     name: Any, radius: float
 ) -> None:
     """Or would be thicker than rods of this target are, or is not thinner than the thinnest in stock."""
@@ -60,12 +67,13 @@ def test_bends_use_at_most_half_of_the_strength_and_the_next_stock_size_would_us
         strain = depth_strain(section, bends.normal, bends.geodesic)
         return strain * material.youngs_modulus / (material.bending_strength or np.nan)
 
-    assert used(section) <= 0.5
+    allowed = PERMANENT[name] * 3 / 4
+    assert used(section) <= allowed
     if section in TRADE_SIZES[material.name]:  # type: ignore[index]
         at = TRADE_SIZES[material.name].index(section)  # type: ignore[index, arg-type]
         for thicker in TRADE_SIZES[material.name][at + 1 : at + 2]:  # type: ignore[index]
             room = min(target.size / 100, min(layout.spacing) / 6)
-            assert used(thicker) > 1 / 2 or thicker.depth > room
+            assert used(thicker) > allowed or thicker.depth > room
 
 
 @pytest.mark.slow
@@ -76,7 +84,7 @@ def test_a_lath_whose_joints_let_it_roll_is_thicker_for_it_bends_towards_its_thi
     assert free.depth > held.depth
     form = rs.find_form(target, layout, rs.Rod(free, larch), ends=("clamped",))
     bending = form.archive(options=rs.OutputOptions(stages=0)).results.plain()["bending"]["clamped"]
-    assert 0.2 < bending["utilisation"] <= 0.5
+    assert 0.4 < bending["utilisation"] <= 1
 
 
 def depth_strain(section: Any, normal: Any, geodesic: Any) -> float:
@@ -110,7 +118,7 @@ def test_what_is_given_is_kept_and_only_the_rest_is_chosen() -> None:
     assert isinstance(wall, rs.Tube)
     assert wall.thickness == 0.002
     with pytest.raises(
-        InputError, match=r"a wall of 50 mm: tubes that withstand .* at most 50 mm thick: give a thinner wall"
+        InputError, match=r"a wall of 50 mm: tubes that withstand .* at most 30 mm thick: give a thinner wall"
     ):
         roof(**{"rod.section.kind": "tube", "rod.section.thickness": "50 mm"}).build()
 
@@ -144,22 +152,26 @@ def test_the_rod_that_was_chosen_is_announced_said_in_the_summary_and_kept(
     out = str(tmp_path / "roof")
     assert main(["form", "heightfield", *options, "clamped", "--only", "csv", "--out", out]) == 0
     said = capsys.readouterr()
-    aim = "half of the bending strength at most"
     (announced,) = [line for line in said.err.splitlines() if line.startswith("rodshell: rod: ")]
     assert "gfrp, E = 23 GPa" in announced
     chosen = "material and section were not given: chosen to fit, "
-    assert f"{chosen}by an estimate of the bends, which aims at {aim} and comes to " in announced
     assert (
-        "; the next size that is sold, a tube of 76 x 6 mm, is wider than a hundredth of half the shell's" in announced
+        f"{chosen}by an estimate of the bends, which aims at 75 % of the permanent strength at most and comes to "
+        in announced
     )
-    assert "bending strength 240 MPa, characteristic, short-term: reduce for duration" in said.out
-    assert "of gfrp's bending strength" in said.out
+    assert "; the next size that is sold, a tube of 76 x 6 mm, would use 87 % at the sharpest bend" in announced
+    assert "bending strength 240 MPa, characteristic, short-term\n" in said.out
+    assert "design strength 80 MPa permanently, 120 MPa during erection\n" in said.out
+    assert "of gfrp's permanent design strength" in said.out
     saved = rs.read(out)
     assert saved.results.plain()["rod"]["chosen"] == {"material": True, "section": True}
     assert saved.results.plain()["bending"]["strength_of"] == "gfrp"
     used = saved.results.plain()["bending"]["clamped"]["utilisation"]
-    assert used <= 0.5
-    assert f"{chosen}aiming at {aim} by an estimate of the bends; reached {percent(used)} in the final" in said.out
+    assert used <= 1
+    assert (
+        f"{chosen}sized for the permanent strength by an estimate of the bends; reached {percent(used)} in the final"
+        in said.out
+    )
     again = load_case(Path(out) / "case.toml")
     assert again.rod.left_open == ()
     assert again.build().rod.parameters() == {key: saved.results.plain()["rod"][key] for key in ("section", "material")}
@@ -190,19 +202,19 @@ def test_rods_of_a_table_use_what_they_are_chosen_for_and_the_summary_says_so(
     main(["popup", table, "--unit", "m", "--rod.material.preset", "larch", "--checks.stages", "0", "--out", out])
     said = capsys.readouterr()
     used = rs.read(out).results.plain()["bending"]["pinned"]["utilisation"]
-    estimate = float(re.findall(r"half of the bending strength at most and comes to (\d+) %", said.err)[0]) / 100
+    estimate = float(re.findall(r"75 % of the permanent strength at most and comes to (\d+) %", said.err)[0]) / 100
     assert 0.8 * estimate < used < 1.2 * estimate
-    assert 0.2 < used < 0.5 * 1.2
+    assert 0.2 < used < 1
     assert f"reached {percent(used)} in the final shape" in said.out
 
 
-def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path) -> None:
+def test_a_summary_claims_no_share_of_the_strength_that_is_not_so(tmp_path: Path) -> None:
     """The same result, had its rods bent more sharply than estimated."""
     table, out = table_of_rods(tmp_path / "rods.csv", 4, 0.92), str(tmp_path / "out")
     main(["popup", table, "--unit", "m", "--checks.stages", "0", "--quiet", "--out", out])
     found = rs.read(out).results
     bent = found.bending.model_copy(update={"pinned": found.bending.pinned.model_copy(update={"utilisation": 0.98})})
-    assert "aiming at half of the bending strength at most by an estimate of the bends; reached 98 % in the final" in (
+    assert "sized for the permanent strength by an estimate of the bends; reached 98 % in the final" in (
         summary_text(found.model_copy(update={"bending": bent}))
     )
 
@@ -211,16 +223,16 @@ def test_a_summary_claims_no_half_of_the_strength_that_is_not_so(tmp_path: Path)
 @pytest.mark.parametrize(
     ("keys", "limit"),
     [
-        ({}, "the next size that is sold, 24 x 48 mm, would use 58 % at the sharpest bend"),
+        ({}, "the next size that is sold, 15 x 40 mm, would use 78 % at the sharpest bend"),
         ({"joint.kind": "pin"}, "at the sharpest bend, since the joints keep it from rolling and bend it edgewise too"),
         ({"layout.spacing": "150 mm"}, "10 x 30 mm, is wider than a sixth of the spacing, 25 mm"),
         (
             {"rod.material.preset": "gfrp"},
-            "a tube of 76 x 6 mm, is wider than a hundredth of half the shell's width, 60 mm",
+            "a tube of 50 x 4 mm, would use 86 % at the sharpest bend",
         ),
         ({"rod.material.preset": "spring-steel", "layout.spacing": "1.5 m"}, "; no thicker one is sold"),
         ({"checks.strength": "2 MPa"}, "no size that is sold fits: the thinnest, 3 x 10 mm, would use "),
-        ({"rod.section.kind": "circle"}, "a thicker one would use more than half at the sharpest bend"),
+        ({"rod.section.kind": "circle"}, "a thicker one would use more at the sharpest bend"),
     ],
 )
 def test_what_keeps_a_chosen_section_from_being_thicker_is_named(keys: dict[str, str], limit: str) -> None:
@@ -229,15 +241,15 @@ def test_what_keeps_a_chosen_section_from_being_thicker_is_named(keys: dict[str,
     fit = case.fit_on(target, layout)
     assert isinstance(rod.section, rs.Circle | rs.Tube | rs.RectangularSection)
     assert rod.material
-    why = fit.reason(rod.section, rod.material, strength=case.checks.strength, shape=case.rod.shape)
+    why = fit.reason(rod.section, rod.material, strength=case.permanent_strength(rod.material), shape=case.rod.shape)
     assert limit in why
 
 
 def test_the_thickest_lath_that_is_sold_is_taken_before_thinner_ones_that_are_not() -> None:
-    """Bends by which the thinnest of the sizes uses 0.45 of the strength: more than a third, less than half."""
+    """Bends by which the thinnest of the sizes uses 0.33 of the strength: 0.72 of the permanent one."""
     larch, thin = rs.Material.preset("larch"), TRADE_SIZES["larch"][0]
     assert larch.bending_strength
-    curvature = 0.45 * larch.bending_strength / larch.youngs_modulus / 1.5e-3
+    curvature = 0.33 * larch.bending_strength / larch.youngs_modulus / 1.5e-3
     bends = Bends(np.array([curvature]), np.zeros(1))
     assert Fit(10.0, 0.025, 0.05, lambda: bends).section(larch) == thin
 
@@ -250,8 +262,8 @@ def test_a_given_strength_wins_over_the_presets(tmp_path: Path, capsys: pytest.C
     bending = form.archive(options=rs.OutputOptions(strength=100e6, stages=0)).results.plain()["bending"]
     assert (bending["strength"], bending["strength_of"]) == (100e6, None)
     bending = form.archive(options=rs.OutputOptions(stages=0)).results.plain()["bending"]
-    assert (bending["strength"], bending["strength_of"]) == (240e6, "gfrp")
-    assert bending["clamped"]["utilisation"] == bending["clamped"]["max_stress"] / 240e6
+    assert (bending["strength"], bending["strength_of"]) == (80e6, "gfrp")
+    assert bending["clamped"]["utilisation"] == bending["clamped"]["max_stress"] / 80e6
 
 
 def test_a_table_of_rods_is_sized_by_how_far_its_ends_come_together() -> None:
@@ -272,14 +284,14 @@ def test_a_rod_fits_the_heading_that_a_search_finds(tmp_path: Path) -> None:
     """On a barrel rods bend least at 45 degrees: half as sharply as across it, so that twice as thick ones fit."""
     options = ["--formula", "sqrt(25 - x^2) - 4", "--target.domain", "rectangle", "--target.size", "6 m, 6 m"]
     options += ["--spacing", "1.5 m", "--rotate", "auto", "--objective", "curvature", "--pop_up.ends", "clamped"]
-    options += ["--rod.material.preset", "larch", "--checks.strength", "20 MPa"]
+    options += ["--rod.material.preset", "larch", "--checks.strength", "14 MPa"]
     out = tmp_path / "barrel"
     assert main(["form", "heightfield", *options, "--only", "csv", "--quiet", "--out", str(out)]) == 0
     case = load_case(out / "case.toml")
     target, layout, rod, *_ = case.build()
     assert layout.rotate == pytest.approx(np.pi / 4)
     assert rod.section == Fit.on(target, layout, anchor=case.drape.anchor).section(
-        rs.Material.preset("larch"), strength=20e6
+        rs.Material.preset("larch"), strength=14e6
     )
     across = rs.GridLayout.orthogonal(spacing=1.5)
-    assert rod.section.depth > Fit.on(target, across).section(rs.Material.preset("larch"), strength=20e6).depth
+    assert rod.section.depth > Fit.on(target, across).section(rs.Material.preset("larch"), strength=14e6).depth

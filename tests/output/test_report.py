@@ -365,7 +365,7 @@ def test_strengths_of_a_preset_are_shown_with_what_they_mean_and_their_source() 
     rows = dict(dict(key_figures(results, flat_plan(made)))["Rod"])
     assert rows["preset"] == "larch"
     assert rows["bending strength"] == "30 MPa"
-    assert rows["these strengths are"] == "characteristic, short-term: reduce for duration and moisture"
+    assert rows["these strengths are"] == "characteristic, short-term"
     assert rows["source"].startswith("EN 338")
     table = checks_table(results)
     assert table is not None

@@ -64,6 +64,11 @@ def figures(*changes: tuple[str, Any]) -> dict[str, Any]:
 
 
 MISSING = object()
+OF_GFRP = [
+    ("strength", {"permanent": 8e7, "erection": 1.2e8}), ("bending.erection_strength", 1.2e8),
+    ("bending.strength_of", "gfrp"),
+    ("rod", {"preset": {"name": "gfrp", "bending_strength": 2.4e8}}),
+]  # fmt: skip
 TOUCHING = {"clearance": -0.003, "pairs": 5, "rods": ["U03", "U04"], "where": [0.1, 0.2, 0.3]}
 
 
@@ -102,6 +107,10 @@ def test_different_faults_of_all_end_conditions_leave_none_to_build() -> None:
     ("changes", "words"),
     [([("bending.deployment", {"utilisation": 1.69, "share": 0.25, "rod": "U03", "at": 0.2})],
       "at 25 % of the deployment the rods would break: 169 % of their strength in U03, 200 mm from its"),
+     ([("bending.deployment", {"utilisation": 2.01, "share": 0.25}), *OF_GFRP],
+      "at 25 % of the deployment the rods use 201 % of gfrp's design strength for erection"),
+     ([("bending.pinned.utilisation", 1.14), ("bending.clamped.utilisation", 1.0001), *OF_GFRP],
+      "with pinned ends the rods use 114 % of gfrp's permanent design strength"),
      ([("bending.deployment.max_bending_strain", 0.08)], "too thick for this curvature"),
      ([("contact.deployment", TOUCHING)], "5 pairs of rods touch or cross, worst: U03 and U04 overlap by 3.00 mm"),
      ([("target.flat", True)], "the target is flat, nothing pops up"),
@@ -129,6 +138,8 @@ def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]]
      ([("agreement.pinned", MISSING)], "the gap to the target was not checked"),
      ([("deployment.clamped.reached_from_flat", None)], "whether the clamped shape is reached from the pinned one"),
      ([("bending.strength_of", "larch"), ("bending.pinned.utilisation", 0.99)], "permanently use 99 %"),
+     ([("bending.deployment", {"utilisation": 1.99, "share": 0.25}), *OF_GFRP],
+      "the ends moved evenly, the rods use 199 % of gfrp's design strength for erection: erect it in another way"),
      ([("deployment", MISSING), ("status", "out of time after 3 s: not checked: the deployment from flat"),
        ("warnings", ["out of time after 3 s: not checked: the deployment from flat"])], "was not checked"),
      ([("pop_up.pinned.stable", None)], "stable was not checked"),

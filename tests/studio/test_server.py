@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import rodshell as rs
+from rodshell.case.link import upload_name
 from rodshell.errors import InputError
-from rodshell.studio.session import upload_name, with_uploads
+from rodshell.studio.session import with_uploads
 
 pytest.importorskip("starlette")
 pytest.importorskip("httpx2")

@@ -14,7 +14,7 @@ import rodshell as rs
 from rodshell.sweeps.columns import read_column
 from rodshell.sweeps.identity import job_identity
 from rodshell.sweeps.store import FOUND, STORE, Store
-from rodshell.sweeps.table import CSV, Table, note_header
+from rodshell.sweeps.table import CSV, Table, header_notes
 
 ROW = {"verdict": "good", "status": "converged", "rms_pinned": 0.0125, "seconds": 0.1, "results": {"rods": 26}}
 
@@ -114,17 +114,19 @@ def test_the_designs_are_replaced_whole_or_not_at_all(tmp_path: Path):
         with pytest.raises(KeyboardInterrupt):
             store.plan(broken())  # type: ignore[arg-type]
         assert store.count() == 2
-        store.plan([([3], "c")], more=True)
+        store.add([([3], "c")])
         store.record("c", FOUND, ROW)
         assert [(design.position, design.keys) for design in store.finished()] == [(2, [3])]
 
 
 def test_the_table_has_a_row_for_each_finished_design_in_order(tmp_path: Path):
     with Store(tmp_path, writing=True) as store:
-        store.plan([([0.03, "ball"], "b"), ([0.04, "ball"], "missing"), ([0.05, [13, 11]], "a"), ([0.06, None], "b")])
+        store.plan(
+            [([0.03, "ball"], "b"), ([0.04, "ball"], "missing"), ([0.05, [13, 11]], "a"), ([0.06, None], "b")],
+            notes=header_notes(["layout.spacing", "joint.kind"], [read_column("rods"), read_column("job")]),
+        )
         store.record("a", "refused", {"status": 'no net, "none"', "seconds": 0.0})
         store.record("b", FOUND, ROW)
-        note_header(store, ["layout.spacing", "joint.kind"], [read_column("rods"), read_column("job")])
         Table(store).write()
     with (tmp_path / CSV).open() as stream:
         head, *rows = csv.reader(stream)
@@ -139,6 +141,7 @@ def test_the_table_has_a_row_for_each_finished_design_in_order(tmp_path: Path):
     table = rs.read_sweep(tmp_path, ["fabrication.total_mass"])
     assert table.column_names == [*head, "fabrication.total_mass"]
     assert table["rms_pinned"].to_pylist() == [0.0125, None, 0.0125]
+    assert str(table["rods"].type) == "int64"
     assert table["joint.kind"].to_pylist() == ["ball", "[13, 11]", None]
 
 

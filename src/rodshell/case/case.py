@@ -12,6 +12,7 @@ from rodshell.case.load_tables import (
     BracingKinds,
     CombinationTable,
     LoadKinds,
+    LockedJointsTable,
     NoBracingTable,
     StabilityTable,
     StrengthTable,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from rodshell.layout import GridLayout
     from rodshell.loads.combinations import Loads
     from rodshell.output.options import OutputOptions
+    from rodshell.rods.materials import Material
     from rodshell.rods.section import Rod
     from rodshell.targets import Target
 
@@ -85,6 +87,7 @@ class Case(Table):
         default=(), description="combinations of loads; in a case file only"
     )
     bracing: BracingKinds = Field(default_factory=NoBracingTable, discriminator="kind")
+    locked_joints: LockedJointsTable = Field(default_factory=LockedJointsTable)
     stability: StabilityTable = Field(default_factory=StabilityTable)
     strength: StrengthTable = Field(default_factory=StrengthTable)
 
@@ -110,7 +113,7 @@ class Case(Table):
                     f"no case file can describe {held.what} ({name}): keep the Python that makes it, or save the form"
                 )
             notes += [f"# {held.note}\n"] if held.note else []
-        idle = {"stability", "strength"} if not self.loads else set[str]()
+        idle = {"locked_joints", "stability", "strength"} if not self.loads else set[str]()
         idle |= {"bracing"} if self.bracing.kind == "none" else set()
         return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
 
@@ -148,7 +151,14 @@ class Case(Table):
         if self.rod.held is not None:
             rod: Rod = self.rod.held.value
             return rod
-        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.checks.strength)
+        return self.rod.build(lambda: self.fit_on(target, layout, anchor=anchor), strength=self.permanent_strength)
+
+    def permanent_strength(self, material: "Material") -> float | None:
+        """What rods of a material withstand permanently [Pa]: as given, or by the building code of a preset."""
+        from rodshell.rods.design_strength import permanent_strength
+
+        given = self.strength.permanent or self.checks.strength
+        return given or permanent_strength(material, self.strength.service_class)
 
     def fit_on(self, target: "Target", layout: "GridLayout", *, anchor: tuple[float, float] | None = None) -> "Fit":
         """What a rod that is left to the target has to fit."""
@@ -212,7 +222,9 @@ class Case(Table):
         layout = built(self.layout, target)
         self._require_stock(layout)
         self.bracing.build()
-        self.built_loads()
+        loads = self.built_loads()
+        if loads is not None and loads.locked_joints is not None:
+            loads.locked_joints.require_pins(joint)
         if self.refine.under not in ("nothing", "weight", *self.combination_names):
             known = ", ".join(("nothing", "weight", *self.combination_names))
             raise InputError(
@@ -271,6 +283,7 @@ class Case(Table):
             loads={load.name: load.build() for load in self.loads},
             combinations={row.name: dict(row.factors) for row in self.combinations},
             bracing=self.bracing.build(),
+            locked_joints=self.locked_joints.build(),
             stability=self.stability.build(),
             strength=self.strength.build(),
             durations={load.name: load.duration for load in self.loads if load.duration is not None},

@@ -171,11 +171,13 @@ class RodTable(Table):
         material = self.material is None and section.kind != "given"
         return (*(["material"] if material else []), *(["section"] if sized else []))
 
-    def build(self, fit: "Callable[[], Fit] | None" = None, *, strength: float | None = None) -> "Rod":
+    def build(
+        self, fit: "Callable[[], Fit] | None" = None, *, strength: "Callable[[Material], float | None] | None" = None
+    ) -> "Rod":
         """The rod.
 
         fit : what material and section have to fit; called where one is left open.
-        strength : of the material, in place of the preset's [Pa].
+        strength : the permanent one of a material [Pa]; default: a preset's.
 
         Raises
         ------
@@ -192,7 +194,8 @@ class RodTable(Table):
         material = self.material.build() if self.material else Material.preset(room.preset)
         if "section" not in self.left_open:
             return Rod(section, material)
-        return Rod(room.section(material, strength=strength, shape=self.shape), material)
+        withstood = strength(material) if strength is not None else None
+        return Rod(room.section(material, strength=withstood, shape=self.shape), material)
 
     @property
     def shape(self) -> "Circle | Tube | None":

@@ -13,6 +13,7 @@ from rodshell.errors import InputError, NetLimitError
 from rodshell.joints import Ball, Joint
 from rodshell.layout import GridLayout
 from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.rods.design_strength import permanent_strength
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, Tube, scaled, size_text
 from rodshell.targets import Target
@@ -20,9 +21,10 @@ from rodshell.units import length_text, rounded_down
 
 WIDE = 1.0  # m: targets above it are built of what shells of metres are built of, those below are models
 SLENDER = 1 / 200  # radius over the target's size [HQK section 3.1]: no rod is sized thicker
-# Of the strength, by the bends of the net: an estimate, since the free shell bends up to 1.2 times as sharply (measured
-# on the gallery). During deployment flat roofs bend 3 times as sharply, those with several waves more.
-AIM = 1 / 2
+# Of the permanent strength, by the bends of the net: an estimate, since the free shell bends up to 1.2 times as sharply
+# (measured on the gallery), a clamped barrel 1.35 times at its ends. During deployment flat roofs bend 3 times as
+# sharply, those with several waves more.
+AIM = 3 / 4
 # Rods of a table bend the more sharply the more others they are joined to, which lie low near their own ends: 1.3 to
 # 1.4 times the root of the joints along one, measured on square tables of 4, 8 and 12 rods each way.
 JOINED = 1.4
@@ -117,7 +119,7 @@ class Fit:
     def section(
         self, material: Material, *, strength: float | None = None, shape: Circle | Tube | None = None
     ) -> Section:
-        """The thickest section that by these bends uses at most half of the strength.
+        """The thickest section that by these bends uses at most three quarters of the permanent strength.
 
         Of the sizes in which a preset material is sold; where none of those fits, or for a material without a name, in
         steps of 1, 1.5, 2, 3, 5, 7. Without a known strength the section is as slender as the paper's rods on its
@@ -125,14 +127,14 @@ class Fit:
 
         Parameters
         ----------
-        strength : in place of the preset's [Pa].
+        strength : permanent [Pa]; None: the preset's by its building code.
         shape : a circle, or a tube whose wall stays as it is, of which only the radius is looked for.
 
         Raises
         ------
         InputError : the tube's wall is too thick for what the bends allow.
         """
-        strength = strength or material.bending_strength
+        strength = strength or permanent_strength(material)
         if strength is None:
             return Tube(self.slender, shape.thickness) if isinstance(shape, Tube) else Circle(self.slender)
         bends, allowed = self.bends(), AIM * strength / material.youngs_modulus
@@ -162,10 +164,10 @@ class Fit:
         ----------
         section : the one that was chosen.
         material : of the rods; a preset has its own strength and the sizes in which it is sold.
-        strength : in place of the preset's [Pa].
+        strength : permanent [Pa]; None: the preset's.
         shape : a circle or a tube, if one was asked for.
         """
-        strength = strength or material.bending_strength
+        strength = strength or permanent_strength(material)
         if strength is None:
             return "as slender as the paper's rods, since no strength is known"
         bends, bears = self.bends(), strength / material.youngs_modulus
@@ -180,7 +182,8 @@ class Fit:
 
         stock = _sold(material, shape)
         share = _share(largest_strain(section, bends) / bears)
-        said = f"by an estimate of the bends, which aims at half of the bending strength at most and comes to {share}; "
+        said = f"by an estimate of the bends, which aims at {_share(AIM)} of the permanent strength "
+        said += f"at most and comes to {share}; "
         if (section,) == stock[-1:]:
             return said + "no thicker one is sold"
         if section in stock:
@@ -188,7 +191,7 @@ class Fit:
         if stock:
             return f"{said}no size that is sold fits: the thinnest, {kept_out(stock[0])}"
         if largest_strain(scaled(section, self.thickest / section.depth), bends) > AIM * bears:
-            return said + "a thicker one would use more than half at the sharpest bend"
+            return said + "a thicker one would use more at the sharpest bend"
         return f"{said}the next step would be wider than {self.thickest_of}, {length_text(self.thickest)}"
 
 

@@ -20,14 +20,17 @@ def command(file: str, out: str | None, report: bool, retry: bool, quiet: bool) 
     All designs are in DIR/table.csv, the best ones in DIR/front.csv. What is finished stays, whatever is interrupted:
     the same command continues.
     """
-    from rodshell.sweeps.plan import opened
     from rodshell.sweeps.search import optimise
+    from rodshell.sweeps.search_plan import read_search
 
-    folder = Path(out) if out else Path("out") / opened(file)[0]
+    plan = read_search(file)
+    folder = Path(out) if out else Path("out") / plan.origin.name
     compile_before_first(quiet=quiet)
     with Progress(quiet=quiet) as progress:
         found = optimise(file, folder, retry=retry, report=report, progress=progress)
     if not quiet:
         click.echo(found.summary())
+        if found.front:
+            click.echo(found.front_text())
         click.echo(f"written to {folder.absolute()}")
     return FOUND if found.front else NOT_CONVERGED

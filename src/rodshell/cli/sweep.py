@@ -9,7 +9,7 @@ from rodshell.cli.options import QUIET
 from rodshell.cli.reporting import FOUND, NOT_CONVERGED, Progress, compile_before_first
 
 if TYPE_CHECKING:
-    from rodshell.sweeps.plan import Plan
+    from rodshell.sweeps.plan import SweepPlan
 
 
 @click.command(epilog="A sweep file is described in docs/sweeps.md; examples/sweep.toml is one.")
@@ -29,7 +29,7 @@ def command(file: str, out: str | None, dry_run: bool, report: bool, retry: bool
     from rodshell.sweeps.run import sweep
 
     plan = read_plan(file)
-    folder = Path(out) if out else Path("out") / plan.name
+    folder = Path(out) if out else Path("out") / plan.origin.name
     if dry_run:
         return _dry_run(plan, folder)
     compile_before_first(quiet=quiet)
@@ -41,7 +41,7 @@ def command(file: str, out: str | None, dry_run: bool, report: bool, retry: bool
     return FOUND if len(found.failures) == 0 or found.finished > sum(n for _, n in found.failures) else NOT_CONVERGED
 
 
-def _dry_run(plan: "Plan", folder: Path) -> int:
+def _dry_run(plan: "SweepPlan", folder: Path) -> int:
     from rodshell.sweeps.run import planned
 
     jobs, finished = planned(plan, folder)

@@ -30,13 +30,15 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
 
     Raises
     ------
-    InputError : the form is in patches, or braced; a load is not a force; the rods have no mass.
+    InputError : the form is in patches, braced, or has joints that are locked; a load is not a force; the rods have no mass.
     """
     wish = f"refine.under = {shown(combination)}"
     if isinstance(stages, PatchedForm):
         raise InputError(f'{wish}: a form in patches is refined without loads, or under = "weight"')
     if loads.bracing is not None:
         raise InputError(f"{wish}: a shell is refined without its bracing, which is fitted to it later: leave one out")
+    if loads.locked_joints is not None:
+        raise InputError(f"{wish}: a shell is refined before its joints are locked: leave one out")
     popped = stages.popped[ends]
     mass = popped.shell.mass[: popped.shell.node_count, 2]
     nodes = LoadedNodes(popped.positions, mass, tributary_of(stages), min(stages.layout.spacing))

@@ -24,7 +24,8 @@ SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f2
 STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
 HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
-STRESSES = ("stress_pinned", "stress_clamped")
+STAGES = "history_stress"
+STRESSES = ("stress_pinned", "stress_clamped", STAGES)
 CURVATURES = ("curvature_pinned", "curvature_clamped", "history_curvature")
 FORCES = ("force_pinned", "force_clamped")
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
@@ -56,7 +57,7 @@ class Scale:
 
     @property
     def palette(self) -> list[str]:
-        return hex_colours(self.colours, np.linspace(0, 1, BINS))
+        return list(_palette(self.colours))
 
 
 def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
@@ -77,16 +78,25 @@ def scale_of(archive: Archive, shape: Shape, colour: Colour) -> Scale | None:
     if colour == "force":
         return None if shape.force is None else _force_scale(archive, shape)
     if shape.gap is not None:
-        largest = _largest_of_all_gaps(archive)
-        factor, unit = length_unit(largest)
-        limit = _rounded_up(max(largest, FINEST) / factor)
-        caption = f"gap to target in {unit}, + outside"
-        return Scale(1e3 / factor * shape.gap[nodes], -limit, limit, SIGNED, caption)
+        return gap_scale(shape.gap[nodes], _largest_of_all_gaps(archive))
     if shape.flat or archive.results.target:
         return None
     heights = 1e3 * shape.positions[nodes, 2]  # mm, as at the axes of the picture
     low, high = float(heights.min()), float(heights.max())
     return Scale(heights, low, max(high, low + FINEST), HEIGHT, "height in mm")
+
+
+def gap_scale(gaps: Floats, largest: float) -> Scale:
+    """The scale of signed distances to the target.
+
+    Parameters
+    ----------
+    gaps : (k,) at each entry of `rod_nodes` [m].
+    largest : of all shapes that have the scale [mm].
+    """
+    factor, unit = length_unit(largest)
+    limit = _rounded_up(max(largest, FINEST) / factor)
+    return Scale(1e3 / factor * gaps, -limit, limit, SIGNED, f"gap to target in {unit}, + outside")
 
 
 def largest_gap(archive: Archive, shape: Shape) -> tuple[float, Floats]:
@@ -115,6 +125,11 @@ def _largest_of_all_gaps(archive: Archive) -> float:
     return max((abs(largest_gap(archive, shape)[0]) for shape in shapes if shape.gap is not None), default=0.0)
 
 
+@lru_cache(maxsize=8)
+def _palette(colours: tuple[str, ...]) -> list[str]:
+    return hex_colours(colours, np.linspace(0, 1, BINS))
+
+
 def length_unit(largest: float) -> tuple[float, str]:
     """The unit that fits a length [mm]: how many mm it is, and its name."""
     return (1e3, "m") if largest >= 1e3 else (1.0, "mm")
@@ -123,16 +138,19 @@ def length_unit(largest: float) -> tuple[float, str]:
 def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     """Utilisation where the strength is known, else the stress in a unit of its size."""
     assert shape.stress is not None
-    strength = archive.results.bending.strength if archive.results.bending else None
-    known = [values for name, values in archive.states.items() if name == "history_stress" or name in STRESSES]
-    top = max(float(np.max(values)) for values in known)
-    if strength:
-        unit, caption = strength / 100, "utilisation in %"
+    bending, final = archive.results.bending, shape.name in SHELLS
+    strength = bending.strength if bending else None
+    erection = (bending.erection_strength if bending else None) or strength
+    known = [(name, float(np.max(values))) for name, values in archive.states.items() if name in STRESSES]
+    if strength and erection:
+        unit, caption = (strength if final else erection) / 100, "utilisation in %"
+        top = max(100 * largest / (erection if name == STAGES else strength) for name, largest in known)
     else:
+        top = max(largest for _, largest in known)
         unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
-        caption = f"stress in {name}"
+        caption, top = f"stress in {name}", top / unit
     largest = float(np.max(shape.stress)) / unit
-    limit = _rounded_up(max(top / unit, FINEST))
+    limit = _rounded_up(max(top, FINEST))
     return Scale(shape.stress / unit, 0.0, limit, STRESS, f"{caption}, here up to {largest:.3g}")
 
 

@@ -227,7 +227,8 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
     state : "draped", "popped_pinned" or "popped_clamped".
     """
     shape, rods = shape_of(archive, state), [rod for rod in rods_of(archive) if len(rod.nodes) > 1]
-    outline = section_outline(archive, float(np.ptp(shape.positions, axis=0).max()))
+    section = archive.results.rod.section if archive.results.rod else None
+    outline = section_outline(section, float(np.ptp(shape.positions, axis=0).max()))
     scale = scale_of(archive, shape, "gap")
     colours = None
     if scale is not None:
@@ -245,16 +246,17 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
     return file.content()
 
 
-def section_outline(archive: Archive, size: float) -> Floats:
+def section_outline(section: Section | None, size: float) -> Floats:
     """(s, 2) corners of the rods' section [m], across and up; of a section without a shape, a thin circle.
 
     Up is m1, the normal of the grid: a rectangle's width and an ellipse's a lie there.
 
     Parameters
     ----------
+    section : of the rods; None: not known.
     size : of the shell [m], for the thickness of a section without a shape.
     """
-    section = (archive.results.rod.section if archive.results.rod else None) or Section()
+    section = section or Section()
     if section.kind == "rectangle" and section.height is not None and section.width is not None:
         w, h = 0.5 * section.height, 0.5 * section.width
         return np.array([[w, -h], [w, h], [-w, h], [-w, -h]])

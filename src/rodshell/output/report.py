@@ -24,7 +24,7 @@ from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import SHELLS, shown_case
 from rodshell.results.records import Agreement, Drape, Ends, Gate, PopUp, Record
 from rodshell.results.results import Clearance, Reactions, Stock
-from rodshell.results.verdict import ENDS, facts, unknown_below
+from rodshell.results.verdict import ENDS, by_design_strength, facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
 
 IN_PAGE = ("supports", "elevations", "erection")
@@ -201,6 +201,12 @@ _PRESET: tuple[Entry, ...] = (
     ("these strengths are", "strength_note", str),
     ("source", "source", str),
 )
+_DESIGN_STRENGTH: tuple[Entry, ...] = (
+    ("design strength, permanent", "permanent", wording.stress),
+    ("design strength, erection", "erection", wording.stress),
+    ("design strengths are of", "source", str),
+)
+UTILISATION = "Utilisation of the strength"
 _BENDING: tuple[Entry, ...] = (
     ("Smallest radius of curvature", "min_radius", wording.millimetres),
     ("\N{EN DASH} largest curvature out of the shell", "normal_curvature", wording.curvature),
@@ -209,7 +215,7 @@ _BENDING: tuple[Entry, ...] = (
     ("Largest strain, bending and axial", "max_strain", wording.percent),
     ("Largest stress, unloaded: bending, axial and torsion", "max_stress", wording.stress),
     ("\N{EN DASH} of torsion alone", "torsion_stress", wording.stress),
-    ("Utilisation of the strength", "utilisation", wording.percent),
+    (UTILISATION, "utilisation", wording.percent),
     ("Sharpest at this share of the deployment", "share", wording.whole_percent),
 )
 _REACTIONS: tuple[Entry, ...] = (
@@ -270,9 +276,7 @@ def checks_table(results: Results) -> dict[str, Any] | None:
     stages = "deployment" if "deployment" in shapes else "pop_up"  # the second with the final shape
     columns = [shape for shape in (*ENDS, stages) if shape in shapes and (shape in ENDS or unknown < 1)]
     rows = _side_by_side(_BENDING, [shapes[column] for column in columns], rounding)
-    strength_of = results.bending.strength_of if results.bending else None
-    if strength_of:
-        rows = [(title.replace("the strength", f"{strength_of}'s strength"), values) for title, values in rows]
+    rows = [row for title, values in rows for row in _with_strength(results, columns, title, values)]
     met = results.contact
     near = [met.of("deployment" if column == stages else column) for column in columns] if met else []
     rows += _side_by_side(_CLEARANCE, [found or Clearance() for found in near], rounding)
@@ -281,6 +285,18 @@ def checks_table(results: Results) -> dict[str, Any] | None:
     deployment = f"deployment above {whole_percent(unknown)}" if unknown else "deployment"
     heads = [deployment if column == stages else column for column in columns]
     return {"columns": heads, "rows": rows} if rows else None
+
+
+def _with_strength(results: Results, columns: Sequence[str], title: str, values: list[str]) -> Columns:
+    """A row of the checks; that of the utilisation with the strengths by which it is counted."""
+    bending = results.bending
+    if title != UTILISATION or bending is None:
+        return [(title, values)]
+    design = "design " if by_design_strength(results) else ""
+    whose = f"{bending.strength_of}'s {design}strength" if bending.strength_of else f"the given {design}strength"
+    strengths = [bending.strength if column in ENDS else bending.erection_strength for column in columns]
+    shown = [_shown(wording.stress, strength, rounding_of(results)) for strength in strengths]
+    return [(title.replace("the strength", whose), values), ("\N{EN DASH} which is", shown)]
 
 
 def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]:
@@ -293,6 +309,8 @@ def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]
     rod, drape = results.rod, results.drape
     parts: list[Record | None] = [rod.section, rod.material, rod] if rod else []
     preset = _listed(rod.preset if rod else None, _PRESET, plan.rounding)
+    if by_design_strength(results):
+        preset += _listed(results.strength, _DESIGN_STRENGTH, plan.rounding)
     deviation = _listed(drape.net_deviation if drape else None, _NET_DEVIATION, plan.rounding)
     groups = [
         ("Target", wording.case_rows(results.target, plan.rounding)),

@@ -1,7 +1,7 @@
 """From checks and fabrication to what is kept of them: the records of result.json and the arrays of states.npz."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from rodshell.checks import OtherShapes as ShapeSearch
 from rodshell.checks import Reactions as SupportReactions
 from rodshell.fabrication import Fabricated
 from rodshell.layout import GridMesh
+from rodshell.loads.strength import Limits
+from rodshell.results.loaded import DesignStrength
 from rodshell.results.records import Bent, Ends, Rod
 from rodshell.results.results import (
     Bar,
@@ -70,6 +72,7 @@ def checked_results(
     fabricated: Fabricated,
     *,
     strength: float | None,
+    limits: Limits = Limits(bending={}),
     shear_strength: float | None = None,
     strength_of: str | None = None,
 ) -> Results:
@@ -79,16 +82,21 @@ def checked_results(
     ----------
     results : of the form, before it was checked.
     mesh : of the flat grid, its rods in the order of the results.
-    strength, shear_strength : of the rods' material [Pa], by which utilisation is counted; None: not known.
+    strength : of the rods' material [Pa]; None: not known.
+    limits : design strengths of the rods, by which utilisation is counted where they are known.
+    shear_strength : of the rods' material [Pa]; None: not known.
     strength_of : the preset material that the strengths are of, where they were not given.
     """
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
     torsion = checks.shear_unknown(strength) if anisotropic and shear_strength is None else ()
+    withstood = _Withstood.of(limits, strength)
+    bending = _bending(checks, mesh, withstood)
     found = results.changed(
         warnings=(*results.warnings, *torsion, *checks.warnings, *fabricated.warnings),
-        rods=_rods(results.rods, mesh, checks, fabricated, strength),
-        bending=_bending(checks, mesh, strength).changed(shear_strength=shear_strength, strength_of=strength_of),
+        rods=_rods(results.rods, mesh, checks, fabricated, withstood),
+        bending=bending.changed(shear_strength=shear_strength, strength_of=None if withstood.given else strength_of),
+        strength=_design_strength(limits, bending),
         reactions={ends: _reactions(held) for ends, held in checks.reactions.items()},
         joint_loads={ends: _joint_loads(mesh, loads) for ends, loads in checks.joints.items()},
         self_weight={
@@ -158,7 +166,48 @@ _PARTS = {
 }
 
 
-def _worst(bent: Sequence[BendingCheck], where: slice, strength: float | None) -> dict[str, Any]:
+class _Withstood(NamedTuple):
+    """By what the utilisation of the final shapes and that of the deployment are counted [Pa]."""
+
+    standing: float | None
+    erection: float | None
+    given: bool = False
+
+    @classmethod
+    def of(cls, limits: Limits, strength: float | None) -> "_Withstood":
+        """Design strengths where they are known; then a final shape has to withstand its stress permanently."""
+        if limits.bending:
+            return cls(limits.bending.get("permanent"), limits.erection, limits.given)
+        return cls(strength, limits.erection or strength)
+
+    def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
+        """Worst figures over a part of the rods' nodes, in any of the shapes."""
+        figures = _worst([*final, *stages], where)
+        judged = ((final, self.standing), (stages, self.erection))
+        shares = [
+            float(shape.stress[where].max()) / strength
+            for shapes, strength in judged
+            for shape in shapes
+            if strength is not None and shape.stress is not None
+        ]
+        return figures | ({"utilisation": max(shares)} if shares else {})
+
+
+def _design_strength(limits: Limits, bending: Bending) -> DesignStrength:
+    """What was judged by, and the deployment judged by it."""
+    stages = bending.deployment
+    return DesignStrength(
+        **limits.bending,
+        erection=limits.erection,
+        axial=limits.axial,
+        shear=1.0 / limits.shear_weight,
+        creep=limits.creep,
+        erection_utilisation=stages.utilisation if stages and limits.erection is not None else None,
+        source=limits.source,
+    )
+
+
+def _worst(bent: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
     """Worst figures over a part of the rods' nodes, in any of the shapes."""
     sharp = max(float(shape.curvature[where].max()) for shape in bent)
     figures: dict[str, Any] = {"min_radius": 1 / sharp if sharp > 0 else None}
@@ -169,13 +218,11 @@ def _worst(bent: Sequence[BendingCheck], where: slice, strength: float | None) -
     for key, name in _PARTS.items():
         parts = [float(np.abs(part[where]).max()) for shape in bent if (part := getattr(shape, name)) is not None]
         figures[key] = max(parts, default=None)
-    if strength is not None and stresses:
-        figures["utilisation"] = max(stresses) / strength
     return figures
 
 
 def _rods(
-    rods: Sequence[Rod], mesh: GridMesh, checks: Checks, fabricated: Fabricated, strength: float | None
+    rods: Sequence[Rod], mesh: GridMesh, checks: Checks, fabricated: Fabricated, withstood: _Withstood
 ) -> tuple[Rod, ...]:
     """The rods with how they are cut, and with their bending in the final shape and in all shapes."""
     final, found = final_ends(checks), list[Rod]()
@@ -183,8 +230,8 @@ def _rods(
         bent: dict[str, Any] = {}
         if final is not None:
             here = mesh.rod_slice(k)
-            bent = Bent(**_worst([checks.bending[final]], here, strength)).plain()
-            bent["pop_up"] = Bent(**_worst([*checks.bending.values(), *checks.deployment_bending], here, strength))
+            bent = Bent(**withstood.worst([checks.bending[final]], (), here)).plain()
+            bent["pop_up"] = Bent(**withstood.worst([*checks.bending.values()], checks.deployment_bending, here))
         made = {
             "cut_length": float(fabricated.cut_length[k]),
             "mass": float(fabricated.mass[k]),
@@ -195,19 +242,21 @@ def _rods(
     return tuple(found)
 
 
-def _bending(checks: Checks, mesh: GridMesh, strength: float | None) -> Bending:
+def _bending(checks: Checks, mesh: GridMesh, withstood: _Withstood) -> Bending:
     everywhere, shapes = slice(None), dict[str, Any]()
     for ends, bent in checks.bending.items():
-        shapes[ends] = WorstBent(**_worst([bent], everywhere, strength), **_place(bent, mesh))
+        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **_place(bent, mesh))
     if checks.deployment is not None:
+        stages = list(zip(checks.deployment.share.tolist(), checks.deployment_bending, strict=True))
         stage = int(np.argmax([bent.curvature.max() for bent in checks.deployment_bending]))
-        figures = _worst(checks.deployment_bending, everywhere, strength)
+        final = [bent for share, bent in stages if share >= 1]
+        figures = withstood.worst(final, [bent for share, bent in stages if share < 1], everywhere)
         shapes["pop_up"] = WorstBent(**figures, share=float(checks.deployment.share[stage]))
     if checks.stages_below_final:
         share, worst = max(checks.stages_below_final, key=lambda stage: float(_stressed(stage[1]).max()))
-        figures = _worst([bent for _, bent in checks.stages_below_final], everywhere, strength)
+        figures = withstood.worst((), [bent for _, bent in checks.stages_below_final], everywhere)
         shapes["deployment"] = WorstBent(**figures, share=share, **_place(worst, mesh))
-    return Bending(strength=strength, **shapes)
+    return Bending(strength=withstood.standing, erection_strength=withstood.erection, **shapes)
 
 
 def _stressed(bent: BendingCheck) -> Floats:
@@ -268,7 +317,7 @@ def _deployment(checks: Checks) -> Deployment:
     found = checks.deployment
     assert found is not None
     stages = tuple(
-        Stage(share=float(share), height=float(np.ptp(positions[:, 2])), **_worst([bent], slice(None), None))
+        Stage(share=float(share), height=float(np.ptp(positions[:, 2])), **_worst([bent], slice(None)))
         for share, positions, bent in zip(found.share, found.positions, checks.deployment_bending, strict=True)
     )
     return Deployment(
@@ -314,8 +363,19 @@ def joint_names(mesh: GridMesh) -> list[str]:
     return ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
 
 
+def support_names(mesh: GridMesh) -> list[str]:
+    """Names of the rod ends, as "U03.1": start (0) and end (1) of each rod in turn.
+
+    Parameters
+    ----------
+    mesh : of the flat grid.
+    """
+    return [f"{rod.name}.{end}" for rod in mesh.grid.rods for end in (0, 1)]
+
+
 def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fabrication:
     names, joints = [rod.name for rod in mesh.grid.rods], joint_names(mesh)
+    points = [*joints, *support_names(mesh)]
     joint_mass = (results.joint.mass if results.joint else None) or 0.0
     stock = dict[str, Any]()
     if fabricated.nesting is not None:
@@ -329,8 +389,8 @@ def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fa
         total_mass=float(fabricated.mass.sum()) + len(joints) * joint_mass,
         bracing=tuple(
             Brace(
-                start=joints[brace.joints[0]],
-                end=joints[brace.joints[1]],
+                start=points[brace.joints[0]],
+                end=points[brace.joints[1]],
                 flat=brace.flat,
                 final=brace.final,
                 **({} if brace.cut is None else {"cut": brace.cut}),

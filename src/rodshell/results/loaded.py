@@ -18,23 +18,23 @@ class Utilisations(Record):
 
     bending: Number = key("of both bending moments and the axial force, with torsion")
     shear: Number = key("of torsion and the shear force")
-    slip: Number = key("of the joints' slip")
+    slip: Number = key("of the force and the moment at which joints slip")
     permanent: Number = key("of the erected shell without loads, by the permanent strength")
 
 
 class DesignStrength(Record):
-    """What the rods are judged by under loads; null: not known."""
+    """What the rods are judged by, unloaded and under loads; null: not known."""
 
     permanent: Number = key("design strength in bending under permanent loads", "Pa")
     long: Number = key("under loads of months", "Pa")
     medium: Number = key("under loads of weeks", "Pa")
     short: Number = key("under loads of days", "Pa")
     instantaneous: Number = key("under gusts", "Pa")
-    erection: Number = key("during deployment", "Pa")
+    erection: Number = key("during the deployment", "Pa")
     axial: Number = key("axial strength over bending strength")
     shear: Number = key("shear strength over bending strength")
     creep: Number = key("by how much deflections under permanent loads grow, over what they are at first")
-    erection_utilisation: Number = key("largest stress of the deployment over its strength")
+    erection_utilisation: Number = key("largest stress of the deployment over that strength")
     source: Text | None = key("where they are from")
 
 
@@ -65,6 +65,11 @@ class LoadedShell(Record):
         "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
     )
     bracing_utilisation: Number = key("utilisation of laths of a third layer or of cables; null: none, or not known")
+    joint_moments: Rows[Number] = rows(
+        "moment of each locked joint about its normal, in the order of joint_loads; empty: none is locked", "N m"
+    )
+    joint_moment_at: Text | None = key("id of the joint whose moment is largest; null: none is locked")
+    slipping: Rows[Text] = rows("ids of the joints that slip")
     mode_factors: Rows[Number] = rows("linear buckling factors of the lowest modes")
 
 

@@ -64,7 +64,8 @@ class WorstBent(Bent):
 class Bending(Record):
     """Bending and stress of all rods in the shapes of the shell."""
 
-    strength: Number = key("bending strength by which utilisation is counted", "Pa")
+    strength: Number = key("by which the use of final shapes is counted: permanent, if that is known", "Pa")
+    erection_strength: Number = key("by which the use of the deployment's stages is counted", "Pa")
     shear_strength: Number = key("shear strength; null: stress is counted by von Mises", "Pa")
     strength_of: Text | None = key("the preset whose strengths these are; null where they were given")
     pinned: WorstBent | None = key("final shape with pinned ends")
@@ -182,10 +183,10 @@ class OtherShapes(Record):
 
 
 class Brace(Record):
-    """A diagonal between two joints."""
+    """A diagonal between two joints, or from a joint to a support."""
 
     start: Text = required("id of the first joint, the two rods' ids with a slash", alias="from")
-    end: Text = required("id of the second joint", alias="to")
+    end: Text = required("id of the second joint, or of a support, as U03.1", alias="to")
     flat: Number = key("length in the flat grid", "m")
     final: Number = key("length in the final shape", "m")
     cut: Number = key("length of a cable free of stress; absent without bracing of cables", "m")
@@ -290,7 +291,7 @@ class Results(Record):
     reactions: ByEnds[Reactions] = by_ends("forces and moments at the supports")
     joint_loads: ByEnds[tuple[JointLoad, ...]] = by_ends("what acts at the joints")
     self_weight: ByEnds[SelfWeight] = by_ends("how much of its own weight the shell carries")
-    strength: DesignStrength | None = key("design strengths, by which the shell under loads is judged")
+    strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
     deployment: Deployment | None = key("the shell from flat to popped up")
     contact: Contact | None = key("contact of rods with each other")

@@ -3,9 +3,10 @@
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees
 
+from rodshell.results.loaded import DesignStrength
 from rodshell.results.records import Bent, RodType
 from rodshell.results.results import Bending, Results
-from rodshell.results.verdict import unknown_below, verdict_of
+from rodshell.results.verdict import strength_name, unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,
     case_rows,
@@ -35,7 +36,7 @@ def summary_text(results: Results) -> str:
     lines += [f"            {reason}" for reason in verdict.reasons[1:]]
     lines.append(f"  grid      {len(results.rods)} rods, {joints} joints")
     if results.rod:
-        lines += _rod(results.rod, results.bending)
+        lines += _rod(results.rod, results.bending, results.strength)
     lines += _patches(results, length)
     lines += _net_and_drape(results, length)
     lines += _refinement(results)
@@ -85,7 +86,7 @@ def rod_text(rod: RodType) -> str:
     return line
 
 
-def _rod(rod: RodType, bending: Bending | None) -> Iterator[str]:
+def _rod(rod: RodType, bending: Bending | None, judged_by: DesignStrength | None) -> Iterator[str]:
     """Section and material in a line; what is known of a preset, and what the program chose, in further lines."""
     yield f"  rod       {rod_text(rod)}"
     if rod.chosen:
@@ -96,6 +97,9 @@ def _rod(rod: RodType, bending: Bending | None) -> Iterator[str]:
         if rod.preset.bending_strength is not None:
             line += f"; bending strength {stress(rod.preset.bending_strength)}, {rod.preset.strength_note}"
         yield line
+    if judged_by is not None and judged_by.permanent is not None:
+        erection = "" if judged_by.erection is None else f", {stress(judged_by.erection)} during erection"
+        yield f"            design strength {stress(judged_by.permanent)} permanently{erection}"
 
 
 def _reached(bending: Bending | None) -> str:
@@ -105,7 +109,7 @@ def _reached(bending: Bending | None) -> str:
     final = [bent.utilisation for bent in (bending.pinned, bending.clamped) if bent]
     known = [used for used in final if used is not None]
     reached = f"reached {percent(max(known))} in the final shape" if known else "what is reached is not known"
-    return f", aiming at half of the bending strength at most by an estimate of the bends; {reached}"
+    return f", sized for the permanent strength by an estimate of the bends; {reached}"
 
 
 def _refinement(results: Results) -> Iterator[str]:
@@ -172,7 +176,6 @@ def _bending(results: Results, length: Length) -> Iterator[str]:
     bending, unknown = results.bending, unknown_below(results)
     if bending is None or (results.target and results.target.flat):
         return
-    strength = f"{bending.strength_of}'s bending strength" if bending.strength_of else "the strength"
     for shape, bent in bending.shapes().items():
         if (shape == "pop_up" and bending.deployment) or (shape in STAGES and unknown >= 1) or bent.min_radius is None:
             continue  # the first is the deployment with the final shape
@@ -183,7 +186,7 @@ def _bending(results: Results, length: Length) -> Iterator[str]:
         if bent.torsion_stress:
             line += f" (torsion alone {stress(bent.torsion_stress)})"
         if bent.utilisation is not None:
-            line += f", {percent(bent.utilisation)} of {strength}"
+            line += f", {percent(bent.utilisation)} of {strength_name(results, shape)}"
         yield line + (f"; unknown below {whole_percent(unknown)} of it" if shape in STAGES and unknown else "")
 
 

@@ -9,13 +9,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
 from rodshell.results.wording import millimetres, percent, place, rounded, rounding_of, whole_percent
+from rodshell.rods.design_strength import RESERVED
 
 ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
 
 FAR_OFF, OFF = 0.05, 0.02  # largest gap over the size: another shape than the target; with clamped ends a convex shell
 # leaves a tenth of the second
 THIN = 0.05  # bending strain up to which the theory of thin rods holds: radii of ten depths
-RESERVED = 0.5  # share of a preset's strength, characteristic and short-term, that a shell may use permanently
 FLAT = "the target is flat, nothing pops up"
 NEAR, AKIN = 0.6, 1.5  # distance over the size and energy ratio below which another stable shape may be met by accident
 LARGE = 1.0  # m; for a wider shell a strength is needed, since people stand under it
@@ -44,7 +44,6 @@ def verdict(results: Results) -> Verdict:
     usable = [ends for ends, found in faults.items() if not found]
     deployment = [
         *_fibre_faults(results, "deployment"),
-        *_erection_faults(results),
         *_contact_faults(results, "deployment"),
     ]
     grave = [sentence for found in faults.values() for sentence in found] + deployment
@@ -82,6 +81,27 @@ def utilisation(results: Results) -> float | None:
     return max((bent.utilisation for bent in shapes if bent.utilisation is not None), default=None)
 
 
+def strength_name(results: Results, shape: str) -> str:
+    """By what the utilisation of a shape is counted: design strengths, if they are known.
+
+    Parameters
+    ----------
+    results : with a strength.
+    shape : "pinned", "clamped", or one of the deployment.
+    """
+    preset = results.bending.strength_of if results.bending else None
+    if preset is None:
+        return "the given strength"
+    if not by_design_strength(results):
+        return f"{preset}'s strength, which is characteristic and short-term"
+    return f"{preset}'s {'permanent design strength' if shape in ENDS else 'design strength for erection'}"
+
+
+def by_design_strength(results: Results) -> bool:
+    """Whether utilisation is counted by design strengths."""
+    return results.strength is not None and results.strength.permanent is not None
+
+
 def facts(results: Results) -> list[str]:
     """What was found, in sentences that judge nothing: gaps, supports, strength."""
     return [*_gaps(results), *_strength(results)]
@@ -115,13 +135,6 @@ def _shell_faults(results: Results, ends: Ends) -> Iterator[str]:
     yield from _contact_faults(results, ends)
     yield from _fibre_faults(results, ends)
     yield from _load_faults(results, ends)
-
-
-def _erection_faults(results: Results) -> Iterator[str]:
-    """Stress of the deployment above its design strength."""
-    used = results.strength.erection_utilisation if results.strength else None
-    if used is not None and used > 1:
-        yield f"during deployment the rods use {max(101, round(100 * used))} % of their design strength for erection"
 
 
 BY_WORDS = {
@@ -176,14 +189,37 @@ def _fibre_faults(results: Results, shape: str) -> Iterator[str]:
     bent = _bent(results, shape)
     used, strain = bent.utilisation, bent.max_bending_strain
     where = "" if bent.rod is None or bent.at is None else f" in {bent.rod}, {_mm(results, bent.at)} from its start"
-    if used is not None and used > 1:
-        share = f"{max(101, round(100 * used))} % of their strength"  # never 100 % of what breaks
-        yield f"{_shape(shape, bent)} the rods would break: {share}{where}"
+    if used is not None and used > 1 and not (shape == "deployment" and _holds_while_erected(results, used)):
+        share = f"{max(101, round(100 * used))} %"  # never 100 % of what is too much
+        if by_design_strength(results):
+            yield f"{_shape(shape, bent)} the rods use {share} of {strength_name(results, shape)}{where}"
+        else:
+            yield f"{_shape(shape, bent)} the rods would break: {share} of their strength{where}"
     if strain is not None and strain > THIN:
         yield (
             f"{_shape(shape, bent)} bending strains the rods by {percent(strain)}: they are too thick for this "
             f"curvature, and the theory of thin rods is valid up to about {percent(THIN)}; use thinner rods or a "
             "larger target"
+        )
+
+
+def _holds_while_erected(results: Results, used: float) -> bool:
+    """Whether a preset's rods that use more than their design strength for erection stay below what breaks them."""
+    characteristic = results.rod.preset.bending_strength if results.rod and results.rod.preset else None
+    strength, of_preset = (
+        (results.bending.erection_strength, results.bending.strength_of) if results.bending else (0, "")
+    )
+    return bool(of_preset and strength and characteristic and used * strength <= characteristic)
+
+
+def _erection(results: Results) -> Iterator[str]:
+    """Too little safety while the shell is erected as computed; another way may need less."""
+    bent = _bent(results, "deployment")
+    used = bent.utilisation
+    if used is not None and used > 1 and _holds_while_erected(results, used):
+        yield (
+            f"{_shape('deployment', bent)}, the ends moved evenly, the rods use {max(101, round(100 * used))} % of "
+            f"{strength_name(results, 'deployment')}: erect it in another way, or use thinner rods"
         )
 
 
@@ -237,6 +273,7 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
                 )
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
+    yield from _erection(results)
     yield from _rods(results, usable)
     if results.target and not set(usable) <= set(results.agreement):
         yield "the gap to the target was not checked"
@@ -258,9 +295,9 @@ def _rods(results: Results, usable: list[Ends]) -> Iterator[str]:
         return
     name = results.bending.strength_of
     used = max((_bent(results, ends).utilisation or 0.0 for ends in usable), default=0.0)
-    if name and used > RESERVED:
+    if name and used > RESERVED and not by_design_strength(results):
         yield (
-            f"the rods permanently use {percent(used)} of {name}'s strength, which is characteristic and short-term: "
+            f"the rods permanently use {percent(used)} of {strength_name(results, ENDS[0])}: "
             "reduce it for duration and moisture and give the reduced value as checks.strength, or use thinner rods"
         )
 
@@ -386,7 +423,8 @@ def _strength(results: Results) -> Iterator[str]:
     used = utilisation(results)
     if used is not None:
         where = _known(results.deployment, unknown_below(results))
-        yield f"Unloaded, the rods use {percent(used)} of their strength at most, {where}"
+        design = "design " if by_design_strength(results) else ""
+        yield f"Unloaded, the rods use {percent(used)} of their {design}strength at most, {where}"
     elif results.bending:
         yield "No strength was given, so it is not known whether the rods hold (checks.strength)."
 

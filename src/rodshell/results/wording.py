@@ -46,10 +46,17 @@ def rounding_of(results: Results) -> Rounding:
     results : of which the tolerance of the drawings and the lengths of the rods are used.
     """
     tolerance = results.drawings.tolerance if results.drawings else None
-    if tolerance is None:
-        asked = 1e3 * OF_ROD * max((rod.length or 0.0 for rod in results.rods), default=0.0)
-    else:
-        asked = 0.5 * 1e3 * tolerance
+    return rounding_to(tolerance, max((rod.length or 0.0 for rod in results.rods), default=0.0))
+
+
+def rounding_to(tolerance: float | None, longest: float) -> Rounding:
+    """The rule of `rounding_of`.
+
+    Parameters
+    ----------
+    tolerance : of the drawings, or None; longest : length of the longest rod [m].
+    """
+    asked = 1e3 * OF_ROD * longest if tolerance is None else 0.5 * 1e3 * tolerance
     power = 10.0 ** floor(log10(max(asked, FINEST)) + 1e-9)
     return Rounding(min(max(power, FINEST), COARSEST))
 

@@ -8,11 +8,15 @@ so that the bending of the erected shell is judged by the permanent strength.
 from dataclasses import dataclass
 from typing import Literal
 
-from rodshell.rods.materials import PresetName
+from rodshell.rods.materials import Material, PresetName
 
 Duration = Literal["permanent", "long", "medium", "short", "instantaneous"]
 DURATIONS: tuple[Duration, ...] = ("permanent", "long", "medium", "short", "instantaneous")
 ServiceClass = Literal[1, 2, 3]
+COVERED: ServiceClass = 2  # where none is given
+RESERVED = (
+    0.5  # share of a characteristic, short-term strength that rods may use permanently where no factors are known
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,3 +80,18 @@ DESIGN: dict[PresetName, DesignFactors] = {
     ),
 }  # fmt: skip
 """Of presets for which they could be cited. Bamboo, PETG and rubber have none: give `[strength]` for them."""
+
+
+def permanent_strength(material: Material, service_class: int | None = None) -> float | None:
+    """What a preset withstands permanently [Pa]; without cited factors `RESERVED` of its strength; None: not known.
+
+    Parameters
+    ----------
+    material : a preset; of other materials nothing is known.
+    service_class : of timber; None: covered.
+    """
+    if material.name is None or material.bending_strength is None:
+        return None
+    factors = DESIGN.get(material.name)
+    share = RESERVED if factors is None else factors.by_duration(service_class or COVERED)["permanent"]
+    return share * material.bending_strength

@@ -1,7 +1,7 @@
 """Materials of rods: elastic constants and density, and named presets with their characteristic strengths.
 
 The figures of a preset are characteristic, short-term values at the moisture and temperature that their source names.
-No factor for duration of load, moisture or safety is applied: reduce them as the applicable building code demands.
+What building codes make of them for duration of load, moisture and safety is in `rods.design_strength`.
 """
 
 from dataclasses import asdict, dataclass
@@ -38,7 +38,7 @@ class Preset:
     source: str
 
 
-MOISTURE = "characteristic, short-term: reduce for duration and moisture"
+MOISTURE = "characteristic, short-term"
 
 PRESETS: dict[PresetName, Preset] = {
     "larch": Preset(

@@ -24,11 +24,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rodshell.case.keys import case_keys
+from rodshell.case.link import UPLOAD, upload_name
 from rodshell.case.load import BY_SUFFIX
 from rodshell.errors import InputError
 from rodshell.output.viewer import viewer_script, viewer_style
 from rodshell.studio.jobs import Jobs
-from rodshell.studio.session import UPLOAD, Session, Sessions, presets, upload_name, with_uploads
+from rodshell.studio.session import Session, Sessions, presets, with_uploads
 from rodshell.studio.worker import News
 
 COOKIE = "rodshell-token"

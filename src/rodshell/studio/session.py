@@ -10,6 +10,7 @@ import os
 import re
 import secrets
 import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -17,14 +18,14 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from rodshell.case.load import BUILT_IN, BY_SUFFIX, FILE_KEYS
+from rodshell.case.link import UPLOAD
+from rodshell.case.load import BUILT_IN, FILE_KEYS
 from rodshell.errors import InputError
 from rodshell.studio.worker import News, Order, run_worker
 from rodshell.units import shown
 
-UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
-UPLOADS = (*(suffix for suffix in BY_SUFFIX if suffix != ".gltf"), ".dxf")  # a .gltf names further files
 ENDED = "the job was ended by the system, perhaps for lack of memory: use fewer rods, or longer edges"
+ENDS = ("done", "left", "failed")  # kinds of news with which an order ends
 GRACE = 30.0  # s beyond the time limit after which a worker that says nothing is ended
 MOST_CASES = 500  # of a session's history
 NAME = re.compile(r"[\w-]{20,60}")
@@ -32,39 +33,62 @@ Heard = Callable[[News], None]
 
 
 class WorkerProcess:
-    """The process of one session, started when it is first needed, and again after it was ended."""
+    """The process of one session, started when it is first needed, and again after it was ended.
+
+    It has one order at a time, and one waits here, the newest: nothing lies in the pipe but a word that one waits.
+    Files are asked for in turn, and end no search for a form.
+    """
 
     def __init__(self, heard: Heard) -> None:
         self._heard = heard
         self._process: Any = None
-        self._sent: Order | None = None  # sent, and not yet taken
-        self._waiting: Order | None = None  # to be sent next; a newer one takes its place
         self._busy: Order | None = None
+        self._waiting: Order | None = None  # to be sent next; a newer one takes its place
+        self._files = deque[Order]()
+        self._told = False  # that one waits
         self._watch: asyncio.TimerHandle | None = None
 
-    @property
-    def busy(self) -> bool:
-        """Whether an order is being worked on, or waits."""
-        return any((self._sent, self._waiting, self._busy))
-
     def order(self, order: Order) -> None:
-        """Send an order, or keep it until the one before it is taken: at most one waits."""
-        if self._sent is not None:
+        """Send an order, or keep it until the process has ended the one before."""
+        if order.kind == "files":
+            self._files.append(order)
+        else:
             self._waiting = order
-            return
-        self._start()
-        self._sent = order
-        self._connection.send(order)
-        self._watch_over(order)
+        if self._busy is None:
+            self._next()
+        elif self._waiting is not None and not self._told:
+            self._told = True
+            self._send(None)
 
     def end(self) -> None:
-        """Kill the process."""
+        """Kill the process, and forget what waits."""
+        self._kill()
+        self._waiting = None
+        self._files.clear()
+
+    def _kill(self) -> None:
         if self._watch is not None:
             self._watch.cancel()
         if self._process is not None:
             self._process.kill()
             self._process.join()
-        self._process = self._sent = self._waiting = self._busy = None
+        self._process = self._busy = None
+
+    def _next(self) -> None:
+        """Send what waits."""
+        if self._files and self._waiting is None:
+            self._busy = self._files.popleft()
+        else:
+            self._busy, self._waiting = self._waiting, None
+        self._told = False
+        if self._busy is not None:
+            self._start()
+            self._send(self._busy)
+            self._watch_over(self._busy)
+
+    def _send(self, message: Order | None) -> None:
+        with suppress(OSError):  # it ended just now: see _ended
+            self._connection.send(message)
 
     def _start(self) -> None:
         if self._process is not None and self._process.is_alive():
@@ -94,30 +118,27 @@ class WorkerProcess:
     def _hear(self, process: Any, news: News) -> None:
         if process is not self._process:
             return
-        if news.kind == "taken":
-            self._busy, self._sent = self._sent, None
-            if self._waiting is not None:
-                order, self._waiting = self._waiting, None
-                self.order(order)
-        if news.kind in ("done", "failed") and self._busy is not None and news.serial == self._busy.serial:
-            self._busy = None
         if self._watch is not None:
             self._watch.cancel()
-        if self._busy is not None:
+        over = self._busy is not None and news.serial == self._busy.serial and news.kind in ENDS
+        if self._busy is not None and not over:
             self._watch_over(self._busy)
         self._heard(news)
+        if over:
+            self._next()
 
     def _ended(self, process: Any) -> None:
         """The process ended although nobody asked it to."""
-        if process is not self._process:
-            return
-        lost = self._sent or self._busy
-        waiting = self._waiting
-        self.end()
+        if process is self._process:
+            self._lose(ENDED)
+
+    def _lose(self, sentence: str) -> None:
+        """Without its process an order has failed; what waits is sent to another."""
+        lost = self._busy
+        self._kill()
         if lost is not None:
-            self._heard(News(lost.serial, "failed", {"sentence": ENDED}))
-        if waiting is not None:
-            self.order(waiting)
+            self._heard(News(lost.serial, "failed", {"sentence": sentence}))
+        self._next()
 
     def _watch_over(self, order: Order) -> None:
         if self._watch is not None:
@@ -126,9 +147,7 @@ class WorkerProcess:
         self._watch = loop.call_later(order.time_limit + GRACE, self._stop, order)
 
     def _stop(self, order: Order) -> None:
-        self.end()
-        sentence = f"the job was stopped: it said nothing for {order.time_limit + GRACE:g} s"
-        self._heard(News(order.serial, "failed", {"sentence": sentence}))
+        self._lose(f"the job was stopped: it said nothing for {order.time_limit + GRACE:g} s")
 
 
 @dataclass
@@ -285,24 +304,6 @@ def with_uploads(case: Mapping[str, Any], uploads: Mapping[str, Path]) -> dict[s
     if dotted or (isinstance(frames, dict) and frames.get("frames") is not None):
         raise InputError("a case in the studio has tables in place of dotted keys, and no drape.frames")
     return found
-
-
-def upload_name(name: str) -> str:
-    """A plain file name for an upload.
-
-    Parameters
-    ----------
-    name : as the browser gave it.
-
-    Raises
-    ------
-    InputError : not the name of a file that the studio reads.
-    """
-    plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")[-100:]
-    suffix = Path(plain).suffix.lower()
-    if suffix not in UPLOADS or not Path(plain).stem:
-        raise InputError(f"{shown(name)}: the studio reads {', '.join(UPLOADS)}")
-    return plain
 
 
 class Sessions:

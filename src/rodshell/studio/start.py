@@ -5,8 +5,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from rodshell.case.load import BUILT_IN, FILE_KEYS, load_case
-from rodshell.studio.session import UPLOAD, presets, upload_name
+from rodshell.case.link import page_case
+from rodshell.case.load import BUILT_IN, load_case
+from rodshell.studio.session import presets
 
 
 def first_case(name: str) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -22,17 +23,8 @@ def first_case(name: str) -> tuple[dict[str, Any], dict[str, bytes]]:
     """
     if name in BUILT_IN:
         return presets()[name], {}
-    case = load_case(name).absolute()
-    tables: dict[str, Any] = case.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-    tables.setdefault("target", {})["kind"] = case.target.kind
-    contents = {}
-    for table, keys in FILE_KEYS.items():
-        for key in keys:
-            if (path := tables.get(table, {}).get(key)) is not None:
-                plain = upload_name(path)
-                contents[plain] = Path(path).read_bytes()
-                tables[table][key] = UPLOAD + plain
-    return tables, contents
+    tables, paths = page_case(load_case(name))
+    return tables, {plain: path.read_bytes() for plain, path in paths.items()}
 
 
 def sessions_folder() -> Path:

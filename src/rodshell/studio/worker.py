@@ -4,8 +4,8 @@ It takes orders from a pipe and sends back what it finds as it is found: first t
 popped-up shells, then checks and verdict. While somebody drags, each order starts from the form before; the last one,
 after the release, is run as the command line runs it, from nothing.
 
-A newer order ends an older one: at any iteration, but while somebody drags only once the grid of the older one was
-shown, so that every order that is begun is seen.
+A newer order ends an older one, which a word in the pipe asks for (None): at any iteration, but while somebody drags
+only once the grid of the older one was shown, so that every order that is begun is seen.
 """
 
 import resource
@@ -17,13 +17,14 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from multiprocessing.connection import Connection
 from pathlib import Path
-from time import process_time
+from time import monotonic, process_time
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from rodshell.errors import InputError, RodshellError
 
 TOO_LARGE = "this job needs more memory than a session may have: use fewer rods, or longer edges"
+PAUSE = 0.1  # s between two messages of progress at least
 MEMORY = 3_000_000_000  # bytes of a worker's data at most
 
 
@@ -56,7 +57,8 @@ class News:
 
     Parameters
     ----------
-    serial : of the order; kind : "taken", "progress", "stage", "files", "done", or "failed".
+    serial : of the order; kind : "taken", "progress", "stage", "files"; at its end "done", "failed", or "left", for a
+        newer one.
     facts : plain values for the page; content : a scene, or a file.
     """
 
@@ -87,19 +89,21 @@ def run_worker(connection: Connection, memory: int = MEMORY) -> None:
             order = connection.recv()
         except (EOFError, OSError):
             return
-        worker.obey(order)
+        if order is not None:  # else a word about an order that came after the one that it was to end
+            worker.obey(order)
 
 
 def _import_all() -> None:
     """What the first order needs, before it comes."""
     import rodshell.job
-    import rodshell.output.viewer  # noqa: F401
+    import rodshell.studio.showing  # noqa: F401
 
 
 class _Worker:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._form: Any = None  # the last form, from which the next drag starts
+        self._preview: Any = None
 
     def obey(self, order: Order) -> None:
         self._send(order, "taken")
@@ -107,7 +111,7 @@ class _Worker:
         try:
             {"form": self._find, "files": self._files, "job": self._job}[order.kind](order)
         except _Superseded:
-            return
+            self._send(order, "left")
         except RodshellError as error:
             self._send(order, "failed", {"sentence": str(error)})
         except MemoryError:
@@ -115,7 +119,7 @@ class _Worker:
             self._send(
                 order,
                 "failed",
-                {"sentence": "this job needs more memory than a session may have: use fewer rods, or longer edges"},
+                {"sentence": TOO_LARGE},
             )
         except Exception as error:
             self._send(
@@ -128,28 +132,34 @@ class _Worker:
 
     def _find(self, order: Order) -> None:
         from rodshell.job import Job
-        from rodshell.studio.showing import checked_facts, preview
+        from rodshell.studio.preview import Preview
+        from rodshell.studio.showing import checked
 
+        self._preview = show = self._preview or Preview()
         job = Job.load(dict(order.case))
         plain = job.changed(refine__vary="") if job.case.refine.vary else job
-        earlier = self._form if order.live else None
+        earlier, said, shown = self._form if order.live else None, monotonic() if order.live else 0.0, False
 
         def progress(stage: str, detail: str, residual: float) -> None:
-            if not order.live and self._connection.poll():
+            nonlocal said
+            if (shown or not order.live) and self._connection.poll():
                 raise _Superseded
-            self._send(order, "progress", {"stage": stage, "detail": detail})
+            if monotonic() > said + PAUSE:
+                said = monotonic()
+                self._send(order, "progress", {"stage": stage, "detail": detail})
 
         grid = plain.run(warm_start=earlier, progress=progress, time_limit=order.time_limit, until="drape")
-        self._show(order, "drape", *preview(grid, job))
+        self._show(order, "drape", *show.of(grid))
+        shown = True
         form = plain.run(warm_start=grid, progress=progress, time_limit=order.time_limit, until="pop-up")
         self._form = form
-        self._show(order, "pop-up", *preview(form, job))
+        self._show(order, "pop-up", *show.of(form))
         if plain is not job and not order.live:
             form = job.run(warm_start=form, progress=progress, time_limit=order.time_limit, until="pop-up")
-            self._show(order, "refinement", *preview(form, job))
+            self._show(order, "refinement", *show.of(form))
         if not order.live:
             self._form = form = form.finished(progress)
-            self._show(order, "checks", *checked_facts(form, job))
+            self._show(order, "checks", *checked(form, job))
 
     def _show(self, order: Order, stage: str, facts: dict[str, Any], scene: bytes) -> None:
         self._send(order, "stage", {"stage": stage, **facts}, scene)

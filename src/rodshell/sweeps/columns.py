@@ -139,6 +139,11 @@ def row_of(results: Results, *, verdict: str, seconds: float) -> dict[str, Any]:
     }
 
 
+def is_usable(row: Mapping[str, Any]) -> bool:
+    """Whether a form converged and can be built, as far as was checked; `row` as of `row_of`, or with a status only."""
+    return row.get("status") == CONVERGED and row.get("verdict") != "unbuildable"
+
+
 def _rms(results: Results, ends: Any) -> float | None:
     """The gap over the size of a shell that converged: of no other it means anything."""
     shell, gap = results.pop_up.get(ends), results.agreement.get(ends)

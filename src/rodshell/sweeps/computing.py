@@ -1,22 +1,25 @@
 """The coordinator: jobs that are not finished are computed, each once, and recorded as they finish."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from rodshell.errors import OutputError, RodshellError
 from rodshell.formfinding.progress import Progress
 from rodshell.job import Job
-from rodshell.sweeps.engines import Engine
-from rodshell.sweeps.identity import program_version
-from rodshell.sweeps.plan import Settings
-from rodshell.sweeps.store import FOUND, LOST, Store
-from rodshell.sweeps.table import Table
+from rodshell.sweeps.engines import Engine, opened_engine
+from rodshell.sweeps.identity import job_identity, program_version
+from rodshell.sweeps.plan import Plan
+from rodshell.sweeps.report import REPORT
+from rodshell.sweeps.store import ARCHIVES, FOUND, LOST, STORE, Store
+from rodshell.sweeps.table import CSV, PARQUET, Table, replaced, write_parquet
 from rodshell.sweeps.watched import Reply
 
-ARCHIVES = "archives"
+COPY = "sweep.toml"
 LOOK = 0.2  # s between two calls of progress
 
 
@@ -38,23 +41,33 @@ class Wanted:
 
 
 class Computation:
-    """Computes jobs and records them.
+    """Computes jobs and records them; see `opened_computation`.
 
     Parameters
     ----------
-    store : of finished jobs; table : which shows them; engine : that runs them; settings : how.
+    plan : whose settings count; store : of finished jobs; table : which shows them; engine : that runs them.
     progress : called at least each fifth of a second.
     retry : whether jobs that were stopped by a limit, or died, are run again.
     """
 
     def __init__(
-        self, store: Store, table: Table, engine: Engine, settings: Settings, progress: Progress, *, retry: bool = False
+        self, plan: Plan, store: Store, table: Table, engine: Engine, progress: Progress, *, retry: bool
     ) -> None:
-        self._store, self._table, self._engine, self._settings = store, table, engine, settings
+        self.store, self.computed = store, 0
+        self._plan, self._table, self._engine = plan, table, engine
         self._progress, self._retry = progress, retry
         self._running = dict[Future[Reply], str]()
         self._begun = monotonic()
-        self.computed = 0
+
+    def wanted(self, job: Job, *, kept: bool) -> Wanted:
+        """A job as it is wanted; kept : with its result folder in archives/.
+
+        Raises
+        ------
+        InputError : a file of its case cannot be read.
+        """
+        name = job_identity(job, self._plan.settings.until)
+        return Wanted(name, job, self.store.folder / ARCHIVES / name if kept else None)
 
     def compute(self, wanted: Iterable[Wanted], stage: str, total: int) -> None:
         """Compute those that are not finished.
@@ -87,9 +100,14 @@ class Computation:
             self._running.clear()
             raise
 
+    def archived(self, jobs: Sequence[str]) -> list[Wanted]:
+        """Finished jobs, in this order, wanted with their result folders in archives/."""
+        keys = {design.job: design.keys for design in self.store.finished() if design.job in jobs}
+        return [self.wanted(self._plan.job(keys[job]), kept=True) for job in jobs]
+
     def is_finished(self, wanted: Wanted) -> bool:
         """Whether nothing has to be computed for a job."""
-        outcome = self._store.outcome(wanted.id)
+        outcome = self.store.outcome(wanted.id)
         if outcome is None or wanted.again or (self._retry and outcome in LOST):
             return False
         return wanted.archive is None or outcome != FOUND or (wanted.archive / "result.json").is_file()
@@ -97,7 +115,7 @@ class Computation:
     def _task(self, wanted: Wanted) -> dict[str, Any]:
         return {
             "case": wanted.job.to_toml(),
-            "until": self._settings.until,
+            "until": self._plan.settings.until,
             "archive": None if wanted.archive is None else str(wanted.archive.absolute()),
             "version": program_version(),
         }
@@ -113,7 +131,7 @@ class Computation:
 
     def _record(self, future: "Future[Reply]") -> None:
         reply = self._engine.reply(future)
-        self._store.record(self._running[future], reply["outcome"], reply["row"])
+        self.store.record(self._running[future], reply["outcome"], reply["row"])
         del self._running[future]
         self.computed += 1
 
@@ -122,3 +140,47 @@ def _time_text(seconds: float) -> str:
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+@contextmanager
+def opened_computation(plan: Plan, folder: Path, progress: Progress, *, retry: bool) -> Iterator[Computation]:
+    """A computation into a folder, in which the table shows what is finished however this is left.
+
+    Parameters
+    ----------
+    plan : of the sweep or search; folder : for it; progress, retry : as of `Computation`.
+
+    Raises
+    ------
+    InputError, EngineError : the engine cannot be used. OutputError : the folder cannot be written, is in use, or has
+        files that are not of a sweep. KeyboardInterrupt : with what is finished, in a sentence.
+    """
+    _require_own(folder)
+    with Store(folder, writing=True) as store:
+        if plan.origin.text:
+            with replaced(folder / COPY) as part:
+                part.write_text(plan.origin.text, encoding="utf-8")
+        table = Table(store)
+        try:
+            with opened_engine(plan.settings) as engine:
+                yield Computation(plan, store, table, engine, progress, retry=retry)
+        except RodshellError:
+            with suppress(OutputError):
+                table.write()
+            raise
+        except KeyboardInterrupt:
+            table.write()
+            done = f"{sum(store.outcomes().values())} of {store.count()} designs are in {folder / CSV}"
+            raise KeyboardInterrupt(f"{done}; the same command continues from there") from None
+        table.write()
+        write_parquet(store)
+
+
+def _require_own(folder: Path) -> None:
+    """OutputError where there are files of these names that a sweep did not write."""
+    if not (folder / STORE).exists():
+        for name in (CSV, PARQUET, REPORT, COPY):
+            if (folder / name).exists():
+                raise OutputError(
+                    f"will not replace {folder / name}, which is not of a sweep: choose another folder, or move it"
+                )

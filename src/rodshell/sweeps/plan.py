@@ -24,6 +24,7 @@ EngineName = Literal["processes", "dask"]
 Keep = Literal["none", "best", "all"]
 Until = Literal["pop-up", "fabrication"]
 Source = str | PathLike[str] | Mapping[str, Any]
+GENERATION = "generation"
 TABLES = ("base", "columns", "axes", "sample", "run")
 RUN = ("engine", "address", "workers", "keep", "best", "until", "time_limit", "memory_limit")
 
@@ -54,94 +55,117 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Design:
-    """One point of a sweep.
+class Origin:
+    """What a plan is read from.
 
     Parameters
     ----------
-    position : its number in the order of the axes, from 0.
-    values : of the axes' keys.
-    job : what is computed.
-    """
-
-    position: int
-    values: tuple[Any, ...]
-    job: Job
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A whole sweep.
-
-    Parameters
-    ----------
-    name : of the file, for the default folder.
+    name : of the file, for titles and the default folder.
     text : the file as it was given; "" for a mapping.
     folder : in which its files lie.
-    bases : jobs by the name that the column "base" shows.
-    axes : the first one changes slowest.
-    columns : in addition to those of every sweep.
-    settings : how it is run.
+    tables : its content.
+    bases : its jobs by the name that the column "base" shows, at least one.
     """
 
     name: str
     text: str
     folder: Path
+    tables: Mapping[str, Any]
     bases: Mapping[str, Job]
-    axes: tuple[Axis, ...]
+
+    @property
+    def first(self) -> Job:
+        """The first base, by whose case quantities are read."""
+        return next(iter(self.bases.values()))
+
+    def source(self, base: str) -> str | None:
+        """By what a command names a base; None for a job that was made in Python."""
+        file = self.folder / base
+        return base if base in BUILT_IN else str(file) if file.is_file() else None
+
+    @property
+    def studio_command(self) -> str:
+        """The command that starts the studio, with the files of the first base that has any."""
+        named = (self.source(name) for name, job in self.bases.items() if job.case.files)
+        return shlex.join(["rodshell", "studio", *[source for source in named if source][:1]])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the plan of a sweep and that of a search have in common.
+
+    Parameters
+    ----------
+    origin : what it was read from.
+    keys : by whose values a design is known: of the case, or "base", or "generation".
+    columns : in addition to those of every table.
+    settings : how jobs are run.
+    """
+
+    origin: Origin
+    keys: tuple[str, ...]
     columns: tuple[Column, ...]
     settings: Settings
 
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """The axes' keys."""
-        return tuple(key for axis in self.axes for key in axis.keys)
+    def job(self, values: Sequence[Any]) -> Job:
+        """The job of a design, by the values of its keys.
+
+        Raises
+        ------
+        InputError : no case can have them together.
+        """
+        base, changes = self._changes(values)
+        return self.origin.bases[base].changed(changes) if changes else self.origin.bases[base]
+
+    def command(self, values: Sequence[Any]) -> str | None:
+        """The command that forms a design alone; None for a base that no command can name.
+
+        values : of its keys.
+        """
+        base, changes = self._changes(values)
+        if (source := self.origin.source(base)) is None:
+            return None
+        words = ["rodshell", "form", source]
+        for key, value in flattened(changes).items():
+            words += [f"--{key}", ",".join(map(str, value)) if isinstance(value, list | tuple) else str(value)]
+        return shlex.join(words)
+
+    def _changes(self, values: Sequence[Any]) -> tuple[str, dict[str, Any]]:
+        """The name of a design's base, and what is changed in its case."""
+        changes = dict(zip(self.keys, values, strict=True))
+        changes.pop(GENERATION, None)
+        return changes.pop(BASE, next(iter(self.origin.bases))), changes
+
+
+@dataclass(frozen=True)
+class SweepPlan(Plan):
+    """A whole sweep.
+
+    Parameters
+    ----------
+    axes : the first one changes slowest.
+    """
+
+    axes: tuple[Axis, ...]
 
     @property
     def count(self) -> int:
         """Number of designs."""
         return prod(len(axis.rows) for axis in self.axes)
 
-    def designs(self) -> Iterator[Design]:
-        """All designs in the order of the axes, made one by one.
+    def designs(self) -> Iterator[tuple[tuple[Any, ...], Job]]:
+        """Values of the keys, and the job, of each design in the order of the axes, made one by one.
 
         Raises
         ------
         InputError : a case cannot have these values.
         """
-        first = next(iter(self.bases.values()))
-        for position, rows in enumerate(product(*(axis.rows for axis in self.axes))):
+        for rows in product(*(axis.rows for axis in self.axes)):
             values = tuple(value for row in rows for value in row)
-            changes = dict(zip(self.keys, values, strict=True))
-            base = self.bases[changes.pop(BASE)] if BASE in changes else first
-            yield Design(position, values, base.changed(changes) if changes else base)
-
-    def command(self, values: Sequence[Any]) -> str | None:
-        """The command that forms a design alone; None for a base that no command can name.
-
-        values : of the axes' keys.
-        """
-        changes = dict(zip(self.keys, values, strict=True))
-        return form_command(changes.pop(BASE, next(iter(self.bases))), self.folder, changes)
+            yield values, self.job(values)
 
 
-def form_command(source: str, folder: Path, changes: Mapping[str, Any]) -> str | None:
-    """The command that forms a design alone; None for a base that no command can name.
-
-    Parameters
-    ----------
-    source : of the base; folder : in which its file lies; changes : values of the case's keys.
-    """
-    place = folder / source
-    if source not in BUILT_IN and not place.is_file():
-        return None
-    words = ["rodshell", "form", source if source in BUILT_IN else str(place)]
-    for key, value in flattened(changes).items():
-        words += [f"--{key}", ",".join(map(str, value)) if isinstance(value, list | tuple) else str(value)]
-    return shlex.join(words)
-
-
-def read_plan(source: Source) -> Plan:
+def read_plan(source: Source) -> SweepPlan:
     """The plan of a sweep.
 
     Parameters
@@ -152,31 +176,38 @@ def read_plan(source: Source) -> Plan:
     ------
     InputError : it cannot be read or used; in one sentence.
     """
-    name, text, folder, given = opened(source)
-    known("", given, TABLES)
-    bases = read_bases(given, folder)
-    first = next(iter(bases.values()))
-    axes = read_axes(table(given, "axes"), table(given, "sample") if "sample" in given else None, first, folder)
-    if len(bases) > 1:
-        axes = (Axis((BASE,), tuple((name,) for name in bases)), *axes)
+    origin = read_origin(source, TABLES)
+    given = origin.tables
+    sample = table(given, "sample") if "sample" in given else None
+    axes = read_axes(table(given, "axes"), sample, origin.first, origin.folder)
+    if len(origin.bases) > 1:
+        axes = (Axis((BASE,), tuple((name,) for name in origin.bases)), *axes)
     if not axes:
         raise InputError('[axes] is missing: give at least one key, such as "layout.spacing" = ["25 mm", "30 mm"]')
-    columns = read_columns(given.get("columns", ()), [key for axis in axes for key in axis.keys])
-    settings = read_settings(table(given, "run"), [column.name for column in columns], folder)
-    return Plan(name, text, folder, bases, axes, columns, settings)
+    keys = tuple(key for axis in axes for key in axis.keys)
+    columns = read_columns(given.get("columns", ()), keys)
+    settings = read_settings(table(given, "run"), [column.name for column in columns], origin.folder)
+    return SweepPlan(origin, keys, columns, settings, axes)
 
 
-def opened(source: Source) -> tuple[str, str, Path, Mapping[str, Any]]:
-    """Name, text, folder and content of a TOML file; of a mapping, which lies in the current folder.
+def read_origin(source: Source, tables: Sequence[str]) -> Origin:
+    """What a plan is read from.
 
     Parameters
     ----------
-    source : as of `read_plan`.
+    source : as of `read_plan`; tables : that the file may have.
 
     Raises
     ------
-    InputError : there is no such file, or it is not TOML.
+    InputError : it cannot be read, has an unknown key, or its base cannot be used.
     """
+    name, text, folder, given = _opened(source)
+    known("", given, tables)
+    return Origin(name, text, folder, given, _read_bases(given, folder))
+
+
+def _opened(source: Source) -> tuple[str, str, Path, Mapping[str, Any]]:
+    """Name, text, folder and content of a TOML file; of a mapping, which lies in the current folder."""
     if isinstance(source, Mapping):
         return "sweep", "", Path(), source
     instance("the sweep", source, str | PathLike, "the path of a TOML file, or a mapping")
@@ -194,17 +225,8 @@ def opened(source: Source) -> tuple[str, str, Path, Mapping[str, Any]]:
         raise InputError(f"{path} is not valid TOML: {reason}") from None
 
 
-def read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
-    """The jobs of the key `base`, one or several, by their names.
-
-    Parameters
-    ----------
-    given : the sweep; folder : in which case files lie.
-
-    Raises
-    ------
-    InputError : it is missing, or a case cannot be read, or is not one that a file can describe.
-    """
+def _read_bases(given: Mapping[str, Any], folder: Path) -> dict[str, Job]:
+    """The jobs of the key `base`, one or several, by their names."""
     if BASE not in given:
         raise InputError(f"base is missing: give a case file, a surface, or one of {', '.join(BUILT_IN)}")
     sources = given[BASE] if isinstance(given[BASE], list | tuple) else [given[BASE]]

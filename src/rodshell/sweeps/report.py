@@ -4,21 +4,20 @@ The charts are plotly's; the page holds its library, the table once, and picture
 """
 
 import json
-import os
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rodshell.errors import InputError, OutputError
+from rodshell.case.link import studio_link
+from rodshell.errors import InputError
 from rodshell.output.pictures import picture_svg
 from rodshell.output.svg import inline
 from rodshell.results import read
-from rodshell.sweeps.columns import CONVERGED, JOB, STANDARD
-from rodshell.sweeps.computing import ARCHIVES
-from rodshell.sweeps.store import Store
-from rodshell.sweeps.table import header_of, table_rows
+from rodshell.sweeps.columns import JOB
+from rodshell.sweeps.plan import GENERATION, Plan
+from rodshell.sweeps.store import ARCHIVES, Finished, Store
+from rodshell.sweeps.table import header_of, in_short, names_of, plain, replaced, table_rows
 
 REPORT = "report.html"
 SHAPES = 12  # pictures at most
@@ -30,21 +29,23 @@ class Page:
 
     Parameters
     ----------
-    kind, title : in its heading; summary : lines under it.
+    kind : of the plan, in its heading; plan : whose designs are shown; summary : lines in its heading.
     first : the two columns that are shown first, across and up.
-    objectives : whether they are objectives, of which the front is shown.
+    measures : columns that say how good a design is; of two the front is shown.
+    larger : those of them that are to be large, and not small.
+    counts : whether a design may be on the front.
     shapes : jobs whose shapes are shown, kept in archives/; caption : what they are, in a sentence.
-    command : that makes the report of a design, by the values of its keys; None where there is none.
     """
 
     kind: str
-    title: str
+    plan: Plan
     summary: Sequence[str]
     first: tuple[str, str]
-    objectives: bool
+    measures: Sequence[str]
+    larger: Sequence[str]
+    counts: Callable[[Finished], bool]
     shapes: Sequence[str]
     caption: str
-    command: Callable[[Sequence[Any]], str | None]
 
 
 def require_plotly() -> None:
@@ -75,74 +76,69 @@ def write_report(store: Store, page: Page) -> Path:
     )
     text = environment.get_template("sweep.html.j2").render(
         kind=page.kind,
-        title=page.title,
+        title=page.plan.origin.name,
         summary=page.summary,
-        objectives=page.objectives,
+        front=len(page.measures) > 1,
         caption=page.caption,
+        studio=page.plan.origin.studio_command,
         shapes=[shape | {"svg": Markup(shape["svg"])} for shape in _shapes(store, page)],
         plotly=Markup(get_plotlyjs()),
         data=Markup(_script_json(_data(store, page))),
     )
     file = store.folder / REPORT
-    part = file.with_name(f".{REPORT}.part")
-    try:
+    with replaced(file) as part:
         part.write_text(text, encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise OutputError(f"cannot write {file}: {error.strerror}") from error
     return file
 
 
 def _data(store: Store, page: Page) -> dict[str, Any]:
-    """The table by column, and for each design its link and its command."""
+    """The table by column, and for each design its report, its link to the studio and its command."""
     keys, columns = header_of(store)
-    names = [*keys, *STANDARD, *(column.name for column in columns)]
+    names = names_of(keys, columns)
     rows = list(table_rows(store, columns))
-    designs = [(design.job, design.row) for design in store.finished()]
-    usable = [
-        k
-        for k, (_, row) in enumerate(designs)
-        if row.get("status") == CONVERGED and row.get("verdict") != "unbuildable"
-    ]
-    cells = {name: [_cell(row[k]) for row in rows] for k, name in enumerate(names) if name != JOB}
-    links = [_link(store, job) for job, _ in designs]
-    commands = [page.command(row[: len(keys)]) for row in rows]
+    designs = [(design.job, page.counts(design)) for design in store.finished()]
+    cells = {name: [plain(row[k]) for row in rows] for k, name in enumerate(names) if name != JOB}
+    given = [row[: len(keys)] for row in rows]
     return {
-        "keys": keys, "rows": cells, "links": links, "commands": commands, "usable": usable, "first": list(page.first),
+        "keys": keys, "rows": cells, "first": list(page.first), "larger": list(page.larger),
+        "usable": [k for k, (_, counts) in enumerate(designs) if counts],
+        "reports": [_report(store, job) for job, _ in designs],
+        "studio": [_studio(page.plan, values) for values in given],
+        "commands": [page.plan.command(values) for values in given],
     }  # fmt: skip
 
 
-def _cell(value: Any) -> Any:
-    return value if value is None or isinstance(value, int | float | str) else json.dumps(value)
-
-
-def _link(store: Store, job: str) -> str | None:
+def _report(store: Store, job: str) -> str | None:
+    """The address of a design's own report, seen from the page; None if its results were not kept."""
     report = Path(ARCHIVES) / job / "report.html"
     return report.as_posix() if (store.folder / report).is_file() else None
 
 
+def _studio(plan: Plan, values: Sequence[Any]) -> str | None:
+    """The link that opens a design in the studio; None for values that no case can have, or that it does not open."""
+    try:
+        return studio_link(plan.job(values).case)
+    except InputError:
+        return None
+
+
 def _shapes(store: Store, page: Page) -> Iterable[dict[str, str]]:
     """Picture, link and caption of each shape."""
-    keys, _ = header_of(store)
-    by_job = {design.job: design for design in store.finished() if design.job in page.shapes}
-    rows = [design.keys for design in by_job.values()]
-    changing = [len({json.dumps(row[k]) for row in rows}) > 1 for k in range(len(keys))]
+    keys, columns = header_of(store)
+    names = names_of(keys, columns)
+    rows = zip(store.finished(), table_rows(store, columns), strict=True)
+    by_job = {design.job: dict(zip(names, row, strict=True)) for design, row in rows if design.job in page.shapes}
+    changing = [key for key in keys if len({json.dumps(row[key]) for row in by_job.values()}) > 1]
+    said = [*(key for key in changing if key != GENERATION), *page.measures, "verdict"]
     for job in page.shapes:
         folder = store.folder / ARCHIVES / job
         if job not in by_job or not (folder / "result.json").is_file():
             continue
         archive = read(folder)
         if archive.final is not None:
-            values = zip(keys, by_job[job].keys, changing, strict=True)
-            given = ", ".join(f"{key} {_shown(value)}" for key, value, changes in values if changes)
-            link = _link(store, job) or ""
+            given = ", ".join(f"{name} {in_short(by_job[job][name])}" for name in said if by_job[job][name] != "")
+            link = _report(store, job) or ""
             yield {"svg": inline(picture_svg(archive, archive.final)), "link": link, "caption": given}
-
-
-def _shown(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(_cell(value))
 
 
 def _script_json(content: Any) -> str:

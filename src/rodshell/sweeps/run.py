@@ -2,25 +2,21 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from rodshell.errors import OutputError, RodshellError
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.sweeps.columns import CONVERGED, STANDARD
-from rodshell.sweeps.computing import ARCHIVES, Computation, Wanted
-from rodshell.sweeps.engines import opened_engine
+from rodshell.sweeps.columns import CONVERGED, is_usable
+from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.identity import job_identity
-from rodshell.sweeps.plan import Plan, Source, read_plan
-from rodshell.sweeps.report import REPORT, SHAPES, Page, require_plotly, write_report
+from rodshell.sweeps.plan import Source, SweepPlan, read_plan
+from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.store import FOUND, STORE, Store
-from rodshell.sweeps.table import CSV, PARQUET, Table, header_of, note_header, table_rows, write_parquet
+from rodshell.sweeps.table import header_notes, header_of, names_of, table_rows
 from rodshell.validation import instance
 
 BEST = "best"
-COPY = "sweep.toml"
 
 
 @dataclass(frozen=True)
@@ -97,41 +93,22 @@ def sweep(
     if report:
         require_plotly()
     check_designs(plan)
-    require_own(folder)
-    with Store(folder, writing=True) as store:
-        note_header(store, plan.keys, plan.columns)
-        store.plan((design.values, job_identity(design.job, plan.settings.until)) for design in plan.designs())
-        if plan.text:
-            (folder / COPY).write_text(plan.text, encoding="utf-8")
-        table = Table(store)
-        try:
-            with opened_engine(plan.settings) as engine:
-                computation = Computation(store, table, engine, plan.settings, progress, retry=retry)
-                computation.compute(_wanted(plan, folder), "sweep", plan.count)
-                computed = computation.computed
-                if plan.settings.keep == "best":
-                    _keep_best(plan, store, computation, folder)
-                shapes = best_jobs(store, plan.settings.best)[:SHAPES] if report else []
-                computation.compute(_archived(plan, folder, shapes), "shapes of the report", len(shapes))
-        except RodshellError:
-            with suppress(OutputError):
-                table.write()
-            raise
-        except KeyboardInterrupt:
-            table.write()
-            done = sum(store.outcomes().values())
-            raise KeyboardInterrupt(
-                f"{done} of {plan.count} designs are in {folder / CSV}; the same command continues from there"
-            ) from None
-        table.write()
-        write_parquet(store)
-        found = swept(store, computed)
+    with opened_computation(plan, folder, progress, retry=retry) as computation:
+        store, until = computation.store, plan.settings.until
+        designs = ((values, job_identity(job, until)) for values, job in plan.designs())
+        store.plan(designs, notes=header_notes(plan.keys, plan.columns))
+        computation.compute(_wanted(plan, computation), "sweep", plan.count)
+        found = swept(store, computation.computed)
+        if plan.settings.keep == "best":
+            _keep_best(plan, computation)
         if report:
+            shapes = best_jobs(store, plan.settings.best)[:SHAPES]
+            computation.compute(computation.archived(shapes), "shapes of the report", len(shapes))
             write_report(store, _page(plan, found, shapes))
-        return found
+    return found
 
 
-def check_designs(plan: Plan) -> None:
+def check_designs(plan: SweepPlan) -> None:
     """Make the case of each design, one by one.
 
     Raises
@@ -142,29 +119,19 @@ def check_designs(plan: Plan) -> None:
         pass
 
 
-def planned(plan: Plan, out: str | PathLike[str]) -> tuple[int, int]:
+def planned(plan: SweepPlan, out: str | PathLike[str]) -> tuple[int, int]:
     """Number of different jobs of a sweep, and of those that are finished in a folder already; nothing is written.
 
     Parameters
     ----------
     plan : of the sweep; out : its folder, which may be missing.
     """
-    jobs = {job_identity(design.job, plan.settings.until) for design in plan.designs()}
+    jobs = {job_identity(job, plan.settings.until) for _, job in plan.designs()}
     folder = Path(out).expanduser()
     if not (folder / STORE).is_file():
         return len(jobs), 0
     with Store(folder, writing=False) as store:
         return len(jobs), sum(store.outcome(job) is not None for job in jobs)
-
-
-def require_own(folder: Path) -> None:
-    """OutputError where there are files of these names that a sweep did not write."""
-    if not (folder / STORE).exists():
-        for name in (CSV, PARQUET, REPORT, COPY):
-            if (folder / name).exists():
-                raise OutputError(
-                    f"will not replace {folder / name}, which is not of a sweep: choose another folder, or move it"
-                )
 
 
 def swept(store: Store, computed: int) -> Swept:
@@ -180,19 +147,18 @@ def swept(store: Store, computed: int) -> Swept:
     return Swept(store.folder, store.count(), computed, dict(verdicts), lost, tuple(failures.most_common()))
 
 
-def _wanted(plan: Plan, folder: Path) -> Iterator[Wanted]:
-    for design in plan.designs():
-        job = job_identity(design.job, plan.settings.until)
-        yield Wanted(job, design.job, folder / ARCHIVES / job if plan.settings.keep == "all" else None)
+def _wanted(plan: SweepPlan, computation: Computation) -> Iterator[Wanted]:
+    return (computation.wanted(job, kept=plan.settings.keep == "all") for _, job in plan.designs())
 
 
-def _keep_best(plan: Plan, store: Store, computation: Computation, folder: Path) -> None:
+def _keep_best(plan: SweepPlan, computation: Computation) -> None:
     """The result folder of the best design, in best/."""
+    store = computation.store
     best = next(iter(best_jobs(store, plan.settings.best)), None)
-    if best is None or (store.note(BEST) == best and (folder / BEST / "result.json").is_file()):
+    if best is None or (store.note(BEST) == best and (store.folder / BEST / "result.json").is_file()):
         return
-    job = next(each.job for each in _wanted(plan, folder) if each.id == best)
-    computation.compute([Wanted(best, job, folder / BEST, again=True)], "best design", 1)
+    (wanted,) = computation.archived([best])
+    computation.compute([replace(wanted, archive=store.folder / BEST, again=True)], "best design", 1)
     store.take_note(BEST, best)
 
 
@@ -204,34 +170,28 @@ def best_jobs(store: Store, measure: str) -> list[str]:
     store : of the sweep; measure : a column of its table.
     """
     keys, columns = header_of(store)
-    place = [*keys, *STANDARD, *(column.name for column in columns)].index(measure)
+    place = names_of(keys, columns).index(measure)
     found = dict[str, float]()
     for design, row in zip(store.finished(), table_rows(store, columns), strict=True):
-        usable = design.row.get("status") == CONVERGED and design.row.get("verdict") != "unbuildable"
-        if usable and isinstance(row[place], int | float):
+        if is_usable(design.row) and isinstance(row[place], int | float):
             found[design.job] = float(row[place])
     return sorted(found, key=lambda job: found[job])
 
 
-def _archived(plan: Plan, folder: Path, jobs: Sequence[str]) -> Iterator[Wanted]:
-    """Some jobs, their results kept."""
-    wanted = {each.id: each.job for each in _wanted(plan, folder) if each.id in jobs}
-    return (Wanted(job, wanted[job], folder / ARCHIVES / job) for job in jobs)
-
-
-def _page(plan: Plan, found: Swept, shapes: Sequence[str]) -> Page:
+def _page(plan: SweepPlan, found: Swept, shapes: Sequence[str]) -> Page:
     """What the report says."""
     measure = plan.settings.best
     numbers = (key for axis in plan.axes for k, key in enumerate(axis.keys) if _varies(row[k] for row in axis.rows))
     return Page(
         kind="rodshell sweep",
-        title=plan.name,
+        plan=plan,
         summary=found.summary().splitlines(),
         first=(next(numbers, "total_length"), measure),
-        objectives=False,
+        measures=[measure],
+        larger=(),
+        counts=lambda design: is_usable(design.row),
         shapes=shapes,
         caption=f"The designs with the smallest {measure} that converged and can be built. Click one for its report.",
-        command=plan.command,
     )
 
 

@@ -4,11 +4,8 @@ The designs of each generation are computed as those of a sweep, into the same s
 and on what was found, so that an interrupted search continues, and a longer one begins with the same designs.
 """
 
-import csv
 import json
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from os import PathLike
@@ -17,23 +14,21 @@ from typing import Any
 
 import numpy as np
 
-from rodshell.errors import InputError, OutputError, RodshellError
+from rodshell.errors import InputError
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.sweeps.asktell import AskTell
 from rodshell.sweeps.axes import drawn_shares
-from rodshell.sweeps.columns import CONVERGED, STANDARD, read_column
-from rodshell.sweeps.computing import ARCHIVES, Computation, Wanted
-from rodshell.sweeps.engines import opened_engine
-from rodshell.sweeps.identity import job_identity
-from rodshell.sweeps.plan import Source
+from rodshell.sweeps.columns import CONVERGED, JOB, STANDARD, read_column
+from rodshell.sweeps.computing import Computation, Wanted, opened_computation
+from rodshell.sweeps.plan import GENERATION, Source
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
-from rodshell.sweeps.run import COPY, require_own
-from rodshell.sweeps.search_plan import FAR, GENERATION, SearchPlan, read_search
+from rodshell.sweeps.search_plan import FAR, SearchPlan, read_search
 from rodshell.sweeps.store import FOUND, Finished, Store
-from rodshell.sweeps.table import CSV, Table, note_header, write_parquet
+from rodshell.sweeps.table import header_notes, in_short, write_csv
 from rodshell.validation import instance
 
 FRONT = "front.csv"
+MOST_SHOWN = 10  # designs of the front in text
 DIFFERENCE, CROSSED = 0.6, 0.9
 
 
@@ -46,8 +41,8 @@ class Optimised:
     folder : of the search.
     designs : their number; computed : jobs that were computed now.
     feasible : number of designs that converged and keep all constraints.
-    front : of those, the ones that no other is better than in all objectives: values of the keys and the objectives, by
-        name, the smallest first objective first.
+    front : of those, the ones that no other is better than in all objectives, the smallest first objective first: by
+        name the values of the variables' keys, objectives, verdict, further columns, and the job.
     """
 
     folder: Path
@@ -57,13 +52,21 @@ class Optimised:
     front: tuple[dict[str, Any], ...]
 
     def summary(self) -> str:
-        """A few lines of text."""
-        lines = [f"{self.designs} designs, {self.computed} computed now; {self.feasible} keep all constraints"]
+        """A line of text, and another where nothing was found."""
+        found = f"{self.designs} designs, {self.computed} computed now; {self.feasible} keep all constraints"
+        return found if self.front else f"{found}\nNO DESIGN keeps all constraints and converged; table.csv says why"
+
+    def front_text(self) -> str:
+        """The front as a table of text, its first designs where it is long."""
         if not self.front:
-            return "\n".join([*lines, "NO DESIGN keeps all constraints and converged; table.csv says why"])
-        name = "best design" if len(self.front) == 1 else f"front of {len(self.front)} designs, first"
-        shown_values = ", ".join(f"{key} {_short(value)}" for key, value in self.front[0].items())
-        return "\n".join([*lines, f"{name}: {shown_values}"])
+            return ""
+        names = [name for name in self.front[0] if name != JOB]
+        cells = [names, *([in_short(design[name]) for name in names] for design in self.front[:MOST_SHOWN])]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
+        more = [f"and {len(self.front) - MOST_SHOWN} more in {FRONT}"] if len(self.front) > MOST_SHOWN else []
+        title = "the best of them" if len(self.front) == 1 else "those that no other is better than in all objectives"
+        return "\n".join([f"{title}:", *lines, *more])
 
 
 def optimise(
@@ -96,47 +99,35 @@ def optimise(
     if report:
         require_plotly()
     algorithm = _algorithm(plan)
-    require_own(folder)
-    with Store(folder, writing=True) as store:
-        note_header(store, [GENERATION, *plan.keys], plan.columns)
-        store.plan(())
-        if plan.text:
-            (folder / COPY).write_text(plan.text, encoding="utf-8")
-        shown_table = Table(store)
-        try:
-            with opened_engine(plan.settings) as engine:
-                computation = Computation(store, shown_table, engine, plan.settings, progress, retry=retry)
-                for generation in range(1, plan.generations + 1):
-                    _generation(plan, generation, algorithm, store, computation)
-                computed, front, feasible = computation.computed, *front_of(plan, store)
-                best = [design.job for design in front]
-                shapes = _some(best, SHAPES) if report else []
-                kept = best if plan.settings.keep == "best" else shapes
-                computation.compute(_archived(plan, store, folder, kept), "best designs", len(kept))
-        except RodshellError:
-            with suppress(OutputError):
-                shown_table.write()
-            raise
-        except KeyboardInterrupt:
-            shown_table.write()
-            raise KeyboardInterrupt(
-                f"{sum(store.outcomes().values())} designs are in {folder / CSV}; the same command continues from there"
-            ) from None
-        shown_table.write()
-        write_parquet(store)
-        rows = tuple(_front_row(plan, design) for design in front)
-        _write_front(folder / FRONT, [*plan.keys, *(objective.column for objective in plan.objectives)], rows)
+    objectives = [objective.column for objective in plan.objectives]
+    with opened_computation(plan, folder, progress, retry=retry) as computation:
+        store = computation.store
+        store.plan((), notes=header_notes(plan.keys, plan.columns))
+        for generation in range(1, plan.generations + 1):
+            _generation(plan, generation, algorithm, computation)
+        computed, front, feasible = computation.computed, *front_of(plan, store)
+        best = [design.job for design in front]
+        shapes = _some(best, SHAPES) if report else []
+        kept = best if plan.settings.keep == "best" else shapes
+        computation.compute(computation.archived(kept), "best designs", len(kept))
+        names = list(dict.fromkeys([*plan.keys[1:], *objectives, "verdict", *(c.name for c in plan.columns), JOB]))
+        rows = tuple(dict(zip(names, _cells(plan, design, names), strict=True)) for design in front)
+        write_csv(folder / FRONT, names, (list(row.values()) for row in rows))
         found = Optimised(folder, store.count(), computed, feasible, rows)
         if report:
-            names = [objective.column for objective in plan.objectives]
-            caption = "Designs of the front, in the order of the first objective. Click one for its report."
-            first = (names[0], names[1]) if len(names) > 1 else (GENERATION, names[0])
             page = Page(
-                "rodshell optimise", plan.name, found.summary().splitlines(), first, len(names) > 1, shapes, caption,
-                plan.command,
-            )  # fmt: skip
+                kind="rodshell optimise",
+                plan=plan,
+                summary=found.summary().splitlines(),
+                first=(objectives[0], objectives[1]) if len(objectives) > 1 else (GENERATION, objectives[0]),
+                measures=objectives,
+                larger=[objective.column for objective in plan.objectives if objective.sign < 0],
+                counts=lambda design: _is_feasible(plan, design),
+                shapes=shapes,
+                caption="Designs of the front, in the order of the first objective. Click one for its report.",
+            )
             write_report(store, page)
-        return found
+    return found
 
 
 def _algorithm(plan: SearchPlan) -> AskTell:
@@ -155,21 +146,19 @@ def _algorithm(plan: SearchPlan) -> AskTell:
         raise InputError('optimise needs the package pymoo: pip install "rodshell[optimise]"') from None
 
 
-def _generation(plan: SearchPlan, number: int, algorithm: AskTell, store: Store, computation: Computation) -> None:
+def _generation(plan: SearchPlan, number: int, algorithm: AskTell, computation: Computation) -> None:
     """Compute the designs of a generation, and pass on their values."""
-    designs = [plan.values(point) for point in algorithm.ask()]
+    store = computation.store
+    designs = [plan.values(number, point) for point in algorithm.ask()]
     names, wanted = list[str](), list[Wanted]()
     for values in designs:
         try:
-            job = plan.job(values)
+            wanted.append(computation.wanted(plan.job(values), kept=plan.settings.keep == "all"))
+            names.append(wanted[-1].id)
         except InputError as error:  # values that no case can have together
-            names.append(f"no case {json.dumps(values)}")
+            names.append(f"no case {json.dumps(values[1:])}")
             store.record(names[-1], "refused", {"status": str(error), "seconds": 0.0})
-        else:
-            names.append(job_identity(job, plan.settings.until))
-            archive = store.folder / ARCHIVES / names[-1] if plan.settings.keep == "all" else None
-            wanted.append(Wanted(names[-1], job, archive))
-    store.plan((([number, *values], name) for values, name in zip(designs, names, strict=True)), more=True)
+    store.add(zip(designs, names, strict=True))
     computation.compute(wanted, f"generation {number} of {plan.generations}", len(wanted))
     found = [_judged(plan, store.outcome(name), store.row(name)) for name in names]
     algorithm.tell(np.array([values for values, _ in found]), np.array([violations for _, violations in found]))
@@ -186,6 +175,11 @@ def _judged(plan: SearchPlan, outcome: str | None, row: Mapping[str, Any]) -> tu
     return signed, [0.0, *broken]
 
 
+def _is_feasible(plan: SearchPlan, design: Finished) -> bool:
+    """Whether a design converged and keeps all constraints."""
+    return max(_judged(plan, design.outcome, design.row)[1]) <= 0
+
+
 def _value(row: Mapping[str, Any], column: str) -> Any:
     return row.get(column) if column in STANDARD else read_column(column).of(row.get("results", {}))
 
@@ -199,11 +193,11 @@ def front_of(plan: SearchPlan, store: Store) -> tuple[list[Finished], int]:
     ----------
     plan : of the search; store : with its designs.
     """
-    kept = list[tuple[list[float], Finished]]()
-    for design in store.finished():
-        values, violations = _judged(plan, design.outcome, design.row)
-        if max(violations) <= 0:
-            kept.append((values, design))
+    kept = [
+        (_judged(plan, design.outcome, design.row)[0], design)
+        for design in store.finished()
+        if _is_feasible(plan, design)
+    ]
     if not kept:
         return [], 0
     all_values = np.array([values for values, _ in kept])
@@ -222,32 +216,7 @@ def _some(jobs: Sequence[str], most: int) -> list[str]:
     return list(jobs[::step])
 
 
-def _archived(plan: SearchPlan, store: Store, folder: Path, jobs: Sequence[str]) -> Iterator[Wanted]:
-    keys = {design.job: design.keys[1:] for design in store.finished() if design.job in jobs}
-    for name in jobs:
-        yield Wanted(name, plan.job(keys[name]), folder / ARCHIVES / name)
-
-
-def _front_row(plan: SearchPlan, design: Finished) -> dict[str, Any]:
-    values = {objective.column: _value(design.row, objective.column) for objective in plan.objectives}
-    return dict(zip(plan.keys, design.keys[1:], strict=True)) | values
-
-
-def _write_front(file: Path, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
-    part = file.with_name(f".{file.name}.part")
-    try:
-        with part.open("w", encoding="utf-8", newline="") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(names)
-            writer.writerows([_cell(row[name]) for name in names] for row in rows)
-        os.replace(part, file)
-    except OSError as error:
-        raise OutputError(f"cannot write {file}: {error.strerror}") from error
-
-
-def _cell(value: Any) -> Any:
-    return json.dumps(value) if isinstance(value, list | tuple | dict) else value
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(_cell(value))
+def _cells(plan: SearchPlan, design: Finished, names: Sequence[str]) -> list[Any]:
+    """Values of a design by the names of keys and columns."""
+    known = dict(zip(plan.keys, design.keys, strict=True)) | {JOB: design.job}
+    return [known[name] if name in known else _value(design.row, name) for name in names]

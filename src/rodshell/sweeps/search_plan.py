@@ -1,6 +1,6 @@
 """The plan of a search: base, variables, objectives and constraints, read from a TOML file or a mapping."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -11,12 +11,11 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.job import Job
 from rodshell.sweeps.axes import Axis, Span, flat_keys, read_listed, read_span
-from rodshell.sweeps.columns import STANDARD, Column, read_column, read_columns
-from rodshell.sweeps.plan import Settings, Source, form_command, known, opened, read_bases, read_settings, table
+from rodshell.sweeps.columns import STANDARD, read_column, read_columns
+from rodshell.sweeps.plan import GENERATION, Plan, Source, known, read_origin, read_settings, table
 from rodshell.units import shown
 
 TABLES = ("base", "columns", "variables", "objectives", "constraints", "search", "run")
-GENERATION = "generation"
 BELOW_ONE = 1 - 1e-12
 FAR = 1e3  # violation of a design without a form: larger than that of any constraint
 
@@ -62,41 +61,26 @@ def keys_of(variable: Span | Axis) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class SearchPlan:
-    """A whole search.
+class SearchPlan(Plan):
+    """A whole search; its keys are "generation" and those of its variables.
 
     Parameters
     ----------
-    name, text, folder : as of `Plan`; base : the job, called `source`.
     variables : intervals, or lists of values.
     objectives, constraints : on columns of the table.
-    columns : of the table, in addition to those of every sweep.
     population, generations, seed : of the algorithm.
-    settings : how jobs are run.
     """
 
-    name: str
-    text: str
-    folder: Path
-    source: str
-    base: Job
     variables: tuple[Span | Axis, ...]
     objectives: tuple[Objective, ...]
     constraints: tuple[Constraint, ...]
-    columns: tuple[Column, ...]
     population: int
     generations: int
     seed: int
-    settings: Settings
 
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """The variables' keys."""
-        return tuple(key for variable in self.variables for key in keys_of(variable))
-
-    def values(self, point: Floats) -> tuple[Any, ...]:
+    def values(self, generation: int, point: Floats) -> tuple[Any, ...]:
         """Values of the keys at a point (n,) of the unit cube."""
-        found = list[Any]()
+        found: list[Any] = [generation]
         for variable, share in zip(self.variables, point.tolist(), strict=True):
             if isinstance(variable, Axis):
                 found += variable.rows[min(int(share * len(variable.rows)), len(variable.rows) - 1)]
@@ -104,64 +88,38 @@ class SearchPlan:
                 found.append(variable.drawn(min(share, BELOW_ONE) if variable.whole else share))
         return tuple(found)
 
-    def job(self, values: Sequence[Any]) -> Job:
-        """The job with these values of the keys.
-
-        Raises
-        ------
-        InputError : no case can have them together.
-        """
-        return self.base.changed(dict(zip(self.keys, values, strict=True)))
-
-    def command(self, values: Sequence[Any]) -> str | None:
-        """The command that forms a design alone; `values` of generation and keys."""
-        return form_command(self.source, self.folder, dict(zip(self.keys, values[1:], strict=True)))
-
 
 def read_search(source: Source) -> SearchPlan:
-    """The plan of a search.
-
-    Parameters
-    ----------
-    source : path of a TOML file, or its content as a mapping.
-
-    Raises
-    ------
-    InputError : it cannot be read or used; in one sentence.
-    """
-    name, text, folder, given = opened(source)
-    known("", given, TABLES)
-    bases = read_bases(given, folder)
-    if len(bases) > 1:
+    """The plan of a search; `source` and errors as of `read_plan`."""
+    origin = read_origin(source, TABLES)
+    if len(origin.bases) > 1:
         raise InputError("base: a search has one: choose among targets by a variable such as target.kind")
-    (base_name, base), *_ = bases.items()
-    variables = tuple(_variable(key, value, base, folder) for key, value in flat_keys(table(given, "variables")))
+    given = origin.tables
+    variables = tuple(
+        _variable(key, value, origin.first, origin.folder) for key, value in flat_keys(table(given, "variables"))
+    )
     if not variables:
         raise InputError(
             '[variables] is missing: give at least one key, such as "layout.spacing" = { from = "25 mm", to = "35 mm" }'
         )
+    keys = (GENERATION, *(key for variable in variables for key in keys_of(variable)))
     objectives = _objectives(table(given, "objectives"))
     constraints = tuple(_constraint(key, value) for key, value in _flat_constraints(table(given, "constraints")))
-    asked = [
-        *given.get("columns", ()),
-        *(objective.column for objective in objectives),
-        *(constraint.column for constraint in constraints),
-    ]
-    keys = [GENERATION, *(key for variable in variables for key in keys_of(variable))]
-    columns = read_columns([name for name in dict.fromkeys(asked) if name not in (*STANDARD, *keys)], keys)
-    run = table(given, "run")
+    columns = read_columns(given.get("columns", ()), keys)
+    there = (*STANDARD, *keys, *(column.name for column in columns))
+    judged = [*(objective.column for objective in objectives), *(constraint.column for constraint in constraints)]
+    columns += tuple(read_column(name) for name in dict.fromkeys(judged) if name not in there)
+    run, search = table(given, "run"), table(given, "search")
     if "best" in run:
         raise InputError("run.best: a search has objectives, which say what is best: leave it out")
-    settings = read_settings(run, [column.name for column in columns], folder)
-    search = table(given, "search")
     known("search", search, ("population", "generations", "seed"))
-    population = _whole(search, "population", 24, 4)
     plan = SearchPlan(
-        name, text, folder, base_name, base, variables, objectives, constraints, columns, population,
-        _whole(search, "generations", 20, 1), _whole(search, "seed", 0, 0), settings,
+        origin, keys, columns, read_settings(run, [column.name for column in columns], origin.folder),
+        variables, objectives, constraints,
+        _whole(search, "population", 24, 4), _whole(search, "generations", 20, 1), _whole(search, "seed", 0, 0),
     )  # fmt: skip
     for corner in (0.0, 0.5, 1.0):
-        plan.job(plan.values(np.full(len(variables), corner)))
+        plan.job(plan.values(1, np.full(len(variables), corner)))
     return plan
 
 

@@ -15,7 +15,7 @@ from typing import Any, Self
 
 from rodshell.errors import OutputError
 
-STORE, LOCK = "sweep.sqlite", "sweep.lock"
+STORE, LOCK, ARCHIVES = "sweep.sqlite", "sweep.lock", "archives"  # in the folder of a sweep
 FORMAT = 1
 CACHE = 500  # kB of the coordinator's memory
 LOG = 200  # pages of SQLite's log, which is then merged into the file
@@ -146,14 +146,21 @@ class Store:
 
     # Designs
 
-    def plan(self, designs: Iterable[tuple[Sequence[Any], str]], *, more: bool = False) -> None:
+    def plan(self, designs: Iterable[tuple[Sequence[Any], str]], *, notes: Mapping[str, str] | None = None) -> None:
         """Write the designs of the sweep in place of earlier ones, all or none.
 
         Parameters
         ----------
-        designs : values of the axes' keys, and the identity of the job.
-        more : whether they follow those that there are.
+        designs : values of the keys, and the identity of the job.
+        notes : by name, to be noted with them.
         """
+        self._write(designs, notes or {}, more=False)
+
+    def add(self, designs: Iterable[tuple[Sequence[Any], str]]) -> None:
+        """Write designs behind those that there are, all or none; `designs` as of `plan`."""
+        self._write(designs, {}, more=True)
+
+    def _write(self, designs: Iterable[tuple[Sequence[Any], str]], notes: Mapping[str, str], *, more: bool) -> None:
         with self._errors():
             self._connection.execute("BEGIN")
             try:
@@ -162,6 +169,7 @@ class Store:
                 first = self.count()
                 rows = ((first + k, job, json.dumps(list(keys))) for k, (keys, job) in enumerate(designs))
                 self._connection.executemany("INSERT INTO designs VALUES (?, ?, ?)", rows)
+                self._connection.executemany("INSERT OR REPLACE INTO notes VALUES (?, ?)", notes.items())
                 self._connection.execute("COMMIT")
             except BaseException:
                 with suppress(sqlite3.Error):

@@ -3,8 +3,8 @@
 import csv
 import json
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from time import monotonic
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rodshell.errors import InputError, OutputError
 from rodshell.sweeps.columns import JOB, STANDARD, Column, read_column
-from rodshell.sweeps.store import Finished, Store
+from rodshell.sweeps.store import STORE, Finished, Store
 from rodshell.validation import instance
 
 if TYPE_CHECKING:
@@ -30,14 +30,19 @@ def header_of(store: Store) -> tuple[list[str], list[Column]]:
     return noted["keys"], [read_column(name) for name in noted["columns"]]
 
 
-def note_header(store: Store, keys: Sequence[str], columns: Sequence[Column]) -> None:
-    """Keep what the table's columns are.
+def header_notes(keys: Sequence[str], columns: Sequence[Column]) -> dict[str, str]:
+    """What the table's columns are, to be noted with the designs.
 
     Parameters
     ----------
-    store : of the sweep; keys : of the axes; columns : of the sweep, in addition to those of every sweep.
+    keys : of the designs; columns : in addition to those of every sweep.
     """
-    store.take_note(HEADER, json.dumps({"keys": list(keys), "columns": [column.name for column in columns]}))
+    return {HEADER: json.dumps({"keys": list(keys), "columns": [column.name for column in columns]})}
+
+
+def names_of(keys: Sequence[str], columns: Sequence[Column]) -> list[str]:
+    """The names of all columns of a table; `keys` and `columns` as of `header_notes`."""
+    return [*keys, *STANDARD, *(column.name for column in columns)]
 
 
 def table_rows(store: Store, columns: Sequence[Column]) -> Iterator[list[Any]]:
@@ -81,31 +86,62 @@ class Table:
         OutputError : it cannot be written.
         """
         keys, columns = header_of(self._store)
-        file = self._store.folder / CSV
-        part = file.with_name(f".{CSV}.part")
-        try:
-            with part.open("w", encoding="utf-8", newline="") as stream:
-                writer = csv.writer(stream, lineterminator="\n")
-                writer.writerow([*keys, *STANDARD, *(column.name for column in columns)])
-                for row in table_rows(self._store, columns):
-                    writer.writerow([_text(value) for value in row])
-            os.replace(part, file)
-        except OSError as error:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
-            if isinstance(error, OutputError):
-                raise
-            raise OutputError(
-                f"cannot write {file}: {error.strerror}; the finished designs are kept in {self._store.path}: make "
-                "room, and start the same sweep again"
-            ) from error
+        names = names_of(keys, columns)
+        write_csv(self._store.folder / CSV, names, table_rows(self._store, columns))
 
 
-def _text(value: Any) -> Any:
-    """A cell of a CSV."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return json.dumps(value) if isinstance(value, list | dict) else value
+def write_csv(file: Path, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table.
+
+    Parameters
+    ----------
+    file : which is replaced; names : of the columns; rows : of plain values.
+
+    Raises
+    ------
+    OutputError : it cannot be written.
+    """
+    with replaced(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(names)
+        for row in rows:
+            writer.writerow([str(value).lower() if isinstance(value, bool) else plain(value) for value in row])
+
+
+@contextmanager
+def replaced(file: Path) -> Iterator[Path]:
+    """A path to write to, which then takes the place of a file of the sweep in one step.
+
+    Raises
+    ------
+    OutputError : it cannot be written.
+    """
+    part = file.with_name(f".{file.name}.part")
+    try:
+        yield part
+        os.replace(part, file)
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(
+            f"cannot write {file}: {error.strerror or error}; the finished designs are kept in {file.parent / STORE}: "
+            "make room, and start the same sweep again"
+        ) from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def plain(value: Any) -> Any:
+    """A value as a cell shows it: lists and tables as JSON."""
+    return json.dumps(value) if isinstance(value, list | tuple | dict) else value
+
+
+def in_short(value: Any) -> str:
+    """A value in a sentence."""
+    if value is None:
+        return "–"
+    return f"{value:.4g}" if isinstance(value, float) else str(plain(value))
 
 
 def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pyarrow.Table":
@@ -130,7 +166,7 @@ def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pya
         keys, columns_of_sweep = header_of(store)
         there = [column.name for column in columns_of_sweep]
         asked = [*columns_of_sweep, *(read_column(name) for name in columns if name not in there)]
-        return arrow_table([*keys, *STANDARD, *(column.name for column in asked)], table_rows(store, asked))
+        return arrow_table(names_of(keys, asked), table_rows(store, asked))
 
 
 def arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Table":
@@ -156,9 +192,9 @@ def arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Tab
 
 
 def _alike(values: list[Any]) -> list[Any]:
-    """Cells of one type: numbers, truth values, or text."""
+    """Cells of one type: truth values, whole numbers, numbers, or text."""
     known = [value for value in values if value is not None]
-    if all(isinstance(value, bool) for value in known) or all(isinstance(value, str) for value in known):
+    if any(all(type(value) is kind for value in known) for kind in (bool, int, str)):
         return values
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
         return [None if value is None else float(value) for value in values]
@@ -171,15 +207,15 @@ def write_parquet(store: Store) -> None:
     Parameters
     ----------
     store : of the sweep.
+
+    Raises
+    ------
+    OutputError : it cannot be written.
     """
     with suppress(ImportError):
         import pyarrow.parquet
 
         keys, columns = header_of(store)
-        names = [*keys, *STANDARD, *(column.name for column in columns)]
-        part = store.folder / f".{PARQUET}.part"
-        try:
+        names = names_of(keys, columns)
+        with replaced(store.folder / PARQUET) as part:
             pyarrow.parquet.write_table(arrow_table(names, table_rows(store, columns)), part)
-            os.replace(part, store.folder / PARQUET)
-        except OSError as error:
-            raise OutputError(f"cannot write {store.folder / PARQUET}: {error.strerror or error}") from error

@@ -1,6 +1,6 @@
 """Processes that run jobs, each watched: one that takes too long or too much memory is stopped alone.
 
-A process that dies is started again, and its job with it, once.
+A process that dies while it starts is started again, and a job whose process dies is run again, both once.
 """
 
 import json
@@ -23,7 +23,7 @@ from rodshell.errors import OutputError, RodshellError
 
 TICK = 0.1  # s between two looks at a process
 PROGRAM = "from rodshell.sweeps.worker import main; main()"
-STARTS = 3  # tries to start a process
+TRIES = 2  # to start a process, and to run a job
 PATIENCE = 600.0  # s that a process may take to start, compilation of kernels included
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -62,7 +62,7 @@ class Worker:
         Stopped : by `stop`.
         """
         ended = []
-        for _ in range(2):
+        for _ in range(TRIES):
             self._start()
             begun = monotonic()
             self._send(task)
@@ -88,17 +88,19 @@ class Worker:
         """A process that is ready."""
         if self._process is not None and self._process.poll() is None:
             return
-        for _ in range(STARTS):
+        for _ in range(TRIES):
             if self._over:
                 raise Stopped
             self._process, self._replies = self._spawned()
             begun = monotonic()
+            late = False
             while (line := self._next(TICK)) == "":
                 if monotonic() - begun > PATIENCE:
+                    late = True
                     self._kill()
             if line is not None:  # it is ready
                 return
-            why = self._end()
+            why = f"it was not ready after {PATIENCE:g} s" if late else self._end()
         raise EngineError(f"a process for jobs cannot be started: {why}")
 
     def _spawned(self) -> "tuple[subprocess.Popen[str], SimpleQueue[str | None]]":

@@ -5,8 +5,9 @@ the largest extent, colours 8: a stage of 8000 segments with two colours takes 6
 """
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -49,6 +50,90 @@ class Scene:
         return len(text).to_bytes(4, "little") + text + self.data
 
 
+@dataclass(frozen=True)
+class Coloured:
+    """What colours a shape, and its worst place: a point (3,) [m], and the value there in words."""
+
+    scale: Scale
+    where: Floats
+    worst: str
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a scene is made of.
+
+    Parameters
+    ----------
+    name : of the result.
+    rods : id and family of each rod.
+    nodes : (k,) nodes of all rods, one rod after the other; counts : (m,) how many each rod has.
+    joints : ids; meeting : (c, 2) entry in `nodes` of each joint on either rod.
+    shapes : in their order, with what colours them.
+    outline : size of everything [m] -> (s, 2) corners of the rods' section, across and up [m].
+    target : points (p, 3) and triangles (t, 3) of the target, if there is one.
+    reactions : by shape, the forces (2 m, 3) at the start and end of each rod over the largest, and that one in words.
+    rows : of the schedules, by the kind of part.
+    """
+
+    name: str
+    rods: Sequence[tuple[str, str]]
+    nodes: Ints
+    counts: Ints
+    joints: Sequence[str]
+    meeting: Ints
+    shapes: Sequence[tuple[Shape, Mapping[Colour, Coloured]]]
+    outline: Callable[[float], Floats]
+    target: tuple[NDArray[np.floating], Ints] | None = None
+    reactions: Mapping[str, tuple[Floats, str]] = field(default_factory=dict)
+    rows: Mapping[str, Any] = field(default_factory=dict)
+
+    def scene(self) -> Scene:
+        """It as bytes for the viewer."""
+        data, entries = _Data(), _entries(self.counts, self.meeting)
+        nodes, counts = self.nodes[entries], np.diff(np.searchsorted(entries, np.cumsum([0, *self.counts])))
+        meeting = np.searchsorted(entries, self.meeting).astype(np.uint32)
+        clouds = [shape.positions[nodes] for shape, _ in self.shapes]
+        low, size = _box([*clouds, *([] if self.target is None else [self.target[0]])])
+        outline = self.outline(float(size.max()))
+        frame = _Frame(low, float(size.max()), entries, data)
+        laths = _laths(outline)
+        known = {kind: coloured.scale for _, colours in self.shapes for kind, coloured in colours.items()}
+        shown = {kind: known[kind] for kind in COLOURS if kind in known}
+        header: dict[str, Any] = {
+            "version": VERSION,
+            "name": self.name,
+            "size": frame.size,
+            "low": low.tolist(),
+            "box": (size / frame.size).tolist(),
+            "rods": [
+                {"id": name, "count": count, "ink": FAMILIES[family == "v"]}
+                for (name, family), count in zip(self.rods, counts.tolist(), strict=True)
+            ],
+            "joints": {"ids": list(self.joints), "entries": data.add(meeting)},
+            "outline": (outline / frame.size).tolist(),
+            "kinds": {kind: scale.caption.split(" in ")[0] for kind, scale in shown.items()},
+            "palettes": {kind: scale.palette for kind, scale in shown.items()},
+            "stages": [
+                frame.stage(shape, colours, cloud, _normals(cloud, counts, meeting) if laths else None)
+                for (shape, colours), cloud in zip(self.shapes, clouds, strict=True)
+            ],
+            "rows": self.rows,
+        }
+        if self.target is not None:
+            points, faces = self.target
+            header["target"] = {"points": frame.points(points), "faces": data.add(faces.astype("<u4"))}
+        last = np.cumsum(counts)
+        header["supports"] = {
+            "entries": data.add(np.column_stack([last - counts, last - 1]).astype("<u4")),
+            "reactions": {
+                name: {"forces": data.add(forces.astype("<f4")), "largest": largest}
+                for name, (forces, largest) in self.reactions.items()
+            },
+        }
+        return Scene(header, data.content())
+
+
 def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     """All shapes of an archive; None where it has no shape in space.
 
@@ -62,51 +147,50 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
     names = [name for name in _in_order(shape_names(archive)) if rods]
     if len(names) < 2:
         return None
-    data = _Data()
-    joints = _drawn_joints(archive, rods)
-    entries, counts = _entries(archive, rods, joints)
-    nodes = archive.states["rod_nodes"][entries]
-    shapes = [_placed(archive, name) for name in names]
+    joints, shapes = _drawn_joints(archive, rods), [_placed(archive, name) for name in names]
+    tables = {"rod": rods_table(archive, brief=True), "joint": joints_table(archive, brief=True)} if schedules else {}
     target = archive.states.get("target_points")
-    cloud = np.concatenate([*(shape.positions[nodes] for shape in shapes), *([] if target is None else [target])])
-    low, size = cloud.min(axis=0), float(np.ptp(cloud, axis=0).max())
-    scales = [_scales(archive, shape) for shape in shapes]
-    known = {kind: scale for coloured in scales for kind, scale in coloured.items()}
-    kinds = {kind: known[kind] for kind in COLOURS if kind in known}
-    at = {int(entry): k for k, entry in enumerate(entries)}
-    meeting = np.array([[at[entry] for entry in pair] for _, pair in joints], dtype=np.uint32).reshape(-1, 2)
-    outline, laths = _outline(archive, size)
-    header: dict[str, Any] = {
-        "version": VERSION,
-        "name": archive.name,
-        "size": size,
-        "low": low.tolist(),
-        "box": ((cloud.max(axis=0) - low) / size).tolist(),
-        "rods": [_rod(rod, count) for rod, count in zip(rods, counts, strict=True)],
-        "joints": {"ids": [joint.id for joint, _ in joints], "entries": data.add(meeting)},
-        "outline": (outline / size).tolist(),
-        "kinds": {kind: scale.caption.split(" in ")[0] for kind, scale in kinds.items()},
-        "palettes": {kind: scale.palette for kind, scale in kinds.items()},
-        "stages": [
-            _stage(archive, shape, coloured, data, nodes=nodes, entries=entries, low=low, size=size,
-                   normals=_normals(shape.positions[nodes], counts, meeting) if laths else None)
-            for shape, coloured in zip(shapes, scales, strict=True)
-        ],
-        "rows": {},
-    }  # fmt: skip
-    if schedules:
-        tables = {"rod": rods_table(archive, brief=True), "joint": joints_table(archive, brief=True)}
-        header["rows"] = {kind: _rows(table) for kind, table in tables.items()}
-    if target is not None:
-        faces = archive.states["target_faces"]
-        points = np.rint((target - low) / size * STEPS).astype("<u2")
-        header["target"] = {"points": data.add(points), "faces": data.add(faces.astype("<u4"))}
-    header["supports"] = _supports(archive, rods, at, data)
-    return Scene(header, data.content())
+    return Drawn(
+        archive.name,
+        [(rod.id, rod.family) for rod in rods],
+        archive.states["rod_nodes"],
+        np.array([len(rod.nodes) for rod in rods]),
+        [joint.id for joint, _ in joints],
+        np.array([pair for _, pair in joints], dtype=np.intp).reshape(-1, 2),
+        [(shape, _colours(archive, shape)) for shape in shapes],
+        partial(section_outline, archive.results.rod.section if archive.results.rod else None),
+        None if target is None else (target, archive.states["target_faces"]),
+        _reactions(archive, rods),
+        {kind: _rows(table) for kind, table in tables.items()},
+    ).scene()
 
 
-def _rod(rod: GridRod, count: int) -> dict[str, Any]:
-    return {"id": rod.id, "count": count, "ink": FAMILIES[rod.family == "v"]}
+@dataclass(frozen=True)
+class _Frame:
+    """Where a scene lies, and which entries are drawn."""
+
+    low: Floats
+    size: float
+    entries: Ints
+    data: "_Data"
+
+    def points(self, points: NDArray[np.floating]) -> dict[str, Any]:
+        return self.data.add(np.rint((points - self.low) / self.size * STEPS).astype("<u2"))
+
+    def stage(
+        self, shape: Shape, colours: Mapping[Colour, Coloured], cloud: Floats, normals: Floats | None
+    ) -> dict[str, Any]:
+        stage: dict[str, Any] = {"name": shape.name, "caption": shape.caption, "points": self.points(cloud)}
+        if normals is not None:
+            stage["normals"] = self.data.add(np.rint(127 * normals).astype(np.int8))
+        stage["colours"] = {kind: self._coloured(coloured) for kind, coloured in colours.items()}
+        return stage
+
+    def _coloured(self, coloured: Coloured) -> dict[str, Any]:
+        scale = coloured.scale
+        bins = np.where(np.isfinite(scale.values), scale.bins, UNKNOWN)[self.entries].astype(np.uint8)
+        worst = {"at": ((coloured.where - self.low) / self.size).tolist(), "text": coloured.worst}
+        return {"bins": self.data.add(bins), "caption": scale.caption, "ticks": _ticks(scale), "worst": worst}
 
 
 class _Data:
@@ -158,46 +242,31 @@ def _drawn_joints(archive: Archive, rods: list[GridRod]) -> list[tuple[GridJoint
     return found
 
 
-def _entries(
-    archive: Archive, rods: list[GridRod], joints: list[tuple[GridJoint, tuple[int, int]]]
-) -> tuple[Ints, list[int]]:
-    """Entries of `rod_nodes` that are drawn, those of ends and joints among them, and how many of them each rod has."""
-    lengths = [len(rod.nodes) for rod in rods]
-    stride = max(1, -(-sum(lengths) // SEGMENTS))
-    kept = {entry for _, pair in joints for entry in pair} if stride > 1 else set[int]()
-    first, parts = 0, []
-    for length in lengths:
-        here = {*range(first, first + length, stride), first + length - 1}
-        parts.append(sorted(here | {entry for entry in kept if first <= entry < first + length}))
-        first += length
-    return np.array([entry for part in parts for entry in part], dtype=np.intp), [len(part) for part in parts]
+def _entries(counts: Ints, meeting: Ints) -> Ints:
+    """Entries that are drawn, of all rods: of very many some, those of ends and joints among them."""
+    stop = np.cumsum(counts)
+    along = np.arange(stop[-1]) - np.repeat(stop - counts, counts)
+    drawn = along % max(1, -(-int(stop[-1]) // SEGMENTS)) == 0
+    drawn[stop - 1] = drawn[meeting.ravel()] = True
+    return np.flatnonzero(drawn)
 
 
-def _scales(archive: Archive, shape: Shape) -> dict[Colour, Scale]:
-    """Scales by which the shape is coloured."""
+def _box(clouds: Sequence[NDArray[np.floating]]) -> tuple[Floats, Floats]:
+    """Lowest corner and extent, each (3,), of all points."""
+    axes = np.concatenate([cloud.T for cloud in clouds], axis=1)  # rows: several times as quick as columns
+    low = axes.min(axis=1)
+    return low, axes.max(axis=1) - low
+
+
+def _colours(archive: Archive, shape: Shape) -> dict[Colour, Coloured]:
+    """By what the shape is coloured."""
     kinds: tuple[Colour, ...] = () if shape.flat else COLOURS
-    found = {colour: scale_of(archive, shape, colour) for colour in kinds}
-    return {colour: scale for colour, scale in found.items() if scale is not None}
-
-
-def _stage(
-    archive: Archive, shape: Shape, scales: dict[Colour, Scale], data: _Data, *,
-    nodes: Ints, entries: Ints, low: Floats, size: float, normals: Floats | None,
-) -> dict[str, Any]:  # fmt: skip
-    coordinates = np.rint((shape.positions[nodes] - low) / size * STEPS).astype("<u2")
-    stage: dict[str, Any] = {"name": shape.name, "caption": shape.caption, "points": data.add(coordinates)}
-    if normals is not None:
-        stage["normals"] = data.add(np.rint(127 * normals).astype(np.int8))
-    stage["colours"] = {
-        kind: {
-            "bins": data.add(np.where(np.isfinite(scale.values), scale.bins, UNKNOWN)[entries].astype(np.uint8)),
-            "caption": scale.caption,
-            "ticks": _ticks(scale),
-            "worst": _worst(archive, shape, kind, scale, low, size),
-        }
-        for kind, scale in scales.items()
+    found = {kind: scale_of(archive, shape, kind) for kind in kinds}
+    return {
+        kind: Coloured(scale, *_worst(archive, shape, kind, scale))
+        for kind, scale in found.items()
+        if scale is not None
     }
-    return stage
 
 
 def _ticks(scale: Scale) -> list[tuple[float, str]]:
@@ -206,29 +275,23 @@ def _ticks(scale: Scale) -> list[tuple[float, str]]:
     return [((value - scale.low) / spread, f"{value + 0.0:g}") for value in nice_ticks(scale.low, scale.high, 4)]
 
 
-def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale, low: Floats, size: float) -> dict[str, Any]:
-    """The place of the largest value, over the size, and the value in words."""
+def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale) -> tuple[Floats, str]:
+    """The place of the largest value [m], and the value in words."""
     if kind == "gap" and shape.gap is not None:
         largest, place = largest_gap(archive, shape)
-        rounding = rounding_of(archive.results)
-        return {
-            "at": ((place - low) / size).tolist(),
-            "text": wording.millimetres(abs(largest) * 1e-3, rounding=rounding),
-        }
+        return place, wording.millimetres(abs(largest) * 1e-3, rounding=rounding_of(archive.results))
     worst = int(np.nanargmax(np.abs(scale.values)))
     unit = scale.caption.split(" in ")[-1].split(",")[0]
-    place = shape.positions[archive.states["rod_nodes"][worst]]
-    return {"at": ((place - low) / size).tolist(), "text": f"{scale.values[worst]:.3g} {unit}"}
+    return shape.positions[archive.states["rod_nodes"][worst]], f"{scale.values[worst]:.3g} {unit}"
 
 
-def _outline(archive: Archive, size: float) -> tuple[Floats, bool]:
-    """The section's outline (s, 2) [m], across and up; and whether it matters how it is turned."""
-    outline = section_outline(archive, size)
+def _laths(outline: Floats) -> bool:
+    """Whether it matters how a section (s, 2) is turned."""
     radii = np.linalg.norm(outline, axis=1)
-    return outline, bool(np.ptp(radii) > 1e-6 * radii.max() or len(outline) == 4)
+    return bool(np.ptp(radii) > 1e-6 * radii.max() or len(outline) == 4)
 
 
-def _normals(points: Floats, counts: list[int], meeting: NDArray[np.uint32]) -> Floats:
+def _normals(points: Floats, counts: Ints, meeting: NDArray[np.uint32]) -> Floats:
     """Unit normals (k, 3) of laths at each entry: at a joint across both rods, as a bolt holds them, between joints
     turned evenly from one to the next."""
     first = np.cumsum([0, *counts])
@@ -252,19 +315,15 @@ def _normals(points: Floats, counts: list[int], meeting: NDArray[np.uint32]) -> 
     return np.asarray(np.divide(normals, length, out=np.zeros_like(normals), where=length > 0))
 
 
-def _supports(archive: Archive, rods: list[GridRod], at: Mapping[int, int], data: _Data) -> dict[str, Any]:
-    """Entries of all rod ends, and by stage the forces on them: their directions and sizes over the largest."""
-    starts = np.cumsum([0, *(len(rod.nodes) for rod in rods)])
-    ends = np.array([[at[int(a)], at[int(b) - 1]] for a, b in pairwise(starts)], dtype="<u4")
-    forces: dict[str, Any] = {}
-    if len(rods) == len(archive.results.rods):
-        for end, reactions in archive.results.reactions.items():
-            values = np.array(reactions.forces, dtype=float).reshape(-1, 3)
-            largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
-            if len(values) == ends.size and largest > 0:
-                scaled = (values / largest).astype("<f4")
-                forces[f"popped_{end}"] = {"forces": data.add(scaled), "largest": wording.newtons(largest)}
-    return {"entries": data.add(ends), "reactions": forces}
+def _reactions(archive: Archive, rods: list[GridRod]) -> dict[str, tuple[Floats, str]]:
+    """Forces on all rod ends by shape, see `Drawn`."""
+    found = dict[str, tuple[Floats, str]]()
+    for end, reactions in archive.results.reactions.items() if len(rods) == len(archive.results.rods) else ():
+        values = np.array(reactions.forces, dtype=float).reshape(-1, 3)
+        largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
+        if len(values) == 2 * len(rods) and largest > 0:
+            found[f"popped_{end}"] = (values / largest, wording.newtons(largest))
+    return found
 
 
 def _rows(table: Table) -> dict[str, Any]:

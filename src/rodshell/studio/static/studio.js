@@ -24,12 +24,12 @@ const SLIDERS = [  // key, name, and how its range follows from its value
   ["target.b", "Half-axis y", "length"], ["target.c", "Half-axis z", "length"], ["target.base", "Base plane", "place"],
   ["target.scale", "Scale", "factor"],
 ];
-const FIRST = ["pop_up.ends", "joint.kind", "drape.method", "rod.material.preset", "checks.stages"];
+const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["rod.material.preset", "Material"], ["drape.method", "Drape"]];
 const IDLE = ["drape.frames", "target.file", "target.boundary", "seams.file"];  // not from a page
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
 
 let start, session, socket, viewer, gui, drawn;
-let base = {}, resolved = null, serial = 0, sent = 0, waiting = null, shown = 0, facts = null, stage = "", history = { at: -1, cases: [], variants: [] };
+let base = {}, resolved = null, serial = Date.now(), waiting = null, shown = 0, facts = null, stage = "", history = { at: -1, cases: [], variants: [] };
 
 // The case, and what is sent
 
@@ -41,9 +41,12 @@ function change(edit, live = false) {
 
 function submit(next, live) {
   base = next;
-  const message = { kind: "case", serial: ++serial, case: base, live };
-  if (sent || socket?.readyState !== WebSocket.OPEN) waiting = message;  // at most one waits: the newest
-  else post(message);
+  byId("verdict").classList.add("old");
+  const soon = waiting;
+  serial = Math.max(serial, shown) + 1;
+  waiting = { kind: "case", serial, case: base, live };  // at most one waits: the newest
+  if (!live) post();
+  else if (!soon) requestAnimationFrame(post);  // at most one a frame
   if (!live) remember();
   showTools();
 }
@@ -59,27 +62,63 @@ function showTools() {
   press("erection", get(base, "checks.stages") ?? DEPLOYMENT);
 }
 
-function checkLoads({ snow, cladding }) {
+// The dialog edits the case's own weight and snow; its other loads and its combinations stay.
+const EDITED = [["self_weight", "own", "cladding"], ["snow", "snow", "value"]];  // kind, name if it is new, key
+
+function showLoads() {
+  const loads = base.loads || [], { elements } = byId("load-values").querySelector("form");
+  for (const [kind, , key] of EDITED) {
+    const found = loads.find(load => load.kind === kind), given = found?.[key] ?? (kind === "snow" && loads.length ? "" : elements[kind].defaultValue);
+    elements[kind].value = typeof given === "number" ? `${given} ${elements[kind].dataset.unit}` : given;
+  }
+  const others = loads.filter(load => !EDITED.some(([kind]) => loads.find(first => first.kind === kind) === load));
+  byId("other-loads").replaceChildren(...others.map(({ name, kind, ...values }) => make("li", { textContent: `${name} (${kind.replaceAll("_", " ")}): ${Object.entries(values).map(([key, value]) => `${key} ${typeof value === "string" ? value : JSON.stringify(value)}`).join(", ")}` })));
+  byId("combined").replaceChildren(...(base.combinations || []).map(({ name, factors }) => make("li", { textContent: `${name}: ${Object.entries(factors || {}).map(([load, factor]) => `${factor} \u00d7 ${load}`).join(" + ")}` })));
+  byId("kept-loads").hidden = !others.length && !base.combinations?.length;
+  byId("load-values").showModal();
+}
+
+function checkLoads(elements) {
   change(next => {
-    next.loads = [{ name: "own", kind: "self_weight", cladding: cladding.value }, { name: "snow", kind: "snow", value: snow.value }];
-    next.combinations = [{ name: "service", factors: { own: 1, snow: 1 } }];
+    next.loads ||= [];
+    next.combinations ||= [];
+    for (const [kind, plain, key] of EDITED) {
+      const text = elements[kind].value.trim(), found = next.loads.find(load => load.kind === kind);
+      if (found && text) found[key] = text;
+      else if (found) dropLoad(next, found);
+      else if (text) {
+        let name = plain;
+        while (next.loads.some(load => load.name === name)) name += "_";
+        next.loads.push({ name, kind, [key]: text });
+        for (const { factors } of next.combinations) factors[name] = 1;
+      }
+    }
+    if (!next.combinations.length) next.combinations.push({ name: "service", factors: Object.fromEntries(next.loads.map(({ name }) => [name, 1])) });
+    if (!next.loads.length) { delete next.loads; delete next.combinations; }
   });
+}
+
+function dropLoad(next, gone) {
+  next.loads = next.loads.filter(load => load !== gone);
+  for (const { factors } of next.combinations) delete factors[gone.name];
+  next.combinations = next.combinations.filter(({ factors }) => Object.keys(factors).length);
 }
 
 function wireTools() {
   byId("refine").onclick = () => change(next => set(next, "refine.vary", get(next, "refine.vary")?.length ? undefined : ["taper"]));
   byId("erection").onclick = () => change(next => set(next, "checks.stages", (get(next, "checks.stages") ?? DEPLOYMENT) ? 0 : DEPLOYMENT));
   const dialog = byId("load-values"), form = dialog.querySelector("form");
-  byId("loads").onclick = () => dialog.showModal();
+  byId("loads").onclick = showLoads;
   form.onsubmit = ({ submitter }) => {
     if (submitter.value === "check") checkLoads(form.elements);
     else change(next => { delete next.loads; delete next.combinations; });
   };
 }
 
-function post(message) {
-  sent = message.serial;
-  socket.send(JSON.stringify(message));
+function post() {
+  if (!waiting || socket?.readyState !== WebSocket.OPEN) return;
+  socket.send(JSON.stringify(waiting));
+  waiting = null;
 }
 
 function order(message) {
@@ -91,7 +130,7 @@ function connect() {
   socket = new WebSocket(`${scheme}://${location.host}/api/sessions/${session}/live`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
-  socket.onopen = () => { sent = 0; };
+  socket.onopen = post;
   socket.onclose = ({ code }) => {
     if (code === 4404) { localStorage.removeItem("rodshell-session"); return open(); }
     say("The server does not answer; trying again", true);
@@ -114,11 +153,6 @@ async function open() {
 
 function hear(news) {
   if (news.kind === "session") return restore(news);
-  if (news.kind === "taken" && news.serial >= sent) {
-    sent = 0;
-    if (waiting) { const next = waiting; waiting = null; post(next); }
-    return;
-  }
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
   if (news.kind === "stage" && news.serial >= shown) {
     shown = news.serial;
@@ -129,7 +163,6 @@ function hear(news) {
   }
   if (news.kind === "done" && news.serial === serial) say("");
   if (news.kind === "failed" && (news.serial === serial || news.serial < 0 || !news.serial)) failed(news.sentence);
-  if (news.kind === "failed" && news.serial >= sent) sent = 0;
 }
 
 function see(bytes) {
@@ -146,6 +179,7 @@ function restore(state) {
   const from = state.cases[state.at];
   byId("undo").disabled = state.at <= 0;
   byId("redo").disabled = state.at >= state.cases.length - 1;
+  byId("tries").hidden = state.cases.length > 2;
   showVariants();
   if (restore.known && JSON.stringify(from) === JSON.stringify(base)) return;
   const linked = restore.known ? null : restore.linked;
@@ -181,7 +215,6 @@ function showFacts() {
     byId("download").removeAttribute("aria-disabled");
     byId("download").href = `/api/sessions/${session}/files.zip`;
   } else {
-    box.classList.add("old");
     byId("download").setAttribute("aria-disabled", "true");
     if (facts.status !== "converged") box.replaceChildren(make("strong", { textContent: facts.status }));
   }
@@ -191,7 +224,10 @@ function showFacts() {
 
 // Controls
 
+let typing = false, stale = false;  // while somebody types or drags in a control it is not made anew
+
 function buildControls() {
+  const focused = document.activeElement?.dataset.path;
   const open = gui ? gui.foldersRecursive().filter(folder => !folder._closed).map(folder => folder._title) : ["Design"];
   gui?.destroy();
   gui = new GUI({ container: byId("controls"), injectStyles: false, title: "Case" });
@@ -202,14 +238,16 @@ function buildControls() {
     if (!known.some(key => key.path === path)) continue;
     addSlider(design, path, name, kind);
   }
-  for (const path of FIRST) addKey(design, known.find(key => key.path === path));
-  const tables = [...new Set(known.map(key => key.path.split(".")[0]))];
+  for (const [path, name] of FIRST) addKey(design, known.find(key => key.path === path), name);
+  const tables = [...new Set(known.filter(key => key.path.includes(".")).map(key => key.path.split(".")[0]))];
   for (const table of tables) {
     const folder = gui.addFolder(`[${table}]`);
     for (const key of known.filter(({ path }) => path.startsWith(`${table}.`))) addKey(folder, key);
     folder.close();
   }
   for (const folder of gui.foldersRecursive()) if (open.includes(folder._title)) folder.open();
+  typing = stale = false;
+  if (focused) byId("controls").querySelector(`[data-path="${focused}"]`)?.focus();
 }
 
 function value(path) {
@@ -226,7 +264,7 @@ function addSlider(folder, path, name, kind) {
   const small = kind !== "angle" && (facts?.handles?.size || resolved?.target?.radius || now) < 1;
   const unit = kind === "angle" ? 180 / Math.PI : kind === "factor" ? 1 : small ? 1000 : 1;
   const size = (facts?.handles?.size || 1) * unit;
-  const [low, high] = kind === "angle" ? [-90, 90] : kind === "place" ? [now * unit - 0.5 * size, now * unit + 0.5 * size] : [now * unit / 4, now * unit * 4];
+  const [low, high] = range(path, now * unit, kind === "angle" ? [-90, 90] : kind === "place" ? [now * unit - 0.5 * size, now * unit + 0.5 * size] : [now * unit / 2, now * unit * 2]);
   const holder = { value: now * unit };
   const symbol = kind === "angle" ? "\u00b0" : kind === "factor" ? "" : small ? "mm" : "m";
   const step = kind === "angle" ? 0.5 : 10 ** Math.floor(Math.log10((high - low) / 400));
@@ -237,15 +275,23 @@ function addSlider(folder, path, name, kind) {
   const controller = folder.add(holder, "value", low, high, step).name(symbol ? `${name} [${symbol}]` : name);
   controller.onChange(() => put(true)).onFinishChange(() => put(false));
   describe(controller, path, start.keys.find(key => key.path === path).help);
-  controller.read = () => { const fresh = value(path) * unit; if (Number.isFinite(fresh) && Math.abs(fresh - holder.value) > 1e-9 * Math.abs(fresh)) { holder.value = fresh; controller.updateDisplay(); } };
 }
 
-function addKey(folder, key) {
+// A slider keeps its range until its value comes near an end of it.
+const ranges = new Map();
+
+function range(path, now, wanted) {
+  const [low, high] = ranges.get(path) || wanted, near = 0.04 * (high - low);
+  ranges.set(path, now < low + near || now > high - near ? wanted : [low, high]);
+  return ranges.get(path);
+}
+
+function addKey(folder, key, label = "") {
   if (!key) return;
   const raw = get(base, key.path);
   const text = raw === undefined ? "" : typeof raw === "string" ? raw : JSON.stringify(raw);
   const holder = { value: text };
-  const name = key.path.split(".").slice(1).join(".");
+  const name = label || key.path.split(".").slice(1).join(".");
   const given = get(resolved, key.path), shownAs = Array.isArray(given) ? given.join(", ") : String(given ?? "default");
   const choices = { [`default: ${shownAs}`]: "", ...Object.fromEntries(key.choices.map(word => [word, String(word)])) };
   const controller = key.choices.length && !key.any_value ? folder.add(holder, "value", choices) : folder.add(holder, "value");
@@ -272,13 +318,21 @@ function forget(next, path) {
 
 function describe(controller, path, help) {
   controller.domElement.title = `${path}: ${help}`;
-  for (const input of controller.domElement.querySelectorAll("input, select")) input.setAttribute("aria-label", `${controller._name}: ${help}`);
+  for (const input of controller.domElement.querySelectorAll("input, select")) {
+    input.setAttribute("aria-label", `${controller._name}: ${help}`);
+    input.dataset.path = path;
+  }
   for (const part of controller.domElement.querySelectorAll(".lil-slider")) part.setAttribute("aria-hidden", "true");
 }
 
 function refreshControls() {
-  if (!byId("controls").contains(document.activeElement)) return buildControls();
-  for (const controller of gui.controllersRecursive()) controller.read?.();
+  stale = true;
+  if (!typing) buildControls();
+}
+
+function settled() {
+  typing = false;
+  if (stale) setTimeout(refreshControls);
 }
 
 // The flat plan
@@ -321,7 +375,7 @@ function markRod(id) {
   byId("plan").querySelector("figcaption").textContent = rod ? `${id}: cut length ${size}. Click to leave it out.` : "Point at a rod; a click leaves it out.";
 }
 
-// Handles in the scene: a dot for the anchor, a ring with a knob for the heading
+// Handles in the scene: a dot for the anchor, a ring with a knob for the heading, a cone each way for the base plane
 
 const handles = { group: null, held: null };
 
@@ -340,20 +394,33 @@ function placeHandles() {
   handles.group = null;
   const known = facts?.handles;
   if (!known || handles.held) { if (!known) return; }
+  const ink = matchMedia("(prefers-color-scheme: dark)").matches ? 0x7db6df : 0x1f5f8b;
   const group = new THREE.Group(), radius = 0.32 * known.size / viewer.scene.size;
   const paint = (colour, always = true) => new THREE.MeshBasicMaterial({ color: colour, depthTest: !always, transparent: true, opacity: 0.92 });
   const dot = new THREE.Mesh(new THREE.SphereGeometry(0.013, 24, 16), paint(0xffffff));
-  const rim = new THREE.Mesh(new THREE.SphereGeometry(0.016, 24, 16), paint(0x1f5f8b));
+  const rim = new THREE.Mesh(new THREE.SphereGeometry(0.016, 24, 16), paint(ink));
   rim.renderOrder = 8;
   dot.renderOrder = 9;
-  const ring = new THREE.Mesh(new THREE.TorusGeometry(radius, 0.0022, 8, 96), paint(0x1f5f8b));
-  const knob = new THREE.Mesh(new THREE.SphereGeometry(0.014, 24, 16), paint(0x1f5f8b));
+  const ring = new THREE.Mesh(new THREE.TorusGeometry(radius, 0.0022, 8, 96), paint(ink));
+  const knob = new THREE.Mesh(new THREE.SphereGeometry(0.014, 24, 16), paint(ink));
   const turn = typeof known.heading === "number" ? known.heading : 0;
   knob.position.set(radius * Math.cos(turn), radius * Math.sin(turn), 0);
   for (const part of [ring, knob]) part.renderOrder = 7;
   group.add(rim, dot, ring, knob);
-  group.position.copy(toScene(known.anchor));
-  Object.assign(handles, { group, dot, knob });
+  const centre = toScene(known.anchor), plane = known.base && new THREE.Group();
+  if (plane) {
+    for (const way of [1, -1]) {
+      const cone = new THREE.Mesh(new THREE.ConeGeometry(0.013, 0.03, 20), paint(ink));
+      cone.rotation.x = way * Math.PI / 2;
+      cone.position.z = way * 0.021;
+      cone.renderOrder = 7;
+      plane.add(cone);
+    }
+    plane.position.copy(toScene(known.base)).sub(centre);
+    group.add(plane);
+  }
+  group.position.copy(centre);
+  Object.assign(handles, { group, dot, knob, plane });
   viewer.world.add(group);
   viewer.redraw();
 }
@@ -378,7 +445,7 @@ function wireHandles() {
   const canvas = viewer.canvas;
   canvas.addEventListener("pointerdown", event => {
     if (!handles.group || drawing) return;
-    handles.held = screenDistance(handles.dot, event) < 16 ? "anchor" : screenDistance(handles.knob, event) < 16 ? "heading" : null;
+    handles.held = [["anchor", "dot"], ["heading", "knob"], ["base", "plane"]].find(([, part]) => handles[part] && screenDistance(handles[part], event) < 16)?.[0];
     if (!handles.held) return;
     viewer.orbit.enabled = false;
     canvas.setPointerCapture(event.pointerId);
@@ -400,6 +467,11 @@ function dragged(event, live) {
     const place = onTarget(event);
     if (place) handles.last = toMetres(place).slice(0, 2).map(value => Number(value.toPrecision(6)));
     if (handles.last) change(next => set(next, "drape.anchor", handles.last), live);
+  } else if (handles.held === "base") {
+    const at = handles.plane.getWorldPosition(new THREE.Vector3()), facing = viewer.camera.position.clone().sub(at).setZ(0).normalize();
+    const wall = new THREE.Plane().setFromNormalAndCoplanarPoint(facing, at), place = ray(event).ray.intersectPlane(wall, new THREE.Vector3());
+    if (place) handles.level = Number(toMetres(place)[2].toPrecision(4));
+    if (handles.level !== undefined) change(next => set(next, "target.base", handles.level), live);
   } else {
     const level = new THREE.Plane(new THREE.Vector3(0, 0, 1), -centre.z), place = ray(event).ray.intersectPlane(level, new THREE.Vector3());
     if (place) handles.turn = Number(Math.atan2(place.y - centre.y, place.x - centre.x).toFixed(4));
@@ -539,6 +611,14 @@ function wire() {
   byId("python").onclick = () => { byId("script").querySelector("pre").textContent = script(); byId("script").showModal(); };
   for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button").onclick = () => dialog.close();
   wireTools();
+  const controls = byId("controls");
+  for (const begin of ["input", "pointerdown"]) controls.addEventListener(begin, () => { typing = true; });
+  for (const end of ["change", "focusout"]) controls.addEventListener(end, settled);
+  addEventListener("pointerup", ({ target }) => { if (!target.closest?.("input, select")) settled(); });
+  controls.addEventListener("keydown", ({ key, target }) => {  // Enter takes the focus away: Tab would begin anew
+    const { path } = target.dataset;
+    if (key === "Enter" && path) requestAnimationFrame(() => controls.querySelector(`[data-path="${path}"]`)?.focus());
+  }, true);  // lil-gui lets no key through
   byId("seam").onclick = startSeam;
   byId("unseam").onclick = () => change(next => set(next, "seams.lines", undefined));
   byId("keep").onsubmit = event => { event.preventDefault(); order({ kind: "keep", name: byId("name").value || facts?.name || "variant" }); byId("name").value = ""; };
@@ -546,11 +626,11 @@ function wire() {
   addEventListener("keydown", event => {
     if (drawing && event.key === "Enter") { event.preventDefault(); endSeam(); }
     if (drawing && event.key === "Escape") { drawing = []; startSeam(); }
-    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && !event.target.closest("input")) {
+    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && !(typing && event.target.closest("input"))) {
       event.preventDefault();
       order({ kind: "step", by: event.shiftKey ? 1 : -1 });
     }
-  });
+  }, true);
   const plan = byId("plan");
   plan.addEventListener("pointerover", ({ target }) => { const id = target.dataset?.rod; if (id) { markRod(id); viewer.select("rod", id); } });
   plan.addEventListener("click", ({ target }) => { if (target.dataset?.rod) toggle(target.dataset.rod); });

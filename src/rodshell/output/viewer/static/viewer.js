@@ -43,8 +43,8 @@ export function createViewer(root, { controls = true } = {}) {
   const reset = make("button", { type: "button", textContent: "Reset view" });
   const picked = make("div", { className: "picked", ariaLive: "polite" });
   const panel = make("div", { className: "controls" },
-    make("label", {}, "Stage ", slider), play, caption, make("label", {}, "Colour ", choice), bar,
-    ...LAYERS.map(([name, text]) => make("label", { className: `layer ${name}` }, boxes[name], ` ${text}`)), reset);
+    make("label", {}, "Stage ", slider), play, reset, caption, make("label", {}, "Colour ", choice), bar,
+    ...LAYERS.map(([name, text]) => make("label", { className: `layer ${name}` }, boxes[name], ` ${text}`)));
   panel.hidden = !controls;
   root.replaceChildren(make("div", { className: "stage" }, canvas, label), panel, picked);
 
@@ -111,26 +111,30 @@ export function createViewer(root, { controls = true } = {}) {
     later();
   }
 
-  // The last stage and the target fill the picture, seen from the south-east.
+  // The stage and the target fill the picture, seen from the south-east.
   function home() {
-    const points = [scene.points.at(-1), ...(geometry.target ? [geometry.target.geometry.attributes.position.array] : [])];
+    const points = [scene.points[+slider.value], ...(geometry.target ? [geometry.target.geometry.attributes.position.array] : [])];
     const low = [1, 1, 1], high = [-1, -1, -1], place = new THREE.Vector3();
     for (const part of points) part.forEach((value, k) => { low[k % 3] = Math.min(low[k % 3], value); high[k % 3] = Math.max(high[k % 3], value); });
     const radius = 0.5 * Math.hypot(...low.map((value, axis) => high[axis] - value));
     orbit.target.set(...low.map((value, axis) => 0.5 * (value + high[axis])));
     camera.aspect = canvas.clientWidth / Math.max(canvas.clientHeight, 1);
+    const right = new THREE.Vector3(), up = new THREE.Vector3();
     let distance = 4 * radius;
-    for (let round = 0; round < 4; round++) {
+    for (let round = 0; round < 5; round++) {
       camera.position.set(0.42, -0.79, 0.45).multiplyScalar(distance).add(orbit.target);
       camera.lookAt(orbit.target);
       camera.updateProjectionMatrix();
       camera.updateMatrixWorld();
-      let extent = 0;
+      const seen = { low: [1e9, 1e9], high: [-1e9, -1e9] };
       for (const part of points) for (let k = 0; k < part.length; k += 3) {
         place.fromArray(part, k).project(camera);
-        extent = Math.max(extent, Math.abs(place.x), Math.abs(place.y));
+        [place.x, place.y].forEach((value, axis) => { seen.low[axis] = Math.min(seen.low[axis], value); seen.high[axis] = Math.max(seen.high[axis], value); });
       }
-      distance *= extent / 0.9;
+      const [x, y] = seen.low.map((value, axis) => 0.5 * (value + seen.high[axis])), half = distance * Math.tan(0.5 * camera.fov * Math.PI / 180);
+      camera.matrixWorld.extractBasis(right, up, place);
+      orbit.target.addScaledVector(right, x * half * camera.aspect).addScaledVector(up, y * half);
+      distance *= Math.max(...seen.low.map((value, axis) => 0.5 * (seen.high[axis] - value))) / 0.88;
     }
     orbit.minDistance = 0.05 * radius;
     orbit.maxDistance = 20 * radius;

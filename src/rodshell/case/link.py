@@ -1,0 +1,95 @@
+"""A case as tables that a page of the studio can hold, and the link that opens it there."""
+
+import json
+import re
+import zlib
+from base64 import urlsafe_b64encode
+from pathlib import Path
+from typing import Any
+
+from rodshell.case.case import Case
+from rodshell.case.load import BY_SUFFIX, FILE_KEYS
+from rodshell.errors import InputError
+from rodshell.units import shown
+
+ADDRESS = "http://127.0.0.1:8731/"  # of `rodshell studio` without options
+UPLOAD = "upload:"  # before the name of a file that was uploaded, where a case names a file
+UPLOADS = (*(suffix for suffix in BY_SUFFIX if suffix != ".gltf"), ".dxf")  # a .gltf names further files
+
+
+def studio_link(case: Case, *, address: str = ADDRESS) -> str:
+    """The link that opens a case in the studio, which `rodshell studio` must be running: ADDRESS#case=CODE.
+
+    CODE is the case as JSON, compressed (raw deflate) and written in base64 for URLs without padding. It holds no
+    files: a case that names some opens in a studio that was started with them, and is refused by others in a sentence.
+
+    Parameters
+    ----------
+    case : of a job.
+    address : of the studio, as it prints it.
+
+    Raises
+    ------
+    InputError : the case holds an object that no case file can describe, or is about a table of rods.
+    """
+    text = json.dumps(page_case(case)[0], separators=(",", ":"))
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    packed = packer.compress(text.encode()) + packer.flush()
+    return f"{address}#case={urlsafe_b64encode(packed).decode().rstrip('=')}"
+
+
+def page_case(case: Case) -> tuple[dict[str, Any], dict[str, Path]]:
+    """What differs from a case without keys, in tables as in a case file; files as uploads, with their paths by name.
+
+    Parameters
+    ----------
+    case : of a job.
+
+    Raises
+    ------
+    InputError : as of `studio_link`; also a file of a kind that the studio does not read.
+    """
+    if case.of_table:
+        raise InputError("the studio finds forms on a target: it does not open a table of rods")
+    for name, held in case.held_objects.items():
+        if not held.writable:
+            raise InputError(f"the studio cannot hold {held.what} ({name}): it opens what a case file can describe")
+    rooted = case.absolute()
+    full, short = (rooted.model_dump(mode="json", exclude_none=True, exclude_defaults=only) for only in (False, True))
+    tables: dict[str, Any] = _with_kinds({"target": {}} | short, full)
+    paths = dict[str, Path]()
+    for table, keys in FILE_KEYS.items():
+        for key in keys:
+            if (path := tables.get(table, {}).get(key)) is not None:
+                name = upload_name(path)
+                paths[name] = Path(path)
+                tables[table][key] = UPLOAD + name
+    return tables, paths
+
+
+def upload_name(name: str) -> str:
+    """A plain file name for an upload.
+
+    Parameters
+    ----------
+    name : as the browser gave it.
+
+    Raises
+    ------
+    InputError : not the name of a file that the studio reads.
+    """
+    plain = re.sub(r"[^\w.() -]", "_", name.replace("\\", "/").rpartition("/")[2]).strip(". ")[-100:]
+    suffix = Path(plain).suffix.lower()
+    if suffix not in UPLOADS or not Path(plain).stem:
+        raise InputError(f"{shown(name)}: the studio reads {', '.join(UPLOADS)}")
+    return plain
+
+
+def _with_kinds(short: Any, full: Any) -> Any:
+    """A dump without defaults, its tables with their kinds: these decide what the other keys are."""
+    if isinstance(short, dict):
+        kind = {"kind": full["kind"]} if "kind" in full else {}
+        return kind | {name: _with_kinds(value, full[name]) for name, value in short.items()}
+    if isinstance(short, list):
+        return [_with_kinds(*pair) for pair in zip(short, full, strict=True)]
+    return short

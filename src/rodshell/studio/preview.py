@@ -1,0 +1,165 @@
+"""What the page shows of a form while it is being found: made from its stages, without the records of a result.
+
+An update while somebody drags costs little more than net and drape.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+from math import degrees
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodshell.arrays import Floats, Ints
+from rodshell.formfinding.patches import PatchedForm
+from rodshell.layout import GridMesh
+from rodshell.output.colour_scale import Colour, gap_scale
+from rodshell.output.grid import CAPTIONS, Shape
+from rodshell.output.models import section_outline
+from rodshell.output.viewer.scene import Coloured, Drawn
+from rodshell.results import wording
+from rodshell.results.from_form import rod_type
+from rodshell.targets import Target
+from rodshell.targets.surface_mesh import BEYOND, surface_mesh
+
+if TYPE_CHECKING:
+    from rodshell.form import Form
+
+Figures = list[tuple[str, str]]
+Surface = tuple[NDArray[np.float32], Ints]  # points [m] and triangles
+
+
+class Preview:
+    """Shows forms one after the other; the triangles of a target are kept while shells lie on the same part of it."""
+
+    def __init__(self) -> None:
+        self._target: Target | None = None
+        self._around = np.zeros((2, 2))  # lowest and highest x, y of the shell for which the triangles were made
+        self._surface: tuple[NDArray[np.float32], Ints] = (
+            np.zeros((0, 3), dtype=np.float32),
+            np.zeros((0, 3), dtype=np.intp),
+        )
+
+    def of(self, form: "Form") -> tuple[dict[str, Any], bytes]:
+        """Facts and scene of a form.
+
+        Parameters
+        ----------
+        form : of a target; with or without popped-up shells.
+        """
+        facts = {
+            "name": form.case.drawings.name or form.target.name,
+            "status": form.status,
+            "warnings": list(form.warnings),
+            "figures": figures(form),
+            "plan": plan(form),
+            "handles": handles(form),
+        }
+        return facts, self._scene(form)
+
+    def _scene(self, form: "Form") -> bytes:
+        mesh, draped, target = form.footprint.mesh, form.boundary.draped, form.target
+        if draped is None:
+            return b""
+        gaps = target.gap(draped).distance - mesh.heights
+        worst = int(np.abs(gaps).argmax())
+        where, largest = {"draped": draped[worst]}, {"draped": abs(float(gaps[worst]))}
+        shapes = [Shape("draped", CAPTIONS["draped"], draped, gaps), Shape("flat", CAPTIONS["flat"], mesh.flat)]
+        for ends, shell in form.popped.items():
+            name, found = f"popped_{ends}", form.agreement.get(ends)
+            shapes.append(Shape(name, CAPTIONS[name], shell.positions, None if found is None else found.gaps))
+            if found is not None:
+                where[name], largest[name] = np.array(found.where), found.max
+        rounding, top = rounding_of(form), 1e3 * max(largest.values())
+
+        def colours(shape: Shape) -> dict[Colour, Coloured]:
+            if shape.gap is None:
+                return {}
+            words = wording.millimetres(largest[shape.name], rounding=rounding)
+            return {"gap": Coloured(gap_scale(shape.gap[mesh.rod_nodes], top), where[shape.name], words)}
+
+        drawn = Drawn(
+            form.case.drawings.name or target.name,
+            [(rod.name, rod.family) for rod in mesh.grid.rods],
+            mesh.rod_nodes,
+            mesh.rod_stop - mesh.rod_start,
+            *_joints(mesh),
+            [(shape, colours(shape)) for shape in shapes],
+            partial(section_outline, rod_type(form.rod).section),
+            self._surface_under(target, draped),
+        )
+        return drawn.scene().content()
+
+    def _surface_under(self, target: Target, draped: Floats) -> Surface:
+        box = np.array([draped[:, :2].min(axis=0), draped[:, :2].max(axis=0)])
+        room = 0.5 * BEYOND * float(np.ptp(box, axis=0).max())
+        if target is not self._target or np.abs(box - self._around).max() > room:
+            points, faces = surface_mesh(target, draped)
+            self._target, self._around, self._surface = target, box, (points.astype(np.float32), faces)
+        return self._surface
+
+
+def figures(form: "Form") -> Figures:
+    """Figures of a form in words, by their names."""
+    rods, rounding = form.footprint.rods, rounding_of(form)
+    stages = form.stages
+    nets = [laid.net for laid in stages.patch_nets.values()] if isinstance(stages, PatchedForm) else [stages.draped.net]
+    angles = [net.min_angle for net in nets if net is not None]
+    return lengths([rod.length for rod in rods], rounding) + [
+        *(("smallest angle between rods", wording.degrees(degrees(min(angles)))) for _ in angles[:1]),
+        *(gap(ends, found.max, found.max_relative, rounding) for ends, found in form.agreement.items()),
+    ]
+
+
+def lengths(found: list[float], rounding: wording.Rounding) -> Figures:
+    """How many rods there are, and how long they are [m]."""
+    rows = [("rods", str(len(found))), ("all rods together", f"{sum(found):.4g} m")]
+    return rows + [("longest rod", wording.millimetres(max(found), 5, rounding)) for _ in found[:1]]
+
+
+def gap(ends: str, largest: float | None, relative: float | None, rounding: wording.Rounding) -> tuple[str, str]:
+    """The largest gap of a shell [m], and over the target's size."""
+    shown = wording.millimetres(largest, rounding=rounding)
+    return f"largest gap, {ends}", f"{shown} ({wording.percent(relative)} of the size)"
+
+
+def rounding_of(form: "Form") -> wording.Rounding:
+    """How finely lengths of a form are shown."""
+    longest = max((rod.length for rod in form.footprint.rods), default=0.0)
+    return wording.rounding_to(form.options.drawings.tolerance, longest)
+
+
+def plan(form: "Form") -> list[dict[str, Any]]:
+    """The flat grid: rods by name with both ends (x, y) and the cut length [m]."""
+    mesh, allowance = form.footprint.mesh, form.options.fabrication.end_allowance
+    ends = mesh.flat[mesh.ends.ravel(), :2].reshape(-1, 4).tolist()
+    return [
+        {"id": rod.name, "family": rod.family, "ends": both, "length": rod.length + 2 * allowance}
+        for rod, both in zip(mesh.grid.rods, ends, strict=True)
+    ]
+
+
+def handles(form: "Form") -> Mapping[str, Any] | None:
+    """Where the handles of anchor, heading and base plane stand; None for a form in patches."""
+    if form.seams:
+        return None
+    anchor = form.case.drape.anchor or form.target.summit
+    place = form.target.lift(np.array([anchor], dtype=float))[0]
+    found = {"anchor": place.tolist(), "heading": form.layout.rotate, "size": form.target.size}
+    if "base" in type(form.case.target).model_fields:  # its plane can be moved
+        ends = form.boundary.points
+        found["base"] = ends[int(ends[:, 0].argmax())].tolist()
+    return found
+
+
+def _joints(mesh: GridMesh) -> tuple[list[str], Ints]:
+    """Ids of all joints, and the entry of `rod_nodes` (c, 2) of each on either rod; the first rod is named first."""
+    rods, count = mesh.grid.crossings.rods, mesh.node_count
+    key = np.repeat(np.arange(len(mesh.rod_start)), mesh.rod_stop - mesh.rod_start) * count + mesh.rod_nodes
+    order = np.argsort(key, kind="stable")
+    entries = order[np.searchsorted(key[order], rods * count + mesh.joint_pairs)]
+    names = [rod.name for rod in mesh.grid.rods]
+    second = rods[:, 0] > rods[:, 1]
+    rods, entries = (np.where(second[:, None], pairs[:, ::-1], pairs) for pairs in (rods, entries))
+    return [f"{names[a]}/{names[b]}" for a, b in rods.tolist()], entries
