@@ -30,7 +30,8 @@ def fixed_forces(stages: PatchForm | PatchedForm, ends: Ends, loads: Loads, comb
 
     Raises
     ------
-    InputError : the form is in patches, braced, or has joints that are locked; a load is not a force; the rods have no mass.
+    InputError : the form is in patches, braced, or has joints that are locked; a load is not a force; the rods have
+        no mass.
     """
     wish = f"refine.under = {shown(combination)}"
     if isinstance(stages, PatchedForm):
