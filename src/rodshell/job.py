@@ -29,10 +29,9 @@ from rodshell.formfinding.search import Objective
 from rodshell.joints import Ball, Joint, require_joint
 from rodshell.layout import FlatGrid, GridLayout
 from rodshell.output.options import OutputOptions
-from rodshell.results.archive import read_inputs
 from rodshell.results.folder import reading
 from rodshell.rods.section import Rod
-from rodshell.run import Announce, Run
+from rodshell.run import Announce, Run, inputs_of
 from rodshell.targets import Target
 from rodshell.units import length_text, shown
 from rodshell.validation import choice, choices_of, file_path, instance, point
@@ -111,7 +110,7 @@ class Job:
             objective=choice("objective", objective, get_args(Objective)), ends=_ends(ends),
             seams=seams, patches=patches or {}, options=options or OutputOptions(),
         )  # fmt: skip
-        self._set(case, target, read_inputs(case.text()))
+        self._set(case, target, inputs_of(case))
 
     @classmethod
     def load(

@@ -70,8 +70,7 @@ class Run:
         self.pops_up = pops_up
         self.asked, self.target, self.progress = case, target, progress
         self.announce, self.frames_in = announce, frames_in
-        named = read_inputs(case.text()) if inputs is None and case.files else {}
-        self.inputs = named if inputs is None else dict(inputs)
+        self.inputs = inputs_of(case) if inputs is None else dict(inputs)
         self.options = case.output_options()
         self.earlier = warm_start
         if warm_start is not None and warm_start.from_table != case.of_table:
@@ -250,6 +249,11 @@ class Run:
             why = fit().reason(rod.section, rod.material, strength=strength, shape=self.asked.rod.shape)
             said += f", {why}"
         self.announce(said)
+
+
+def inputs_of(case: Case) -> dict[str, bytes]:
+    """What the files that a case names hold, by their path in its text."""
+    return read_inputs(case.text()) if case.files else {}
 
 
 def _same_drapes(now: Stages, before: Stages) -> bool:
