@@ -179,7 +179,7 @@ def test_a_process_that_never_starts_ends_the_sweep_after_one_more_try(
     noted = process(start=f"noted('s'); {act}")
     monkeypatch.setattr(watched, "PATIENCE", patience)
     with pytest.raises(rs.RodshellError, match=f"a process for jobs cannot be started: .*{why}") as error:
-        rs.sweep(plan(), tmp_path / "out")
+        rs.sweep(plan(axes={"layout.spacing": ["80 mm"]}), tmp_path / "out")
     assert "\n" not in str(error.value)
     assert noted.read_text() == "ss"
 

@@ -17,7 +17,6 @@ from math import sqrt
 
 import numpy as np
 from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
@@ -304,6 +303,8 @@ class ArcLength:
         if size <= SMALL:
             row = np.linalg.eigh(np.array([inverse(unit) for unit in np.eye(size)]))[1][:, 0]
         else:
+            from scipy.sparse.linalg import LinearOperator, eigsh  # here, as forms without checks do not need it
+
             start = np.sin(1.0 + np.arange(size) ** 2)
             operator = LinearOperator((size, size), matvec=inverse, dtype=float)
             row = eigsh(operator, k=1, which="SA", v0=start, tol=MODES_CLOSE)[1][:, 0]
