@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio ci-full house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -58,6 +58,11 @@ accept-house: ## print the table of results before and after, archives, misuses 
 
 accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1000 ten minutes)
 	python -m tests.acceptance.sweep --designs $(or $(DESIGNS),10000)
+
+ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000 for a shorter sweep)
+	.ci/run
+	$(MAKE) --keep-going accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
+		accept-house accept-loads accept-refine accept-sweep accept-studio
 
 house:     ## print figures of the source tree, before and after: files, circles of imports, types, documentation
 	python -m tests.acceptance.house_figures

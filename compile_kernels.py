@@ -82,6 +82,10 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
     class Kernels(CC):  # type: ignore[misc, unused-ignore]
         """A library of the kernels that are taken while it is compiled."""
 
+        def _get_extra_cflags(self) -> list[str]:
+            """Numba's C sources, which are compiled along, take twice as long by Python's own options, -O3 -g."""
+            return [*super()._get_extra_cflags(), *(["-O1", "-g0"] if os.name == "posix" else [])]
+
         def _get_extra_ldflags(self) -> list[str]:
             return [*super()._get_extra_ldflags(), *(["-s"] if sys.platform == "linux" else [])]  # without symbols
 
@@ -109,10 +113,50 @@ def compile_unit(folder: Path, level: str, unit: int, claims: Path) -> None:
     pythonapi._unboxers.functions[types.Array] = checked_array
     pythonapi.PythonAPI.get_c_object = c_object
     jit.kernels_are_kept = lambda: False
+    optimise_once()
     gc.disable()  # it takes a tenth of the time
     library = Kernels(library_name(level, unit), source_module="rodshell.kernels")
     library.output_dir, library.target_cpu = str(folder), level
     library.compile()
+
+
+def optimise_once() -> None:
+    """Let kernels that kernels call, and parts of Numba, be optimised once, in the library that they become part of:
+    Numba also compiles each on its own, for calls from Python, which takes a quarter of the time. Those that may
+    reassociate are optimised as Numba does it, since their bits depend on that."""
+    from numba import _dynfunc
+    from numba.core import codegen, dispatcher
+    from numba.core.registry import cpu_target
+    from numba.core.runtime import rtsys
+
+    def without_wrappers(_, flags):  # type: ignore[no-untyped-def]
+        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        return flags
+
+    def never_called(library, described, environment):  # type: ignore[no-untyped-def]
+        return _dynfunc.make_function(described.lookup_module(), described.qualname, "", 1, environment, (library,))
+
+    def reassociates(part):  # type: ignore[no-untyped-def]
+        return " reassoc " in str(part)
+
+    def prepare(library, part):  # type: ignore[no-untyped-def]
+        if reassociates(part):
+            optimise_functions(library, part)
+        part.data_layout = library._codegen._data_layout
+
+    def finish(library):  # type: ignore[no-untyped-def]
+        if library.name.startswith("compiled_") or reassociates(library._final_module):
+            optimise(library)
+
+    rtsys.initialize(cpu_target.target_context)  # what allocates memory is compiled, and called
+    dispatcher._FunctionCompiler._customize_flags = without_wrappers
+    cpu_target.target_context.get_executable = never_called
+    optimise_functions = codegen.CPUCodeLibrary._optimize_functions
+    optimise = codegen.CPUCodeLibrary._optimize_final_module
+    codegen.CPUCodeLibrary._optimize_functions = prepare
+    codegen.CPUCodeLibrary._optimize_final_module = finish
+    codegen.JITCodeLibrary._finalize_specific = lambda library: None
+    codegen.JITCPUCodegen._add_module = lambda code, module: None
 
 
 def source_of(module: str) -> Path:

@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from rodshell.loads.combinations import Loads, Stability
     from rodshell.loads.kinds import LineLoad, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
     from rodshell.loads.laths import Laths
+    from rodshell.loads.locked_joints import LockedJoints
     from rodshell.loads.strength import Strength
     from rodshell.model.elastic_rod import ElasticRod
     from rodshell.model.shell import Shell
@@ -115,6 +116,7 @@ _HOMES = {
     "rodshell.loads.combinations": ("Loads", "Stability"),
     "rodshell.loads.kinds": ("LineLoad", "PointLoad", "SelfWeight", "Settlement", "Snow", "Temperature", "Wind"),
     "rodshell.loads.laths": ("Laths",),
+    "rodshell.loads.locked_joints": ("LockedJoints",),
     "rodshell.loads.strength": ("Strength",),
     "rodshell.model.elastic_rod": ("ElasticRod",),
     "rodshell.model.shell": ("Shell",),
@@ -142,11 +144,11 @@ __all__ = [
     "Ellipsoid", "ExplicitForce", "ExplicitPenalty", "Fabrication", "Fall", "FlatGrid", "FlatRod", "Footprint", "Form",
     "Freeform", "GivenSection", "Gravity", "GravityForce", "GridLayout", "GridMesh", "HeightField", "Hemisphere",
     "ImplicitEuler", "ImplicitForce", "ImplicitPenalty", "InputError", "Job", "Laths", "LineLoad", "Linker", "Loads",
-    "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions", "Paraboloid",
-    "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle", "RectangularSection",
-    "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample", "SelfWeight",
-    "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Strength", "Target",
-    "Temperature",
+    "LockedJoints", "Material", "Motion", "NetLimitError", "OutOfTimeError", "OutputError", "OutputOptions",
+    "Paraboloid", "PatchLayout", "Pin", "Placement", "PointLoad", "PointLoads", "PopUp", "Profile", "Rectangle",
+    "RectangularSection", "Results", "Rigid", "Rod", "RodLoads", "RodShape", "RodSupports", "RodshellError", "Sample",
+    "SelfWeight", "Settlement", "SharedDofs", "Shell", "Snow", "Spring", "Stability", "StabilityError", "Strength",
+    "Target", "Temperature",
     "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "agreement", "bar", "chebyshev_net", "check", "check_loads",
     "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back", "mesh_grid", "optimise",
     "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "simulate", "solve_rod",

@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
     from rodshell.loads.check import LoadChecks
     from rodshell.loads.combinations import Loads
-    from rodshell.loads.strength import Limits, Strength
     from rodshell.refining.acceptance import Refined
 
 Stages = PatchForm | PatchedForm
@@ -203,6 +202,7 @@ class Form:
             final=shape,
             pattern=Pattern.of(getattr(self.case.bracing, "pattern", "both")),
             prestrain=getattr(self.case.bracing, "prestrain", None),
+            to_supports=getattr(self.case.bracing, "ends_at", "joints") == "supports",
         )
 
     @cached_property
@@ -389,7 +389,7 @@ class Form:
             results = with_seam_forces(results, self.stages, checks)
         results = checked_results(
             results, self.footprint.mesh, checks, self.fabrication,
-            limits=_limits(self, self.case.strength.build()), shear_strength=strengths.shear_strength,
+            limits=self.options.limits(self.rod, self.case.strength.build()), shear_strength=strengths.shear_strength,
             strength=strengths.strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
@@ -416,25 +416,11 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
 
     Raises
     ------
-    InputError : a load does not fit the form; the form is in patches, or comes from a table of rods.
+    InputError : a load does not fit the form; the form comes from a table of rods.
     """
     from rodshell.loads.check import check_shells  # most forms have no loads
     from rodshell.loads.combinations import Loads
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
-    if isinstance(form.stages, PatchedForm):
-        raise InputError("a form in patches cannot be checked under loads: leave out the seams, or the loads")
-    return check_shells(form.stages, loads, limits=_limits(form, loads.strength), progress=progress)
-
-
-def _limits(form: Form, asked: "Strength") -> "Limits":
-    """What a form's rods are judged by, with loads and without."""
-    from rodshell.loads.strength import Limits
-
-    judged_by = form.options.judged_by(form.rod)
-    return Limits.of(
-        form.rod, asked,
-        characteristic=judged_by.strength, of_preset=form.options.strength is None,
-        shear_weight=judged_by.shear_weight,
-    )  # fmt: skip
+    return check_shells(form.stages, loads, limits=form.options.limits(form.rod, loads.strength), progress=progress)

@@ -37,7 +37,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "refine": ("refine",),
     "checks": ("checks",),
     "fabrication": ("fabrication", "bracing"),
-    "loads": ("loads", "combinations", "stability", "strength"),
+    "loads": ("loads", "combinations", "locked_joints", "stability", "strength"),
     "files": ("drawings",),
 }
 """The stages of a job in their order, and the tables of the case that each brings in; those before it count too."""
@@ -70,8 +70,7 @@ class Run:
         self.pops_up = pops_up
         self.asked, self.target, self.progress = case, target, progress
         self.announce, self.frames_in = announce, frames_in
-        named = read_inputs(case.text()) if inputs is None and case.files else {}
-        self.inputs = named if inputs is None else dict(inputs)
+        self.inputs = inputs_of(case) if inputs is None else dict(inputs)
         self.options = case.output_options()
         self.earlier = warm_start
         if warm_start is not None and warm_start.from_table != case.of_table:
@@ -144,10 +143,16 @@ class Run:
             return earlier.refined
         from rodshell.refining.acceptance import refined  # it takes a tenth of a second to load, which few jobs need
 
-        table = case.refine
+        table, weight, forces = case.refine, float(case.refine.under == "weight"), None
+        ends = stages.ends[0] if table.ends is None else table.ends
+        loads = case.built_loads() if table.under in case.combination_names else None
+        if loads is not None and ends in stages.ends:
+            from rodshell.loads.fixed import fixed_forces
+
+            weight, forces = fixed_forces(stages, ends, loads, table.under)
         return refined(
-            stages, vary,
-            ends=table.ends, under_weight=table.under == "weight", start=table.start, progress=self.progress,
+            stages, vary, ends=ends, under_weight=weight, dead_loads=forces, span_error=table.tolerance,
+            start=table.start, progress=self.progress,
         )  # fmt: skip
 
     def _decided(self, case: Case, found: Built) -> tuple[Case, Built, Search | None]:
@@ -244,6 +249,11 @@ class Run:
             why = fit().reason(rod.section, rod.material, strength=strength, shape=self.asked.rod.shape)
             said += f", {why}"
         self.announce(said)
+
+
+def inputs_of(case: Case) -> dict[str, bytes]:
+    """What the files that a case names hold, by their path in its text."""
+    return read_inputs(case.text()) if case.files else {}
 
 
 def _same_drapes(now: Stages, before: Stages) -> bool:

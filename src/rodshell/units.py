@@ -22,6 +22,7 @@ Kind = Literal[
     "acceleration",
     "rotational stiffness",
     "force",
+    "moment",
     "bending stiffness",
     "section modulus",
     "mass",
@@ -108,6 +109,7 @@ _KINDS: dict[Kind, _Units] = {
     "rotational stiffness": _Units(
         "a rotational stiffness", '"0.5 N m/rad"', _factors("1 Nm/rad Nm", "1000 kNm/rad kNm", "0.001 Nmm/rad Nmm")
     ),
+    "moment": _Units("a moment", '"50 N m"', _factors("1 Nm", "1000 kNm", "0.001 Nmm")),
     "force": _Units("a force", '"5 kN"', _factors("1 N", "1000 kN", "1e6 MN", "4.4482216152605 lbf")),
     "bending stiffness": _Units(
         "a bending stiffness",

@@ -18,6 +18,7 @@ from rodshell.loads.kinds import LoadedNodes
 from rodshell.loads.structure import Structure
 from rodshell.loads.tributary import tributary_areas
 from rodshell.rods.cable import CableStretch
+from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load_path import load_path
 from rodshell.solve.modes import linear_buckling
@@ -84,6 +85,28 @@ def balance_rows() -> Iterator[Row]:
             off = max(np.abs(one.reaction_sum + one.load_sum).max() / np.linalg.norm(one.load_sum) for one in shells)
             note = f"{len(shells)} of combinations and ends"
             yield Row(NAMES[name], f"{words}: reactions off minus the loads", float(off), 1e-9, note=note)
+
+
+def locked_rows() -> Iterator[Row]:
+    """Pins tightened after erection: nothing changes until loads come, and then the shell resists shear."""
+    form = shell("paraboloid")
+    structure = Structure.erected(form.popped["pinned"], form.rod)
+    locked = rs.LockedJoints(shear=5e3).lock(structure)
+    again = find_equilibrium(locked.equilibrium.problem, locked.equilibrium.state, locked.equilibrium.forces)
+    moved = 1e3 * float(np.abs(again.state - structure.equilibrium.state).max())
+    yield Row(NAMES["paraboloid"], "joints locked at 5 kN m/rad: the shell moves", moved, 1e-6, "mm")
+    snow = rs.Loads(loads={"snow": rs.Snow(SNOW)}, combinations={"snow": {"snow": 1.0}})
+    free, tight = (
+        rs.check_loads(form, replace(snow, locked_joints=joints)).shells["snow"]["pinned"]
+        for joints in (None, rs.LockedJoints(shear=5e3))
+    )
+    assert free.limit_factor
+    assert tight.limit_factor
+    gain = free.limit_factor / tight.limit_factor
+    note = f"{free.limit_factor:.3f} and {tight.limit_factor:.3f} kN/m2"
+    yield Row(NAMES["paraboloid"], "snow: limit with free joints, over locked ones", gain, 0.8, note=note)
+    off = np.abs(tight.reaction_sum + tight.load_sum).max() / np.linalg.norm(tight.load_sum)
+    yield Row(NAMES["paraboloid"], "joints locked: reactions off minus the loads", float(off), 1e-9)
 
 
 def work_rows() -> Iterator[Row]:
@@ -192,6 +215,19 @@ VAULT = ROOF.replace('kind = "paraboloid"\nradius = 6.0\nheight = 3.0', MESH).re
 ROPES = (
     '[bracing]\nkind = "cables"\nsection = { kind = "circle", radius = 0.003 }\nmaterial = { youngs_modulus = 160e9 }\n'
 )
+PLANE = """[target]
+kind = "heightfield"
+formula = "1 + 0*x"
+domain = "rectangle"
+size = [8.0, 6.0]
+[layout]
+spacing = 1.5
+[pop_up]
+ends = "clamped"
+[rod]
+section = { kind = "rectangle", width = 0.035, height = 0.05 }
+material = { preset = "larch" }
+"""
 BAD = {
     "a negative load": (ROOF + TUBES, SNOWY.replace("0.5", "-0.5") + WINTER, "must not be negative"),
     "a load's unknown kind": (ROOF + TUBES, SNOWY.replace('"snow"\nv', '"hail"\nv') + WINTER, "loads.0.kind must be"),
@@ -208,6 +244,10 @@ BAD = {
     ),
     "strength without fibres": (ROOF + GIVEN, SNOWY + WINTER, "fibre"),
     "bracing across an opening": (VAULT + TUBES, SNOWY + WINTER + ROPES, "cross an opening"),
+    "locked joints that are balls": (
+        ROOF + TUBES, SNOWY + WINTER + '[locked_joints]\nshear = "2 kN m/rad"\n', "ball joints cannot be locked",
+    ),
+    "supports that leave a mechanism": (PLANE, SNOWY + WINTER, "turning about itself (a mechanism)"),
     "no such file": (ROOF + TUBES, None, "there is no such file"),
 }  # fmt: skip
 
@@ -243,5 +283,5 @@ def bad_rows() -> Iterator[Row]:
 
 
 def all_rows() -> Iterator[Row]:
-    for rows in (area_rows, cable_rows, bad_rows, work_rows, balance_rows, bare_rows, braced_rows):
+    for rows in (area_rows, cable_rows, bad_rows, work_rows, balance_rows, locked_rows, bare_rows, braced_rows):
         yield from rows()

@@ -76,7 +76,7 @@ def test_a_clamp_moment_is_the_energy_gained_where_it_turns() -> None:
 
 def test_out_of_equilibrium_nothing_balances() -> None:
     """The sums test the state: a shell that is not in equilibrium does not pass."""
-    from rodshell.checks.loads import reactions
+    from rodshell.checks.reactions import reactions
     from rodshell.solve.equilibrium import Problem, find_equilibrium
     from rodshell.solve.problem import Supports
 

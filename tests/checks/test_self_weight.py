@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import rodshell as rs
-from rodshell.checks import SelfWeight, self_weight
-from rodshell.checks.loads import weakest
+from rodshell.checks import SelfWeightCheck, self_weight
+from rodshell.checks.self_weight import weakest
 from rodshell.model import Shell
 from tests.checks.shells import ROD, dome
 
 
-def found(form: rs.Form) -> SelfWeight:
+def found(form: rs.Form) -> SelfWeightCheck:
     popped = form.popped["pinned"]
     return self_weight(popped.shell, popped.equilibrium)
 
@@ -72,10 +72,10 @@ def test_heavy_joints_leave_less_to_bear():
 
 
 def test_what_is_sewn_bears_as_little_as_its_weakest_patch():
-    strong, weak = SelfWeight(None, 1e-3, "none", 5), SelfWeight(0.7, None, "limit point", 9)
-    assert weakest([strong, weak]) == SelfWeight(0.7, None, "limit point", 14)
-    assert weakest([strong, strong]) == SelfWeight(None, 1e-3, "none", 10)
-    assert weakest([strong, SelfWeight(None, None, "no mass")]).limit == "no mass"
+    strong, weak = SelfWeightCheck(None, 1e-3, "none", 5), SelfWeightCheck(0.7, None, "limit point", 9)
+    assert weakest([strong, weak]) == SelfWeightCheck(0.7, None, "limit point", 14)
+    assert weakest([strong, strong]) == SelfWeightCheck(None, 1e-3, "none", 10)
+    assert weakest([strong, SelfWeightCheck(None, None, "no mass")]).limit == "no mass"
 
 
 def test_summary_and_result_say_both_kinds_of_ends():

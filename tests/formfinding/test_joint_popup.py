@@ -8,7 +8,7 @@ import pytest
 from numpy.linalg import norm
 
 import rodshell as rs
-from rodshell.checks.loads import joint_loads, reactions
+from rodshell.checks.reactions import joint_loads, reactions
 from rodshell.joints.crossings import RodNodes
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem, Supports

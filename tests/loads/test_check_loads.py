@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import rodshell as rs
 from rodshell.errors import InputError
+from rodshell.formfinding.popup import Ends
 from rodshell.layout.cells import diagonals
-from rodshell.loads.check import _load, tributary_of
+from rodshell.loads.check import _load, mechanism, tributary_of
 from rodshell.loads.kinds import LoadedNodes
 from rodshell.loads.structure import Structure
 from rodshell.solve.load_path import load_path
@@ -135,6 +137,31 @@ def test_final_state_and_energy_do_not_depend_on_the_order_of_fixed_loads() -> N
         assert elastic - unloaded.energy == pytest.approx(ways[0][1] - unloaded.energy, rel=1e-8)
 
 
+@pytest.mark.parametrize("pattern", ["both", "one"])
+def test_cables_to_the_supports_are_anchored_there(pattern: str) -> None:
+    """The same cables and more, whose pull the supports carry: forces balance with them and without loads."""
+    form = shell("tubes")
+    reach = rs.Cables(rod=ROPE, prestrain=5e-4, pattern=pattern, ends_at="supports")
+    inner = replace(reach, ends_at="joints")
+    loads = one(rs.Snow(100.0), stability=rs.Stability(modes=1))
+    found, less = (rs.check_loads(form, replace(loads, bracing=bracing)) for bracing in (reach, inner))
+    shells = found.shells["all"]["pinned"]
+    joints = len(form.footprint.mesh.grid.crossings)
+    at_supports = found.braced[:, 1] >= joints
+    np.testing.assert_array_equal(found.braced[~at_supports], less.braced)
+    assert at_supports.sum() > 0
+    assert np.abs(shells.reaction_sum + shells.load_sum).max() < 1e-9 * np.linalg.norm(shells.load_sum)
+    structure = Structure.erected(form.popped["pinned"], form.rod)
+    braced = reach.brace(structure, form.target)
+    places = np.vstack(
+        [structure.positions(structure.equilibrium)[form.footprint.mesh.joint_nodes], form.boundary.points]
+    )
+    lengths = np.linalg.norm(np.diff(places[braced.braced], axis=1)[:, 0], axis=1)
+    assert braced.bracing_mass.sum() == pytest.approx(lengths.sum() * ROPE.mass_per_length)
+    pulls = braced.support_forces(braced.equilibrium)
+    assert np.abs(pulls.sum_of_forces).max() < 1e-9 * np.abs(pulls.forces).max()
+
+
 def test_bracing_of_a_symmetric_shell_is_stressed_symmetrically() -> None:
     form = shell("tubes")
     found = rs.check_loads(form, one(rs.Snow(100.0), bracing=BRACED["cables"]))
@@ -194,6 +221,80 @@ def test_a_wrong_argument_is_refused_in_one_sentence(make: object, message: str)
         make()  # type: ignore[operator]
 
 
+def test_patches_carry_what_each_carries_alone() -> None:
+    """A cap cut in two: the limit is that of its weaker half, to what encloses it; loads have the sums of the whole."""
+    seam = [[[-12.0, 1.0], [12.0, 1.0]]]
+    both = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends="pinned", seams=seam)
+    loads = one(rs.Snow(20.0), stability=rs.Stability(modes=2))
+    found = rs.check_loads(both, loads).shells["all"]["pinned"]
+    assert found.load_sum[2] / found.at_factor == pytest.approx(-20.0 * 84 * pi, rel=1e-3)
+    assert np.abs(found.reaction_sum + found.load_sum).max() < 1e-9 * np.linalg.norm(found.load_sum)
+    forces = rs.Snow(20.0).forces(
+        LoadedNodes(both.popped["pinned"].positions, np.zeros(0), tributary_of(both.stages), 3.0)
+    )
+    limits, first = list[float](), 0
+    for patch in both.patches:
+        structure = Structure.erected(patch.popped["pinned"], TUBE)
+        count = structure.shell.node_count
+        alone = np.zeros((structure.size, 3))
+        alone[:count] = forces[first : first + count]
+        limits.append(load_path(structure.equilibrium, alone).factor)
+        first += count
+    assert first == len(forces)
+    assert found.limit_factor == pytest.approx(min(limits), rel=4e-3)  # each within 0.2 %
+    assert max(limits) > 1.05 * min(limits)
+
+
+@pytest.mark.slow
+def test_the_report_of_patches_says_that_their_seams_are_held(tmp_path: Path) -> None:
+    case = {
+        "target": {"kind": "cap", "radius": 10.0, "base": 4.0}, "layout": {"spacing": 3.0, "edge": 1.5},
+        "rod": {"section": {"kind": "tube", "radius": 0.021, "thickness": 0.0035}, "material": {"preset": "gfrp"}},
+        "pop_up": {"ends": "pinned"}, "checks": {"stages": 0}, "seams": {"lines": [[[-12.0, 1.0], [12.0, 1.0]]]},
+        "loads": [{"name": "snow", "kind": "snow", "value": "0.02 kN/m2"}],
+        "combinations": [{"name": "winter", "factors": {"snow": 1.0}}],
+        "bracing": {
+            "kind": "cables", "prestrain": 5e-4, "ends_at": "supports", "section": {"kind": "circle", "radius": 0.003},
+            "material": {"youngs_modulus": "160 GPa", "density": 7850},
+        },
+    }  # fmt: skip
+    form = rs.Job.load(case).run()
+    found = form.archive().results.loads["winter"]["pinned"]
+    assert len(found.bracing) == len(form.fabrication.bracing)
+    assert None not in found.bracing
+    assert len(found.support_forces) == 2 * len(form.footprint.rods)
+    folder = form.save(tmp_path / "out", kinds="report, csv")
+    assert "The seams between patches are held" in (folder / "report.html").read_text(encoding="utf-8")
+    rows = (folder / "schedule" / "bracing.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + len(found.bracing)
+
+
+PLANE = rs.HeightField(formula="1 + 0*x", domain=rs.Rectangle((8.0, 6.0)))
+
+
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+@pytest.mark.parametrize("edge", [0.75, 0.1])
+def test_straight_laths_on_ball_joints_are_a_mechanism(ends: Ends, edge: float) -> None:
+    """They turn about themselves without any moment, whatever holds their ends; by round-off alone pivots may be
+    zero, positive or negative. Pins hold them, and so does the least curvature."""
+    form = rs.find_form(PLANE, grid(1.5, edge), LARCH, ends=ends)
+    with pytest.raises(InputError, match=rf"with {ends} ends nothing keeps [UV]0\d from turning about itself"):
+        rs.check_loads(form, one(rs.Snow(10.0)))
+    vault = rs.HeightField(formula="1 - 0.08*y^2", domain=rs.Rectangle((8.0, 6.0)))
+    for target, joint in ((PLANE, rs.Pin()), (vault, None)):
+        held = rs.find_form(target, grid(1.5, edge), LARCH, ends=ends, joint=joint)
+        assert mechanism(Structure.erected(held.popped[ends], LARCH)) is None
+
+
+def test_a_load_across_a_plane_grid_has_no_buckling_factor() -> None:
+    """It bends the rods, and draws them in the second order only."""
+    form = rs.find_form(PLANE, grid(1.5, 0.75), TUBE, ends="pinned")
+    found = rs.check_loads(form, one(rs.Snow(10.0))).shells["all"]["pinned"]
+    assert found.linear_factor is None
+    assert found.limit_kind == "none"
+    assert found.max_deflection > 1e-3
+
+
 def test_rods_without_mass_have_no_weight_to_check() -> None:
     bare = rs.Rod(rs.GivenSection(EA=1e7, EI1=2e3, EI2=2e3, GJ=1e3))
     form = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), bare, ends="pinned")
@@ -237,3 +338,42 @@ def test_a_table_of_rods_has_no_areas() -> None:
     assert form is not table
     with pytest.raises(InputError, match="comes from a table of rods"):
         rs.check_loads(table, one(rs.Snow(1.0)))
+
+
+def test_frequencies_are_those_of_the_rods_mass_wherever_nodes_are() -> None:
+    """Against twice as many edges: of fourth order in bending; an added lump at each joint slows by its share."""
+    cap, found = rs.Cap(10.0, 4.0), []
+    for edge in (1.5, 0.75):
+        form = rs.find_form(cap, grid(3.0, edge), TUBE, ends="pinned")
+        found.append(rs.check_loads(form, one(rs.Snow(1.0), stability=rs.Stability(modes=4))).frequencies["pinned"])
+    assert len(found[1]) == 4
+    np.testing.assert_allclose(found[0], found[1], rtol=0.03)
+    rods = sum(rod.length for rod in form.footprint.rods) * TUBE.mass_per_length
+    lump = rods / len(form.footprint.mesh.grid.crossings)
+    heavy = rs.find_form(cap, grid(3.0, 0.75), TUBE, ends="pinned", joint=rs.Ball(mass=lump))
+    slower = rs.check_loads(heavy, one(rs.Snow(1.0))).frequencies["pinned"]
+    # as much mass again, where modes of the whole shell move: between none of it and twice it at the crests
+    assert np.sqrt(1 / 3) < slower[0] / found[1][0] < np.sqrt(1 / 2) * 1.05
+
+
+def test_frequencies_of_a_shell_are_those_of_its_stiffness_and_mass() -> None:
+    """A second way: all modes of both matrices by LAPACK, the mass of edges put together from elements of Hermite's
+    linear shape functions."""
+    form = shell("tubes")
+    structure = Structure.erected(form.popped["pinned"], form.rod)
+    tangent, model = structure.equilibrium.tangent, structure.shell
+    upper = tangent.pattern.upper(tangent.values).toarray()
+    stiffness = upper + upper.T - np.diag(upper.diagonal())
+    size = structure.size
+    mass = np.zeros((3 * size, 3 * size))
+    for (a, b), length in zip(model.stretch.blocks.tolist(), model.mesh.edge_lengths.tolist(), strict=True):
+        part = TUBE.mass_per_length * length / 6.0
+        for axis in range(3):
+            p, q = 3 * a + axis, 3 * b + axis
+            mass[p, p] += 2 * part
+            mass[q, q] += 2 * part
+            mass[p, q] += part
+            mass[q, p] += part
+    units = np.array([tangent.freedom.expand(row).ravel() for row in np.eye(tangent.freedom.size)])
+    squares = eigh(stiffness, units @ mass @ units.T, eigvals_only=True)
+    np.testing.assert_allclose(structure.frequencies(3), np.sqrt(squares[:3]) / (2 * pi), rtol=1e-6)

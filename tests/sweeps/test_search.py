@@ -61,15 +61,19 @@ def test_a_front_is_found_whole():
 
 
 def test_the_front_is_what_no_design_dominates_and_the_seed_decides_it(tmp_path: Path):
-    found = rs.optimise(plan(), tmp_path / "one")
+    found = rs.optimise(plan(columns=["rods"]), tmp_path / "one")
     table = rows_of(tmp_path / "one" / "table.csv")
     assert len(table) == found.designs == 10
     values = [(float(row["rms_pinned"]), float(row["total_length"])) for row in table]
     best = {mine for mine in values if not any(all(np.less_equal(v, mine)) and v != mine for v in values)}
     front = rows_of(tmp_path / "one" / "front.csv")
     assert [(float(row["rms_pinned"]), float(row["total_length"])) for row in front] == sorted(best)
-    assert rs.optimise(plan(), tmp_path / "one").computed == 0
-    longer = plan(search={"population": 5, "generations": 3, "seed": 3})
+    assert list(front[0])[:3] == ["layout.spacing", "layout.rods", "layout.edge"]
+    for row, line in zip(front, found.front_text().splitlines()[2:], strict=True):
+        (same,) = [each for each in table if all(each[name] == value for name, value in row.items() if name != "job")]
+        assert [f"{float(same[name]):.4g}" in line for name in ("layout.spacing", "rms_pinned", "rods")] == [True] * 3
+    assert rs.optimise(plan(columns=["rods"]), tmp_path / "one").computed == 0
+    longer = plan(columns=["rods"], search={"population": 5, "generations": 3, "seed": 3})
     assert rs.optimise(longer, tmp_path / "one").computed <= 5
     assert rows_of(tmp_path / "one" / "table.csv")[:10] == table
 

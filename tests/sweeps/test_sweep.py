@@ -179,7 +179,7 @@ def test_a_process_that_never_starts_ends_the_sweep_after_one_more_try(
     noted = process(start=f"noted('s'); {act}")
     monkeypatch.setattr(watched, "PATIENCE", patience)
     with pytest.raises(rs.RodshellError, match=f"a process for jobs cannot be started: .*{why}") as error:
-        rs.sweep(plan(), tmp_path / "out")
+        rs.sweep(plan(axes={"layout.spacing": ["80 mm"]}), tmp_path / "out")
     assert "\n" not in str(error.value)
     assert noted.read_text() == "ss"
 
@@ -223,29 +223,32 @@ def test_jobs_over_a_limit_are_stopped_alone(tmp_path: Path, process: Callable[.
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_sweep_that_is_stopped_goes_on_where_it_was(tmp_path: Path, whole: Path, number: int):
+def test_a_sweep_that_is_stopped_goes_on_where_it_was(tmp_path: Path):
+    """Again and again, in each way, and then it is computed to its end."""
     file, out = tmp_path / "sweep.toml", tmp_path / "out"
-    rods = ", ".join(f'"{count} mm"' for count in range(60, 75))
+    spacings = ", ".join(f'"{count} mm"' for count in range(60, 90))
     (tmp_path / "base.toml").write_text(rs.Job.load(BASE).to_toml())
-    file.write_text(f'base = "base.toml"\n[axes]\n"layout.spacing" = [{rods}]\n[run]\nuntil = "pop-up"\n')
-    process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, "sweep", str(file), "--out", str(out)],
-        stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
-    workers = list[psutil.Process]()
-    while process.poll() is None and not (1 <= _recorded(out) < 15):
-        time.sleep(0.01)
-        workers = psutil.Process(process.pid).children()
-    os.kill(process.pid, number)
-    said = process.communicate()[1]
-    assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}[signal.Signals(number)]
-    if number != signal.SIGKILL:
-        assert f"designs are in {out / CSV}; the same command continues from there" in said
-        assert len(rows_of(out)) == _recorded(out)
-    kept = _recorded(out)
-    assert rs.sweep(file, out).computed == 15 - kept
+    file.write_text(f'base = "base.toml"\n[axes]\n"layout.spacing" = [{spacings}]\n[run]\nuntil = "pop-up"\n')
+    workers, kept = list[psutil.Process](), 0
+    for number, code in ((signal.SIGKILL, -9), (signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        process = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, "sweep", str(file), "--out", str(out)],
+            stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )  # fmt: skip
+        while process.poll() is None and _recorded(out) == kept:
+            time.sleep(0.01)
+        workers += psutil.Process(process.pid).children()
+        os.kill(process.pid, number)
+        said = process.communicate()[1]
+        assert process.returncode == code
+        before, kept = kept, _recorded(out)
+        assert before < kept < 30
+        if number != signal.SIGKILL:
+            assert f"{kept} of 30 designs are in {out / CSV}; the same command continues from there" in said
+            assert len(rows_of(out)) == kept
+    assert rs.sweep(file, out).computed == 30 - kept
+    assert len(workers) == 3
     assert psutil.wait_procs(workers, timeout=10)[1] == []
 
 

@@ -12,6 +12,7 @@ from rodshell.case.load_tables import (
     BracingKinds,
     CombinationTable,
     LoadKinds,
+    LockedJointsTable,
     NoBracingTable,
     StabilityTable,
     StrengthTable,
@@ -86,6 +87,7 @@ class Case(Table):
         default=(), description="combinations of loads; in a case file only"
     )
     bracing: BracingKinds = Field(default_factory=NoBracingTable, discriminator="kind")
+    locked_joints: LockedJointsTable = Field(default_factory=LockedJointsTable)
     stability: StabilityTable = Field(default_factory=StabilityTable)
     strength: StrengthTable = Field(default_factory=StrengthTable)
 
@@ -111,7 +113,7 @@ class Case(Table):
                     f"no case file can describe {held.what} ({name}): keep the Python that makes it, or save the form"
                 )
             notes += [f"# {held.note}\n"] if held.note else []
-        idle = {"stability", "strength"} if not self.loads else set[str]()
+        idle = {"locked_joints", "stability", "strength"} if not self.loads else set[str]()
         idle |= {"bracing"} if self.bracing.kind == "none" else set()
         return "".join(notes) + toml_text(self.absolute().model_dump(exclude_none=True, exclude=idle))
 
@@ -220,9 +222,24 @@ class Case(Table):
         layout = built(self.layout, target)
         self._require_stock(layout)
         self.bracing.build()
-        self.built_loads()
+        loads = self.built_loads()
+        if loads is not None and loads.locked_joints is not None:
+            loads.locked_joints.require_pins(joint)
+        if self.refine.under not in ("nothing", "weight", *self.combination_names):
+            known = ", ".join(("nothing", "weight", *self.combination_names))
+            raise InputError(
+                f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
+            )
         rod = self.rod_on(target, layout, anchor=anchor)
-        self.output_options().require_known_stress(rod, joint)
+        options = self.output_options()
+        options.require_known_stress(rod, joint)
+        if self.strength != StrengthTable():
+            from rodshell.loads.strength import net_section
+
+            strength = self.strength.build()
+            options.limits(rod, strength)
+            if strength.hole:
+                net_section(rod.section, strength.hole)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
 
     def _require_stock(self, layout: "GridLayout") -> None:
@@ -249,6 +266,11 @@ class Case(Table):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")
 
+    @property
+    def combination_names(self) -> tuple[str, ...]:
+        """Names of the combinations of loads."""
+        return tuple(row.name for row in self.combinations)
+
     def built_loads(self) -> "Loads | None":
         """What the shell is to be checked under; None where the case has no loads.
 
@@ -269,6 +291,7 @@ class Case(Table):
             loads={load.name: load.build() for load in self.loads},
             combinations={row.name: dict(row.factors) for row in self.combinations},
             bracing=self.bracing.build(),
+            locked_joints=self.locked_joints.build(),
             stability=self.stability.build(),
             strength=self.strength.build(),
             durations={load.name: load.duration for load in self.loads if load.duration is not None},

@@ -192,7 +192,7 @@ def _rename(raw: Raw, overrides: dict[str, object]) -> None:
                 del raw[old_table]
 
 
-LOAD_TABLES = ("loads", "combinations", "bracing", "stability", "strength")
+LOAD_TABLES = ("loads", "combinations", "bracing", "locked_joints", "stability", "strength")
 """What a file of loads may have; it replaces all of these that the case has."""
 
 

@@ -1,6 +1,7 @@
 """The tables of loads: each kind of load, their combinations, the bracing and how stability is looked at."""
 
 from collections.abc import Mapping
+from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -26,6 +27,8 @@ from rodshell.case.values import (
     Point3,
     Pressure,
     Share,
+    SlipMoment,
+    Stiffness,
     Stress,
     Table,
     Whole,
@@ -41,6 +44,7 @@ if TYPE_CHECKING:
     from rodshell.loads.combinations import Stability
     from rodshell.loads.kinds import Load
     from rodshell.loads.laths import Laths
+    from rodshell.loads.locked_joints import LockedJoints
     from rodshell.loads.strength import Strength
     from rodshell.rods.section import Rod
 
@@ -257,6 +261,9 @@ class CablesTable(BracingTable):
     kind: Literal["cables"] = "cables"
     pattern: DiagonalPattern = Field(default="both", description='diagonals: "both" of a cell, "one", or "every = n"')
     prestrain: Share = Field(default=0.0, description="strain by which cables are shortened when they are put in")
+    ends_at: Literal["joints", "supports"] = Field(
+        default="joints", description="where cables end: at the outermost joints, or at the supports"
+    )
     across_openings: Literal["refuse", "leave out"] = Field(
         default="refuse", description="what becomes of diagonals across an opening"
     )
@@ -302,6 +309,29 @@ class LathsTable(BracingTable):
 
 
 BracingKinds = NoBracingTable | CablesTable | LathsTable
+
+
+class LockedJointsTable(Table):
+    shear: Stiffness | None = Field(
+        default=None,
+        description="stiffness about the normal of pins tightened after erection",
+    )
+    slip: SlipMoment | None = Field(default=None, description="moment at which they slip; default: not checked")
+
+    def build(self) -> "LockedJoints | None":
+        """What it says; None where no joint is locked.
+
+        Raises
+        ------
+        InputError : a moment without a stiffness, or a stiffness of zero.
+        """
+        if self.shear is None:
+            if self.slip is not None:
+                raise InputError("locked_joints.shear is missing: give the stiffness of the tightened pins")
+            return None
+        from rodshell.loads.locked_joints import LockedJoints
+
+        return LockedJoints(shear=inf if isinstance(self.shear, str) else self.shear, slip=self.slip)
 
 
 class StabilityTable(Table):

@@ -4,8 +4,9 @@ from rodshell.checks.bending import Bending, bending, bending_of, curvatures
 from rodshell.checks.check import Checks, check
 from rodshell.checks.contact import Contact, contact_of
 from rodshell.checks.deployment import Deployment, Elsewhere, deploy
-from rodshell.checks.loads import JointLoads, Reactions, SelfWeight, joint_loads, reactions, self_weight
 from rodshell.checks.other_shapes import OtherShape, OtherShapes, other_shapes
+from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
+from rodshell.checks.self_weight import SelfWeightCheck, self_weight
 
 __all__ = [
     "Bending",
@@ -17,7 +18,7 @@ __all__ = [
     "OtherShape",
     "OtherShapes",
     "Reactions",
-    "SelfWeight",
+    "SelfWeightCheck",
     "bending",
     "bending_of",
     "check",

@@ -11,17 +11,9 @@ import numpy as np
 from rodshell.checks.bending import VON_MISES, Bending, bending, bending_of, shell_normals
 from rodshell.checks.contact import Contact, contact, contact_of, worst_contact
 from rodshell.checks.deployment import Deployment, deploy, reached_by_turning
-from rodshell.checks.loads import (
-    JointLoads,
-    Reactions,
-    SelfWeight,
-    joint_loads,
-    reactions,
-    self_weight,
-    unknown_weights,
-    weakest,
-)
 from rodshell.checks.other_shapes import OtherShapes, other_shapes
+from rodshell.checks.reactions import JointLoads, Reactions, joint_loads, reactions
+from rodshell.checks.self_weight import SelfWeightCheck, self_weight, unknown_weights, weakest
 from rodshell.errors import OutOfTimeError
 from rodshell.formfinding import PopUp
 from rodshell.formfinding.popup import Ends
@@ -49,7 +41,7 @@ class ShellChecks:
     reactions: Reactions
     joints: JointLoads
     contact: Contact
-    self_weight: SelfWeight | None
+    self_weight: SelfWeightCheck | None
     other_shapes: OtherShapes | None
 
     __repr__ = brief
@@ -77,7 +69,7 @@ class Checks:
     joints: dict[Ends, JointLoads]
     deployment: Deployment | None = None
     deployment_bending: tuple[Bending, ...] = ()
-    self_weight: dict[Ends, SelfWeight] = field(default_factory=dict)
+    self_weight: dict[Ends, SelfWeightCheck] = field(default_factory=dict)
     contact: dict[Ends, Contact] = field(default_factory=dict)
     deployment_contact: tuple[Contact, ...] = ()
     other_shapes: dict[Ends, OtherShapes] = field(default_factory=dict)
@@ -228,7 +220,7 @@ def _long_checks(
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
     follow = "pinned" in done and stages > 0
     deployment, turned, stopped = None, None, ""
-    weighed, others = dict[Ends, SelfWeight](), dict[Ends, OtherShapes]()
+    weighed, others = dict[Ends, SelfWeightCheck](), dict[Ends, OtherShapes]()
     missing = [f"self-weight with {ends} ends" for ends in done]
     missing += [*(["the deployment from flat"] if follow else []), "other stable shapes"]
     try:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import splu
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
@@ -230,6 +229,8 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     -------
     (n, 3) the nodes on that surface [m].
     """
+    from scipy.sparse.linalg import splu  # here, as forms without checks do not need it
+
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]
     ends = np.unique(joined[mesh.ends])

@@ -30,5 +30,7 @@ def command(file: str, out: str | None, report: bool, retry: bool, quiet: bool) 
         found = optimise(file, folder, retry=retry, report=report, progress=progress)
     if not quiet:
         click.echo(found.summary())
+        if found.front:
+            click.echo(found.front_text())
         click.echo(f"written to {folder.absolute()}")
     return FOUND if found.front else NOT_CONVERGED

@@ -10,7 +10,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.fabrication.cutting import Nesting, nest, splices
 from rodshell.layout import GridMesh, Profile
-from rodshell.layout.cells import Pattern, diagonals
+from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
 from rodshell.layout.flatgrid import layers
 from rodshell.rods.section import Rod
 from rodshell.rods.varied import varied
@@ -21,8 +21,8 @@ SHORT = 2.0  # joint distances: shorter pieces are avoided where that takes no m
 
 @dataclass(frozen=True)
 class Diagonal:
-    """One diagonal of a cell: the joints that it ties, and their distance flat and in the final shape [m]; of a cable
-    also its length free of stress [m]."""
+    """One diagonal of a cell: the joints that it ties, rod ends being counted on from them, and their distance flat and
+    in the final shape [m]; of a cable also its length free of stress [m]."""
 
     joints: tuple[int, int]
     flat: float
@@ -69,7 +69,7 @@ class Fabricated:
     splices : distances from each rod's start, its allowance not counted [m].
     pieces : (rod, number along the rod, length [m]) of all that is cut from stock, rods one after the other.
     nesting : of the pieces; None where there is no stock length, or a piece does not fit.
-    bracing : diagonals between joints, by their index among the grid's crossings.
+    bracing : diagonals between joints, by their index among the grid's crossings, and to rod ends.
     """
 
     options: Fabrication
@@ -85,7 +85,7 @@ class Fabricated:
 
 def fabricate(
     mesh: GridMesh, rod: Rod, options: Fabrication, *, curvature: Floats | None = None, final: Floats | None = None,
-    pattern: Pattern = Pattern(), prestrain: float | None = None,
+    pattern: Pattern = Pattern(), prestrain: float | None = None, to_supports: bool = False,
 ) -> Fabricated:  # fmt: skip
     """Cut list, layers, splices, stock and bracing of a grid.
 
@@ -95,6 +95,7 @@ def fabricate(
     final : (n, 3) the final shape, for the bracing [m].
     pattern : of the bracing; default: both diagonals of every cell.
     prestrain : by which cables are shortened when they are put in [-]; None: the bracing is not of cables.
+    to_supports : diagonals also from the outermost joints to the rod ends.
     """
     rods, crossings = mesh.grid.rods, mesh.grid.crossings
     lengths = np.array([rod_line.length for rod_line in rods])
@@ -112,8 +113,12 @@ def fabricate(
             made, pieces, nesting = longer, others, tried
     bracing: tuple[Diagonal, ...] = ()
     if final is not None:
-        flat, there = mesh.flat[mesh.joint_nodes], final[mesh.joint_pairs].mean(axis=1)
+        ends = mesh.ends.ravel()
+        flat = np.vstack([mesh.flat[mesh.joint_nodes], mesh.flat[ends]])
+        there = np.vstack([final[mesh.joint_pairs].mean(axis=1), final[ends]])
         pairs = diagonals(mesh.grid, pattern)
+        if to_supports:
+            pairs = np.vstack([pairs, rim_diagonals(mesh.grid, pattern) + [0, len(mesh.joint_pairs)]])
 
         def apart(points: Floats) -> list[float]:
             distances: list[float] = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).tolist()

@@ -48,14 +48,8 @@ def grid_cells(grid: FlatGrid) -> Ints:
     ----------
     grid : rods and crossings.
     """
-    rods = grid.crossings.rods.tolist()
-    along: dict[int, list[tuple[float, int]]] = {}
-    for joint, (pair, positions) in enumerate(zip(rods, grid.crossings.at.tolist(), strict=True)):
-        for rod, place in zip(pair, positions, strict=True):
-            along.setdefault(rod, []).append((place, joint))
-    next_to: dict[tuple[int, int], list[int]] = {}  # the joints next to a joint on a rod
-    for rod, on_rod in along.items():
-        row = [joint for _, joint in sorted(on_rod)]
+    rods, next_to = grid.crossings.rods.tolist(), dict[tuple[int, int], list[int]]()  # joints next to one on a rod
+    for rod, row in _rows(grid).items():
         for k, joint in enumerate(row):
             next_to[joint, rod] = row[max(k - 1, 0) : k] + row[k + 1 : k + 2]
     found: dict[frozenset[int], tuple[int, int, int, int]] = {}
@@ -89,6 +83,44 @@ def diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
     rising = (b - a).prod(axis=-1) > 0
     line = np.where(rising, a[..., 0] - a[..., 1], a[..., 0] + a[..., 1])
     return np.asarray(pairs[line % pattern.every == 0])
+
+
+def rim_diagonals(grid: FlatGrid, pattern: Pattern = Pattern()) -> Ints:
+    """(d, 2) crossing and rod end that each diagonal of a field at the rim joins, ends being those of each rod in turn.
+
+    A rod's end is joined to the joints next to its last one on the rod that crosses it there. Between two rods that end
+    side by side these are both diagonals of their field; where the rim steps from one rod to the next, both start at
+    the joint at the inner corner and divide the field into triangles. A diagonal along a rod is left out.
+
+    Parameters
+    ----------
+    grid : rods and crossings.
+    pattern : of two diagonals of a field one is left out, as in cells; with lines the others of its way are.
+    """
+    rows, rods = _rows(grid), grid.crossings.rods.tolist()
+    found = list[tuple[int, int, int]]()  # joint where it starts, the rod's last joint, and the end
+    for rod, row in sorted(rows.items()):
+        for end, last in ((2 * rod, row[0]), (2 * rod + 1, row[-1])):
+            other = rows[rods[last][1] if rods[last][0] == rod else rods[last][0]]
+            k = other.index(last)
+            found += [(start, last, end) for start in other[max(k - 1, 0) : k] + other[k + 1 : k + 2]]
+    pairs = np.array([(start, end) for start, _, end in found], dtype=np.intp).reshape(-1, 2)
+    ends, joints = np.array([rod.point(s) for rod in grid.rods for s in (rod.start, rod.end)]), flat_joints(grid)
+    way = ends[pairs[:, 1]] - joints[pairs[:, 0]]
+    along = joints[[last for _, last, _ in found]] - joints[pairs[:, 0]]
+    across = np.abs(way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0])
+    kept = across > LEAST_ANGLE * np.linalg.norm(way, axis=1) * np.linalg.norm(along, axis=1)
+    rising = way.prod(axis=1) > 0
+    if pattern.ways == 1:
+        between = {(start, last) for (start, last, _), used in zip(found, kept.tolist(), strict=True) if used}
+        kept &= rising | np.array([(last, start) not in between for start, last, _ in found], dtype=bool)
+    if pattern.every > 1:
+        a, b = _lattice(grid)[pairs[:, 0]].T
+        kept &= np.where(rising, a - b, a + b) % pattern.every == 0
+    return np.asarray(pairs[kept])
+
+
+LEAST_ANGLE = 0.2  # sine of that between a diagonal at the rim and the rod that it starts from
 
 
 def lines(pairs: Ints, points: Floats) -> list[list[int]]:
@@ -145,6 +177,17 @@ def flat_joints(grid: FlatGrid) -> Floats:
     """
     first, at = grid.crossings.rods[:, 0].tolist(), grid.crossings.at[:, 0].tolist()
     return np.array([grid.rods[rod].point(s) for rod, s in zip(first, at, strict=True)]).reshape(-1, 2)
+
+
+def _rows(grid: FlatGrid) -> dict[int, list[int]]:
+    """The joints on each rod, in their order along it."""
+    along: dict[int, list[tuple[float, int]]] = {}
+    for joint, (pair, stations) in enumerate(
+        zip(grid.crossings.rods.tolist(), grid.crossings.at.tolist(), strict=True)
+    ):
+        for rod, place in zip(pair, stations, strict=True):
+            along.setdefault(rod, []).append((place, joint))
+    return {rod: [joint for _, joint in sorted(on_rod)] for rod, on_rod in along.items()}
 
 
 def _rising(grid: FlatGrid, pairs: Ints) -> Floats:

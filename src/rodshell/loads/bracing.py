@@ -8,7 +8,7 @@ import numpy as np
 from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.layout import GridMesh
-from rodshell.layout.cells import Pattern, diagonals
+from rodshell.layout.cells import Pattern, diagonals, rim_diagonals
 from rodshell.loads.structure import Structure
 from rodshell.rods.cable import CableStretch
 from rodshell.rods.section import Rod
@@ -18,6 +18,7 @@ from rodshell.units import percent_text
 from rodshell.validation import brief, choice, instance, not_negative
 
 AcrossOpenings = Literal["refuse", "leave out"]
+EndsAt = Literal["joints", "supports"]
 SHARES = (0.25, 0.5, 0.75)  # of a diagonal, where it is looked whether the shell is under it
 STEPS = 8  # in which a prestress is applied that is too much for one
 
@@ -32,6 +33,8 @@ class Cables:
     pattern : "both" diagonals of every cell, "one", or "every = n": lines of both through every n-th joint.
     prestrain : by which the erected shell's cables are shorter, free of stress, than where they go [-]. Slack cables
         brace nothing: factors without prestress are small.
+    ends_at : where lines of cables end: at the outermost "joints", so that the fields at the rim are not braced, or at
+        the "supports" beyond.
     across_openings : what becomes of diagonals that leave the shell, across an opening: the bracing is refused, or they
         are left out.
     """
@@ -39,6 +42,7 @@ class Cables:
     rod: Rod
     pattern: str = "both"
     prestrain: float = 0.0
+    ends_at: EndsAt = "joints"
     across_openings: AcrossOpenings = "refuse"
 
     __repr__ = brief
@@ -47,6 +51,7 @@ class Cables:
         instance("the bracing's rod", self.rod, Rod)
         Pattern.of(self.pattern)
         not_negative("the prestrain", self.prestrain)
+        choice("ends_at", self.ends_at, get_args(EndsAt))
         choice("across_openings", self.across_openings, get_args(AcrossOpenings))
 
     def brace(self, structure: Structure, target: Target) -> Structure:
@@ -62,8 +67,15 @@ class Cables:
         InputError : a cable crosses an opening; the shell does not withstand the prestress.
         """
         mesh, before = structure.mesh, structure.equilibrium
-        pairs = braced_diagonals(mesh, structure.positions(before), target, self.pattern, self.across_openings)
-        blocks = outer_nodes(mesh)[pairs]
+        pairs = braced_diagonals(
+            mesh,
+            structure.positions(before),
+            target,
+            self.pattern,
+            self.across_openings,
+            to_supports=self.ends_at == "supports",
+        )
+        blocks = np.append(outer_nodes(mesh), structure.shell.ends)[pairs]
         lengths = np.linalg.norm(before.state[blocks[:, 1]] - before.state[blocks[:, 0]], axis=1)
         stiffness = np.full(len(blocks), self.rod.stretch_stiffness)
 
@@ -95,9 +107,10 @@ class Cables:
 
 
 def braced_diagonals(
-    mesh: GridMesh, positions: Floats, target: Target, pattern: str, across_openings: AcrossOpenings
-) -> Ints:
-    """(d, 2) crossings that diagonals join.
+    mesh: GridMesh, positions: Floats, target: Target, pattern: str, across_openings: AcrossOpenings, *,
+    to_supports: bool = False,
+) -> Ints:  # fmt: skip
+    """(d, 2) crossings that diagonals join; the rod ends, start and end of each in turn, are counted on from them.
 
     Parameters
     ----------
@@ -105,6 +118,7 @@ def braced_diagonals(
     positions : (n, 3) of its nodes [m].
     target : whose openings the diagonals must not cross.
     pattern, across_openings : as of `Cables`.
+    to_supports : whether cables continue to the supports.
 
     Raises
     ------
@@ -113,7 +127,10 @@ def braced_diagonals(
     pairs = diagonals(mesh.grid, Pattern.of(pattern))
     if not len(pairs):
         raise InputError("the grid has no cell of four joints that could be braced: use a smaller spacing")
-    ends = positions[mesh.joint_pairs].mean(axis=1)[pairs]
+    if to_supports:
+        rim = rim_diagonals(mesh.grid, Pattern.of(pattern))
+        pairs = np.vstack([pairs, rim + [0, len(mesh.joint_pairs)]])
+    ends = np.vstack([positions[mesh.joint_pairs].mean(axis=1), positions[mesh.ends.ravel()]])[pairs]
     points = np.concatenate([(1 - share) * ends[:, 0] + share * ends[:, 1] for share in SHARES])
     outside = (target.margin(target.retract(points)) < 0).reshape(len(SHARES), -1).any(axis=0)
     if outside.any() and across_openings == "refuse":

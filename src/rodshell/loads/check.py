@@ -8,16 +8,17 @@ whole combination, with the shell's weight if that is in it.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.bending import require_known_stress, rod_frames
-from rodshell.checks.loads import Reactions
+from rodshell.checks.reactions import Reactions
 from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
-from rodshell.formfinding import PatchForm, PopUp
+from rodshell.formfinding import PatchForm, PopUp, pop_up
+from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.loads.bracing import Cables
@@ -32,12 +33,13 @@ from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
 from rodshell.solve.load_path import Limit, load_path
-from rodshell.solve.modes import LinearBuckling, linear_buckling
-from rodshell.solve.sparse_ldl import SingularError
+from rodshell.solve.modes import LinearBuckling, linear_buckling, softest_motion
 from rodshell.units import shown
 from rodshell.validation import brief
 
 PERMANENT: Duration = "permanent"
+ROUND_OFF = 1e-14  # of the stiffness of each unknown alone: soft shells have 5e-12, mechanisms 1e-16
+SAME_SHAPE = 1e-4  # of the size: patches together are where each is alone
 MOST = 100.0  # times a combination: factors above are not looked for
 
 
@@ -68,6 +70,7 @@ class LoadedShell:
     bracing_forces : (d,) axial force of each brace, tension positive, of slack cables exactly 0 [N].
     bracing_utilisation : of the laths of a third layer, or of the cables in tension; None: there are none, or their
         strength is not known.
+    joint_moments : (c,) moment of each locked joint about its normal [N m]; empty: none is locked.
     mode_factors : (j,) linear buckling factors of `modes`.
     modes : (j, n, 3) lowest linear buckling modes, the largest component being 1.
     mode : (n, 3) how the shell gives way at the limit, or None.
@@ -90,6 +93,7 @@ class LoadedShell:
     used: Utilisation
     bracing_forces: Floats
     bracing_utilisation: float | None
+    joint_moments: Floats
     modes: Floats
     mode_factors: Floats
     mode: Floats | None
@@ -126,9 +130,10 @@ class LoadChecks:
     ----------
     asked : the loads and combinations.
     shells : by combination and end condition; an end condition whose shell did not converge is left out.
-    braced : (d, 2) crossings that each brace joins; without bracing there are none.
+    braced : (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are none.
     limits : what the rods are judged by.
     stopped, missing : when a time limit came, or "", and which combinations were not reached.
+    frequencies : lowest natural frequencies of the shells without loads, with bracing and locked joints [Hz].
     """
 
     asked: Loads
@@ -137,6 +142,7 @@ class LoadChecks:
     limits: Limits
     stopped: str = ""
     missing: tuple[str, ...] = ()
+    frequencies: Mapping[Ends, Floats] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         late = f", {self.stopped}" if self.stopped else ""
@@ -182,13 +188,14 @@ class LoadChecks:
 
 
 def check_shells(
-    stages: PatchForm, loads: Loads, *, limits: Limits = Limits(bending={}), progress: Progress = silent
-) -> LoadChecks:
-    """Check every shell of a form in one piece that converged under each combination.
+    stages: PatchForm | PatchedForm, loads: Loads, *,
+    limits: Limits = Limits(bending={}), progress: Progress = silent,
+) -> LoadChecks:  # fmt: skip
+    """Check every shell of a form that converged under each combination.
 
     Parameters
     ----------
-    stages : of the form.
+    stages : of the form; of one in patches these are loaded together, their seams held as supports are.
     loads : with their combinations.
     limits : of the rods.
     progress : called with stage and figures; an OutOfTimeError that it raises ends the checks, and what was found until
@@ -198,19 +205,22 @@ def check_shells(
     ------
     InputError : a load does not fit the form; a strength is given, and the stress of its rods is not known.
     """
-    if stages.from_table:
+    if isinstance(stages, PatchForm) and stages.from_table:
         raise InputError("the form comes from a table of rods: without a target no areas for loads are known")
+    if loads.locked_joints is not None:
+        loads.locked_joints.require_pins(stages.joint)
     areas = tributary_of(stages)
-    done = {ends: popped for ends, popped in stages.popped.items() if popped.report.converged}
+    done = {ends: popped for ends, popped in _popped_up(stages).items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
-    stopped, braced = "", np.empty((0, 2), dtype=np.intp)
+    stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
     try:
         for ends, popped in done.items():
             if limits.bending:
                 require_known_stress(stages.rod, twisted=rod_frames(popped.shell) is not None)
             structure = _locked(popped, ends, loads, stages)
             braced = structure.braced
+            vibrations[ends] = structure.frequencies(loads.stability.modes)
             nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
@@ -221,15 +231,38 @@ def check_shells(
                 missing.pop(0)
     except OutOfTimeError as late:
         stopped = str(late)
-    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else ())
+    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else (), vibrations)
 
 
 def _said(progress: Progress, where: str, what: str) -> None:
     progress("loads", f"{where}, {what}", 0.0)
 
 
-def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Structure:
-    """The erected shell with its bracing locked.
+def _popped_up(stages: PatchForm | PatchedForm) -> dict[Ends, PopUp]:
+    """The popped-up shells; those of patches as one model of all, found again from the draped state.
+
+    Raises
+    ------
+    ConvergenceError : the model of all patches has another shape than each of them alone.
+    """
+    if isinstance(stages, PatchForm):
+        return dict(stages.popped)
+    found = dict[Ends, PopUp]()
+    for ends, alone in stages.popped.items():
+        if not alone.report.converged:
+            continue
+        found[ends] = pop_up(stages.footprint, stages.boundary, stages.rod, ends=ends, joint=stages.joint)
+        off = float(np.abs(found[ends].positions - alone.positions).max())
+        if not found[ends].report.converged or off > SAME_SHAPE * stages.target.size:
+            raise ConvergenceError(
+                f"with {ends} ends the patches take another shape together than each alone, and cannot be checked "
+                "under loads: check each patch as a case of its own"
+            )
+    return found
+
+
+def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm | PatchedForm) -> Structure:
+    """The erected shell with its bracing locked, and then its joints.
 
     Raises
     ------
@@ -239,28 +272,52 @@ def _locked(popped: PopUp, ends: Ends, loads: Loads, stages: PatchForm) -> Struc
     if bracing is not None:
         fitted = replace(bracing, rod=stages.rod) if isinstance(bracing, Laths) and bracing.rod is None else bracing
         structure = fitted.brace(structure, stages.target)
-    try:
-        _ = structure.equilibrium.tangent
-    except SingularError:
-        raise InputError(
-            f"with {ends} ends the supports and joints leave the shell a motion without any stiffness (a mechanism), "
-            "so that it cannot carry a load: hold its ends' directions (clamped), use stiffer joints, or more rods"
-        ) from None
+    if loads.locked_joints is not None:
+        structure = loads.locked_joints.lock(structure)
+    if (reason := mechanism(structure)) is not None:
+        raise InputError(f"with {ends} ends {reason}")
     return structure
 
 
-def tributary_of(stages: PatchForm) -> Tributary:
+def mechanism(structure: Structure) -> str | None:
+    """Which motion has no stiffness, and what to do, in words; None: every motion has one.
+
+    Parameters
+    ----------
+    structure : in equilibrium without loads.
+    """
+    stiffness, motion = softest_motion(structure.equilibrium)
+    if abs(stiffness) > ROUND_OFF:
+        return None
+    shell = structure.shell
+    block = int(np.argmax(np.linalg.norm(motion, axis=1)))
+    edge = block - shell.first_angle
+    if 0 <= edge < len(shell.mesh.edges):
+        name = shell.mesh.grid.rods[int(shell.mesh.edge_rods[edge])].name
+        return (
+            f"nothing keeps {name} from turning about itself (a mechanism), so that the shell cannot carry a load: use "
+            'joints that hold it, such as pins (joint.kind = "pin")'
+        )
+    x, y, _ = structure.equilibrium.state[block]
+    return (
+        f"supports and joints leave the shell a motion without any stiffness (a mechanism), largest near ({x:.4g}, "
+        f"{y:.4g}) m, so that it cannot carry a load: use pins or rigid joints, more rods, or clamped ends"
+    )
+
+
+def tributary_of(stages: PatchForm | PatchedForm) -> Tributary:
     """The areas of the target that each node of a form takes.
 
     Parameters
     ----------
-    stages : of a form in one piece that has a target.
+    stages : of a form that has a target.
     """
-    layout = stages.layout
-    anchor = stages.draped.anchor or stages.target.summit
-    return tributary_areas(
-        stages.target, stages.trimmed.positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing)
-    )
+    layout, anchor = stages.layout, stages.target.summit
+    if isinstance(stages, PatchForm):
+        positions, anchor = stages.trimmed.positions, stages.draped.anchor or anchor
+    else:
+        positions = np.concatenate([patch.trimmed.positions for patch in stages.patches.values()])
+    return tributary_areas(stages.target, positions, anchor=anchor, rotate=layout.rotate, spacing=min(layout.spacing))
 
 
 def _load(structure: Structure, nodes: LoadedNodes, loads: Loads, factors: Mapping[str, float]) -> Load:
@@ -336,7 +393,9 @@ def loaded_shell(
     shell, forces = structure.shell_at(found), found.forces[:edges]
     bent = bending_under(shell, found.state, structure.rod, forces, limits)
     judged = partial(utilisation, rod=structure.rod, limits=limits, asked=loads.strength)
-    used = judged(shell, found.state, forces=forces, duration=duration, bent=bent)
+    moments = structure.locked_moments(found)
+    slip = None if loads.locked_joints is None else loads.locked_joints.slip
+    used = judged(shell, found.state, forces=forces, duration=duration, bent=bent, moments=moments, slip_moment=slip)
     erected = judged(structure.shell, unloaded.state, forces=unloaded.forces[:edges], duration=PERMANENT)
     total = np.zeros(3) if load.forces is None else factor * load.forces[:n].sum(axis=0)
     shapes = np.zeros((0, n, 3)) if buckling is None else buckling.shapes[:, :n]
@@ -357,6 +416,7 @@ def loaded_shell(
         used=used.with_permanent(erected),
         bracing_forces=structure.bracing_forces(found),
         bracing_utilisation=_of_bracing(structure, found, loads, limits, duration),
+        joint_moments=moments,
         modes=shapes,
         mode_factors=np.zeros(0) if buckling is None else buckling.factors,
         mode=None if path.mode is None else path.mode[:n],
@@ -396,14 +456,15 @@ def _with_imperfections(
     amplitude = loads.stability.amplitude(float(np.ptp(points[:, :2], axis=0).min()))
     if amplitude is None or buckling is None or not len(buckling.shapes):
         return None, None, 0
-    ends, work = list[tuple[float, Limit]](), 0
-    for sign in (1.0, -1.0):
-        try:
-            start = imperfect(structure.equilibrium, buckling.shapes, sign * amplitude)
-        except ConvergenceError:
-            return None, "lost", work
-        path = load_path(start, load, most=MOST, stations=(), progress=progress)
+    try:
+        starts = [imperfect(structure.equilibrium, buckling.shapes, sign * amplitude) for sign in (1.0, -1.0)]
+    except ConvergenceError:
+        return None, "lost", 0
+    kind: Limit = "none"
+    least, work = np.inf, 0
+    for start in starts:  # the second only as far as it could be the smaller
+        path = load_path(start, load, most=min(MOST, least), stations=(), progress=progress)
         work += path.factorizations
-        ends.append((np.inf if path.limit == "none" else path.factor, path.limit))
-    least, kind = min(ends)
+        if path.limit != "none" and path.factor < least:
+            least, kind = path.factor, path.limit
     return (None if np.isinf(least) else least), kind, work

@@ -6,6 +6,7 @@ from rodshell.errors import InputError
 from rodshell.loads.bracing import Cables
 from rodshell.loads.kinds import LineLoad, Load, PointLoad, SelfWeight, Settlement, Snow, Temperature, Wind
 from rodshell.loads.laths import Laths
+from rodshell.loads.locked_joints import LockedJoints
 from rodshell.loads.strength import Strength
 from rodshell.rods.design_strength import DURATIONS, Duration
 from rodshell.units import shown
@@ -65,6 +66,7 @@ class Loads:
     loads : by name.
     combinations : by name, the factors of loads by their names.
     bracing : that is put in before the loads act; None: none.
+    locked_joints : how pins are tightened after that, before the loads act; None: they stay free.
     stability : how stability is looked at.
     strength : what rods and joints withstand.
     durations : by a load's name, how long it acts; default: by its kind, see `LASTING`.
@@ -77,6 +79,7 @@ class Loads:
     loads: dict[str, Load]
     combinations: dict[str, dict[str, float]]
     bracing: Bracing | None = None
+    locked_joints: LockedJoints | None = None
     stability: Stability = field(default_factory=Stability)
     strength: Strength = field(default_factory=Strength)
     durations: dict[str, Duration] = field(default_factory=dict)
@@ -109,6 +112,8 @@ class Loads:
             raise InputError(f"the shell has no {missing} to be checked under: give [[{missing}]], {{ {example} }}")
         if self.bracing is not None:
             instance("bracing", self.bracing, Bracing, "rodshell.Cables(...) or rodshell.Laths(...)")
+        if self.locked_joints is not None:
+            instance("locked_joints", self.locked_joints, LockedJoints, "rodshell.LockedJoints(...)")
         for name, load in self.loads.items():
             if not isinstance(load, Load):
                 raise InputError(f"the load {shown(name)} must be a load such as rodshell.Snow(500.0), not {load!r}")

@@ -9,7 +9,10 @@ sigma is the normal stress of both bending moments and the axial force together,
 whose strength f_a is below that of bending in timber [EN 1995-1-1, 6.2.3; with k_m = 1]. tau_T is the stress of
 torsion, tau_V of the shear force: 3/2 of its mean in a rectangle, 4/3 in a circle or an ellipse, 2 in a tube. At a
 joint with a hole, stresses are those of the net section. A joint slips where the axial forces of a rod on both of its
-sides differ by more than it can transfer.
+sides differ by more than it can transfer. A locked joint also transfers a moment M about its normal, half of it to
+either side of a rod, where the node at the joint has the mean of both sides: bending has the stress of M/2 more there;
+and slip is the root of the sum of the squares of force and moment over what alone makes it slip [the limit surface of
+sliding friction as an ellipse: Howe and Cutkosky 1996].
 
 Compression is also shown over the Euler load of each span between joints. It does not count as a utilisation: the path
 of the loaded shell has the buckling of spans in it.
@@ -23,10 +26,11 @@ from typing import Literal
 import numpy as np
 
 from rodshell.arrays import Bools, Floats, Ints
-from rodshell.checks.bending import VON_MISES, Bending, bending_of
-from rodshell.checks.loads import cut_forces
+from rodshell.checks.bending import VON_MISES, Bending, bending_of, fibre_modulus, fibre_strain
+from rodshell.checks.reactions import cut_forces
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
+from rodshell.joints.crossings import RodNodes
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
 from rodshell.model.rod_sections import varied_at_nodes
@@ -224,6 +228,7 @@ class Utilisation:
 def utilisation(
     shell: Shell, state: Floats, rod: Rod, *,
     forces: Floats, limits: Limits, asked: Strength, duration: Duration, bent: Bending | None = None,
+    moments: Floats | None = None, slip_moment: float | None = None,
 ) -> Utilisation:  # fmt: skip
     """Utilisation of a shell in equilibrium.
 
@@ -237,6 +242,8 @@ def utilisation(
     asked : holes, slip and effective lengths.
     duration : of the loads.
     bent : the shell's bending, where it is known.
+    moments : (c,) of locked joints about their normals [N m]; None or empty: none is locked.
+    slip_moment : at which locked joints slip [N m]; None: not known.
 
     Raises
     ------
@@ -255,6 +262,10 @@ def utilisation(
         bends, areas = bends * np.minimum(local.bend1, local.bend2), areas * local.stretch
     euler_loads = pi**2 * spans.least(bends) / (asked.effective_length * spans.lengths) ** 2
     euler = spans.on_entries(np.maximum(-axial, 0.0) / euler_loads)
+    turned = np.zeros(len(mesh.rod_nodes))
+    if moments is not None and len(moments):
+        joints = RodNodes(mesh, shell.node_blocks, shell.first_angle).at_crossings
+        np.maximum.at(turned, joints, np.abs(moments)[:, None])
     uses: dict[By, Floats] = {}
     strength = limits.bending.get(duration)
     if strength is not None and bent.stress is not None:
@@ -262,12 +273,20 @@ def utilisation(
         if asked.hole:
             net[_at_joints(mesh)] = net_section(section, asked.hole)
         drawn = np.abs(bent.axial_strain) * rod.stretch_stiffness / area_of(rod)
-        uses["bending"] = net * (bent.stress + drawn * (1.0 / limits.axial - 1.0)) / strength
+        stress = bent.stress + drawn * (1.0 / limits.axial - 1.0)
+        if turned.any():
+            within = 0.5 * turned / rod.bend_stiffnesses[1]
+            if local is not None:
+                within = within * local.fibre2 / local.bend2
+            stress = stress + fibre_modulus(rod) * fibre_strain(rod, np.zeros_like(within), within)
+        uses["bending"] = net * stress / strength
         if bent.torsion_stress is not None and (peak := _shear_peak(section)) is not None:
             sheared = spans.on_entries(across) * peak / (limits.cracked * area_of(rod) * areas)
             uses["shear"] = net * limits.shear_weight * (bent.torsion_stress + sheared) / strength
-    if asked.slip is not None:
-        uses["slip"] = spans.jumps(axial) / asked.slip
+    slips = [] if asked.slip is None else [spans.jumps(axial) / asked.slip]
+    slips += [] if slip_moment is None else [turned / slip_moment]
+    if slips:
+        uses["slip"] = np.sqrt(np.sum(np.square(slips), axis=0))
     return Utilisation(uses, euler)
 
 

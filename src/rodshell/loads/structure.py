@@ -1,8 +1,8 @@
-"""The shell that loads act on: erected, then braced, its model and its equilibrium without loads.
+"""The shell that loads act on: erected, braced, its joints locked; its model and its equilibrium without loads.
 
 The erected shell is the popped-up one. It has no weight while its bracing is put in: it is held up until then, by the
 scaffold or the crane that erects it. The bracing is fitted to the shell as it stands, and stressed; the shell gives way
-to that, and the equilibrium that it finds is where all loads begin.
+to that, and in the equilibrium that it finds its joints are locked, where they are. All loads begin there.
 """
 
 from dataclasses import dataclass, field, replace
@@ -12,13 +12,16 @@ from itertools import pairwise
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
-from rodshell.checks.loads import Reactions, reactions
+from rodshell.checks.reactions import Reactions, reactions
 from rodshell.formfinding.popup import PopUp
+from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.model.rod_sections import RodSections
 from rodshell.rods.cable import CableStretch
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium
+from rodshell.solve.modes import frequencies
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +73,11 @@ class Structure:
     shell : the model of the grid, its source frames being at the equilibrium.
     equilibrium : of grid and bracing without loads, its ends held.
     rod : of the grid.
-    braced : (d, 2) crossings that its bracing joins.
+    braced : (d, 2) crossings that its bracing joins, the rod ends counted on from them.
     bracing_mass : (n,) mass of the bracing, lumped at the mesh's nodes [kg]; None: there is no bracing.
     cables : its energy; None: there are no cables.
     laths : its third layer; None: there is none.
+    locked : crossings of the joints of each of the shell's last elements, which lock them; empty: none is locked.
     """
 
     shell: Shell
@@ -83,6 +87,7 @@ class Structure:
     bracing_mass: Floats | None = None
     cables: CableStretch | None = None
     laths: LathLayer | None = None
+    locked: tuple[Ints, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Structure: {self.shell}, {self.equilibrium.report.status.value}>"
@@ -123,6 +128,44 @@ class Structure:
         if self.laths is not None:
             return self.laths.forces(found.forces[len(self.mesh.edges) :])
         return np.zeros(0) if self.cables is None else self.cables.forces(found.state)
+
+    def locked_moments(self, found: Equilibrium) -> Floats:
+        """(c,) moment of each locked joint about its normal in an equilibrium of the structure [N m], positive where
+        the angle from the first rod to the second has grown; empty where none is locked.
+
+        Parameters
+        ----------
+        found : an equilibrium of this structure.
+        """
+        if not self.locked:
+            return np.zeros(0)
+        result, elements = np.zeros(len(self.mesh.grid.crossings)), self.shell_at(found).elements
+        for crossings, element in zip(self.locked, elements[-len(self.locked) :], strict=True):
+            assert isinstance(element, RelativeRotation)
+            result[crossings] = element.moments(found.state)[:, 0]
+        return result
+
+    def frequencies(self, count: int) -> Floats:
+        """(k,) the lowest natural frequencies without loads, ascending [Hz]; none without mass, or if unstable.
+
+        Rods' mass is spread along their edges, so that the frequencies of bending are of fourth order in their length
+        (see `solve.modes.frequencies`); joints and bracing are at the nodes.
+
+        Parameters
+        ----------
+        count : so many, or as many as there are.
+        """
+        shell, mass = self.shell, np.zeros((self.size, 3))
+        mass[: len(shell.mass)] = shell.mass
+        if self.bracing_mass is not None:
+            mass[: shell.node_count] += self.bracing_mass[:, None]
+        spread = np.zeros(len(self.equilibrium.problem.stretch.blocks))
+        mesh = self.mesh
+        of_rods = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods)).mass * mesh.edge_lengths
+        spread[: len(of_rods)] = of_rods
+        if self.equilibrium.tangent.negative_modes or not of_rods.all():
+            return np.zeros(0)
+        return frequencies(self.equilibrium, mass, count, edge_mass=spread).frequencies
 
     def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
         """The model of the laths of a third layer alone and its state; None: there are none.

@@ -182,6 +182,8 @@ class Shell:
         ----------
         state : (N, 3) node positions [m] and twist angles [rad].
         """
+        if self.node_count == self.mesh.node_count:  # nodes that rods share
+            return state[: self.node_count].copy()
         result, visits = np.zeros((self.mesh.node_count, 3)), np.zeros(self.mesh.node_count)
         np.add.at(result, self.mesh.rod_nodes, state[self.node_blocks])
         np.add.at(visits, self.mesh.rod_nodes, 1.0)

@@ -15,6 +15,8 @@ from rodshell.results.records import Ends
 from rodshell.results.wording import millimetres, percent, rounded, rounding_of, stress
 from rodshell.units import percent_text
 
+CLOSE = 1.005  # both factors are found within 0.2 %: a larger ratio of theirs says something
+MOST_NAMES = 4  # of joints that slip
 MOST_MODES = 3  # pictures, of the combination that falls first
 BY = {
     "bending": "bending and axial force",
@@ -24,12 +26,16 @@ BY = {
 }
 STATED = (
     "The erected shell is an equilibrium of elastic rods, without weight and held up until its bracing is fixed; the "
-    "bracing is then stressed, and all loads begin there.",
+    "bracing is then stressed, joints that are to be locked are locked as they then stand, and all loads begin there.",
     "Loads are fixed forces on the areas of the surface that belong to each node. Wind does not turn with the shell.",
     "Large displacements and the rods' stresses from bending are in every figure; supports do not yield unless a load "
     "moves them.",
     "Stiffness is the mean one, and not reduced: neither by partial factors nor by creep. Relaxation of bent rods, "
     "pressure at bolts, cladding and its stiffness, fatigue, fire and accidental loads are not checked.",
+)
+SEAMS = (
+    "The seams between patches are held in place, as supports are: what carries them has to withstand the forces "
+    "there, which are among those of the foundations, and its own stiffness is not in these figures."
 )
 
 
@@ -51,12 +57,14 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
         for caption, ends, state in _modes(archive, shells)
     ]
     return {
-        "assumptions": [*_strengths(results), *STATED],
+        "assumptions": [*_strengths(results), *STATED, *([SEAMS] if results.patches else [])],
         "strength": [_strength(results, *each) for each in shells],
         "deflection": [_deflection(results, *each) for each in shells],
         "stability": [_stability(*each) for each in shells],
+        "frequencies": list(_frequencies(shells)),
         "modes": pictures,
         "foundations": [_foundation(results, *each) for each in shells],
+        "joints": [_joints(*each) for each in shells if each[2].joint_moments],
         "bracing": [_bracing(results, *each) for each in shells if each[2].bracing],
     }  # fmt: skip
 
@@ -128,14 +136,25 @@ def _factor(value: float | None, missing: str) -> str:
 
 def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Three figures side by side."""
-    imperfect = "not asked for" if shell.imperfect_kind is None else "over 100"
+    imperfect = _factor(shell.imperfect_factor, "not asked for" if shell.imperfect_kind is None else "over 100")
+    above = (shell.imperfect_factor or np.inf) > CLOSE * (shell.limit_factor or np.inf)
+    if above and shell.limit_kind == "bifurcation" and shell.imperfect_kind not in (None, "not followed"):
+        imperfect += " (the bifurcation is stable)"
     return [
         name,
         ends,
         _factor(shell.linear_factor, "over 100"),
         f"{_factor(shell.limit_factor, 'over 100')} ({shell.limit_kind})",
-        _factor(shell.imperfect_factor, imperfect),
+        imperfect,
     ]
+
+
+def _frequencies(shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[str]:
+    """Natural frequencies with each kind of ends: they do not depend on the combination."""
+    for ends, shell in {ends: shell for _, ends, shell in shells}.items():
+        known = [rounded(value) for value in shell.frequencies if value is not None]
+        if known:
+            yield f"{ends} ends: {', '.join(known)} Hz"
 
 
 def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[tuple[str, Ends, str]]:
@@ -173,6 +192,21 @@ def _foundation(results: Results, name: str, ends: Ends, shell: LoadedShell) -> 
 
 def _kilo(newtons: float | None) -> str:
     return f"{round(1e-3 * (newtons or 0.0), 2) + 0.0:.2f}"
+
+
+def _joints(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
+    """Moments of locked joints, and which joints slip."""
+    largest = max((abs(moment or 0.0) for moment in shell.joint_moments), default=0.0)
+    slip = None if shell.utilisations is None else shell.utilisations.slip
+    more = f" and {len(shell.slipping) - MOST_NAMES} more" if len(shell.slipping) > MOST_NAMES else ""
+    return [
+        name,
+        ends,
+        rounded(largest),
+        shell.joint_moment_at or "",
+        "not known" if slip is None else percent(slip),
+        "not known" if slip is None else ", ".join(shell.slipping[:MOST_NAMES]) + more or "none",
+    ]
 
 
 def _bracing(results: Results, name: str, ends: Ends, shell: LoadedShell) -> list[str]:

@@ -363,8 +363,19 @@ def joint_names(mesh: GridMesh) -> list[str]:
     return ["/".join(names[k] for k in sorted(pair)) for pair in mesh.grid.crossings.rods.tolist()]
 
 
+def support_names(mesh: GridMesh) -> list[str]:
+    """Names of the rod ends, as "U03.1": start (0) and end (1) of each rod in turn.
+
+    Parameters
+    ----------
+    mesh : of the flat grid.
+    """
+    return [f"{rod.name}.{end}" for rod in mesh.grid.rods for end in (0, 1)]
+
+
 def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fabrication:
     names, joints = [rod.name for rod in mesh.grid.rods], joint_names(mesh)
+    points = [*joints, *support_names(mesh)]
     joint_mass = (results.joint.mass if results.joint else None) or 0.0
     stock = dict[str, Any]()
     if fabricated.nesting is not None:
@@ -378,8 +389,8 @@ def _fabrication(results: Results, mesh: GridMesh, fabricated: Fabricated) -> Fa
         total_mass=float(fabricated.mass.sum()) + len(joints) * joint_mass,
         bracing=tuple(
             Brace(
-                start=joints[brace.joints[0]],
-                end=joints[brace.joints[1]],
+                start=points[brace.joints[0]],
+                end=points[brace.joints[1]],
                 flat=brace.flat,
                 final=brace.final,
                 **({} if brace.cut is None else {"cut": brace.cut}),

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodshell.arrays import Floats, Ints
+from rodshell.joints.crossings import RodNodes
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.check import LoadedShell as CheckedShell
-from rodshell.results.from_checks import joint_names
+from rodshell.results.from_checks import joint_names, support_names
 from rodshell.results.loaded import Governs, LoadedShell, Utilisations
 from rodshell.results.results import Results
 
@@ -26,7 +27,12 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
     found = results.changed(
         loads={
             name: {
-                ends: _record(mesh, shell, _in_order(results, mesh, checks.braced, shell.bracing_forces))
+                ends: _record(
+                    mesh,
+                    shell,
+                    _in_order(results, mesh, checks.braced, shell.bracing_forces),
+                    checks.frequencies.get(ends, np.zeros(0)),
+                )
                 for ends, shell in by_ends.items()
             }
             for name, by_ends in checks.shells.items()
@@ -62,7 +68,7 @@ _KINDS: dict[str, str] = {"lost": "not followed"}
 
 def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) -> tuple[float | None, ...]:
     """The force of each brace of the fabrication; None of those that are left out."""
-    names = joint_names(mesh)
+    names = [*joint_names(mesh), *support_names(mesh)]
     known = {
         frozenset((names[a], names[b])): force for (a, b), force in zip(braced.tolist(), forces.tolist(), strict=True)
     }
@@ -70,8 +76,9 @@ def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) ->
     return tuple(known.get(frozenset((brace.start, brace.end))) for brace in rows) if known else ()
 
 
-def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ...]) -> LoadedShell:
+def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ...], frequencies: Floats) -> LoadedShell:
     governs = None if shell.governs is None else _place(mesh, shell.governs[1], shell.governs[0])
+    names = joint_names(mesh)
     return LoadedShell(
         at_factor=shell.at_factor,
         load_sum=shell.load_sum.tolist(),
@@ -95,8 +102,21 @@ def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ..
         support_moments=shell.support_forces.moments.tolist(),
         bracing=bracing,
         bracing_utilisation=shell.bracing_utilisation,
+        joint_moments=tuple(shell.joint_moments.tolist()),
+        joint_moment_at=names[int(np.argmax(np.abs(shell.joint_moments)))] if len(shell.joint_moments) else None,
+        slipping=tuple(names[k] for k in _slipping(mesh, shell)),
         mode_factors=tuple(shell.mode_factors.tolist()),
+        frequencies=tuple(frequencies.tolist()),
     )
+
+
+def _slipping(mesh: GridMesh, shell: CheckedShell) -> Ints:
+    """The crossings at which a joint slips."""
+    used = shell.used.uses.get("slip")
+    if used is None:
+        return np.empty(0, dtype=np.intp)
+    entries = RodNodes(mesh, mesh.rod_nodes, 0).at_crossings
+    return np.flatnonzero((used[entries] > 1).any(axis=1))
 
 
 def _place(mesh: GridMesh, entry: int, by: str | None = None) -> Governs:

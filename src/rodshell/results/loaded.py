@@ -18,7 +18,7 @@ class Utilisations(Record):
 
     bending: Number = key("of both bending moments and the axial force, with torsion")
     shear: Number = key("of torsion and the shear force")
-    slip: Number = key("of the joints' slip")
+    slip: Number = key("of the force and the moment at which joints slip")
     permanent: Number = key("of the erected shell without loads, by the permanent strength")
 
 
@@ -65,7 +65,15 @@ class LoadedShell(Record):
         "axial force of each brace in the order of fabrication.bracing, tension positive, 0: slack; null: left out", "N"
     )
     bracing_utilisation: Number = key("utilisation of laths of a third layer or of cables; null: none, or not known")
+    joint_moments: Rows[Number] = rows(
+        "moment of each locked joint about its normal, in the order of joint_loads; empty: none is locked", "N m"
+    )
+    joint_moment_at: Text | None = key("id of the joint whose moment is largest; null: none is locked")
+    slipping: Rows[Text] = rows("ids of the joints that slip")
     mode_factors: Rows[Number] = rows("linear buckling factors of the lowest modes")
+    frequencies: Rows[Number] = rows(
+        "lowest natural frequencies without loads, of rods, joints and bracing; empty: not known", "Hz"
+    )
 
 
 LoadCases = dict[str, ByEnds[LoadedShell]]

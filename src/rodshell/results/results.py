@@ -183,10 +183,10 @@ class OtherShapes(Record):
 
 
 class Brace(Record):
-    """A diagonal between two joints."""
+    """A diagonal between two joints, or from a joint to a support."""
 
     start: Text = required("id of the first joint, the two rods' ids with a slash", alias="from")
-    end: Text = required("id of the second joint", alias="to")
+    end: Text = required("id of the second joint, or of a support, as U03.1", alias="to")
     flat: Number = key("length in the flat grid", "m")
     final: Number = key("length in the final shape", "m")
     cut: Number = key("length of a cable free of stress; absent without bracing of cables", "m")

@@ -14,10 +14,10 @@ from rodshell.errors import InputError
 from rodshell.output.pictures import picture_svg
 from rodshell.output.svg import inline
 from rodshell.results import read
-from rodshell.sweeps.columns import JOB, STANDARD
+from rodshell.sweeps.columns import JOB
 from rodshell.sweeps.plan import GENERATION, Plan
 from rodshell.sweeps.store import ARCHIVES, Finished, Store
-from rodshell.sweeps.table import header_of, in_short, plain, replaced, table_rows
+from rodshell.sweeps.table import header_of, in_short, names_of, plain, replaced, table_rows
 
 REPORT = "report.html"
 SHAPES = 12  # pictures at most
@@ -94,7 +94,7 @@ def write_report(store: Store, page: Page) -> Path:
 def _data(store: Store, page: Page) -> dict[str, Any]:
     """The table by column, and for each design its report, its link to the studio and its command."""
     keys, columns = header_of(store)
-    names = [*keys, *STANDARD, *(column.name for column in columns)]
+    names = names_of(keys, columns)
     rows = list(table_rows(store, columns))
     designs = [(design.job, page.counts(design)) for design in store.finished()]
     cells = {name: [plain(row[k]) for row in rows] for k, name in enumerate(names) if name != JOB}
@@ -125,7 +125,7 @@ def _studio(plan: Plan, values: Sequence[Any]) -> str | None:
 def _shapes(store: Store, page: Page) -> Iterable[dict[str, str]]:
     """Picture, link and caption of each shape."""
     keys, columns = header_of(store)
-    names = [*keys, *STANDARD, *(column.name for column in columns)]
+    names = names_of(keys, columns)
     rows = zip(store.finished(), table_rows(store, columns), strict=True)
     by_job = {design.job: dict(zip(names, row, strict=True)) for design, row in rows if design.job in page.shapes}
     changing = [key for key in keys if len({json.dumps(row[key]) for row in by_job.values()}) > 1]

@@ -7,13 +7,13 @@ from os import PathLike
 from pathlib import Path
 
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.sweeps.columns import CONVERGED, STANDARD, is_usable
+from rodshell.sweeps.columns import CONVERGED, is_usable
 from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.identity import job_identity
 from rodshell.sweeps.plan import Source, SweepPlan, read_plan
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
 from rodshell.sweeps.store import FOUND, STORE, Store
-from rodshell.sweeps.table import header_notes, header_of, table_rows
+from rodshell.sweeps.table import header_notes, header_of, names_of, table_rows
 from rodshell.validation import instance
 
 BEST = "best"
@@ -170,7 +170,7 @@ def best_jobs(store: Store, measure: str) -> list[str]:
     store : of the sweep; measure : a column of its table.
     """
     keys, columns = header_of(store)
-    place = [*keys, *STANDARD, *(column.name for column in columns)].index(measure)
+    place = names_of(keys, columns).index(measure)
     found = dict[str, float]()
     for design, row in zip(store.finished(), table_rows(store, columns), strict=True):
         if is_usable(design.row) and isinstance(row[place], int | float):

@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.sweeps.asktell import AskTell
 from rodshell.sweeps.axes import drawn_shares
-from rodshell.sweeps.columns import CONVERGED, STANDARD, read_column
+from rodshell.sweeps.columns import CONVERGED, JOB, STANDARD, read_column
 from rodshell.sweeps.computing import Computation, Wanted, opened_computation
 from rodshell.sweeps.plan import GENERATION, Source
 from rodshell.sweeps.report import SHAPES, Page, require_plotly, write_report
@@ -28,6 +28,7 @@ from rodshell.sweeps.table import header_notes, in_short, write_csv
 from rodshell.validation import instance
 
 FRONT = "front.csv"
+MOST_SHOWN = 10  # designs of the front in text
 DIFFERENCE, CROSSED = 0.6, 0.9
 
 
@@ -40,8 +41,8 @@ class Optimised:
     folder : of the search.
     designs : their number; computed : jobs that were computed now.
     feasible : number of designs that converged and keep all constraints.
-    front : of those, the ones that no other is better than in all objectives: values of the keys and the objectives, by
-        name, the smallest first objective first.
+    front : of those, the ones that no other is better than in all objectives, the smallest first objective first: by
+        name the values of the variables' keys, objectives, verdict, further columns, and the job.
     """
 
     folder: Path
@@ -51,13 +52,21 @@ class Optimised:
     front: tuple[dict[str, Any], ...]
 
     def summary(self) -> str:
-        """A few lines of text."""
-        lines = [f"{self.designs} designs, {self.computed} computed now; {self.feasible} keep all constraints"]
+        """A line of text, and another where nothing was found."""
+        found = f"{self.designs} designs, {self.computed} computed now; {self.feasible} keep all constraints"
+        return found if self.front else f"{found}\nNO DESIGN keeps all constraints and converged; table.csv says why"
+
+    def front_text(self) -> str:
+        """The front as a table of text, its first designs where it is long."""
         if not self.front:
-            return "\n".join([*lines, "NO DESIGN keeps all constraints and converged; table.csv says why"])
-        name = "best design" if len(self.front) == 1 else f"front of {len(self.front)} designs, first"
-        shown_values = ", ".join(f"{key} {in_short(value)}" for key, value in self.front[0].items())
-        return "\n".join([*lines, f"{name}: {shown_values}"])
+            return ""
+        names = [name for name in self.front[0] if name != JOB]
+        cells = [names, *([in_short(design[name]) for name in names] for design in self.front[:MOST_SHOWN])]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
+        more = [f"and {len(self.front) - MOST_SHOWN} more in {FRONT}"] if len(self.front) > MOST_SHOWN else []
+        title = "the best of them" if len(self.front) == 1 else "those that no other is better than in all objectives"
+        return "\n".join([f"{title}:", *lines, *more])
 
 
 def optimise(
@@ -101,9 +110,9 @@ def optimise(
         shapes = _some(best, SHAPES) if report else []
         kept = best if plan.settings.keep == "best" else shapes
         computation.compute(computation.archived(kept), "best designs", len(kept))
-        rows = tuple(_front_row(plan, design) for design in front)
-        names = [*plan.keys[1:], *objectives]
-        write_csv(folder / FRONT, names, ([row[name] for name in names] for row in rows))
+        names = list(dict.fromkeys([*plan.keys[1:], *objectives, "verdict", *(c.name for c in plan.columns), JOB]))
+        rows = tuple(dict(zip(names, _cells(plan, design, names), strict=True)) for design in front)
+        write_csv(folder / FRONT, names, (list(row.values()) for row in rows))
         found = Optimised(folder, store.count(), computed, feasible, rows)
         if report:
             page = Page(
@@ -207,6 +216,7 @@ def _some(jobs: Sequence[str], most: int) -> list[str]:
     return list(jobs[::step])
 
 
-def _front_row(plan: SearchPlan, design: Finished) -> dict[str, Any]:
-    values = {objective.column: _value(design.row, objective.column) for objective in plan.objectives}
-    return dict(zip(plan.keys[1:], design.keys[1:], strict=True)) | values
+def _cells(plan: SearchPlan, design: Finished, names: Sequence[str]) -> list[Any]:
+    """Values of a design by the names of keys and columns."""
+    known = dict(zip(plan.keys, design.keys, strict=True)) | {JOB: design.job}
+    return [known[name] if name in known else _value(design.row, name) for name in names]

@@ -40,6 +40,11 @@ def header_notes(keys: Sequence[str], columns: Sequence[Column]) -> dict[str, st
     return {HEADER: json.dumps({"keys": list(keys), "columns": [column.name for column in columns]})}
 
 
+def names_of(keys: Sequence[str], columns: Sequence[Column]) -> list[str]:
+    """The names of all columns of a table; `keys` and `columns` as of `header_notes`."""
+    return [*keys, *STANDARD, *(column.name for column in columns)]
+
+
 def table_rows(store: Store, columns: Sequence[Column]) -> Iterator[list[Any]]:
     """The rows of the finished designs, one by one: the axes' keys, the standard columns, and `columns`.
 
@@ -81,7 +86,7 @@ class Table:
         OutputError : it cannot be written.
         """
         keys, columns = header_of(self._store)
-        names = [*keys, *STANDARD, *(column.name for column in columns)]
+        names = names_of(keys, columns)
         write_csv(self._store.folder / CSV, names, table_rows(self._store, columns))
 
 
@@ -134,6 +139,8 @@ def plain(value: Any) -> Any:
 
 def in_short(value: Any) -> str:
     """A value in a sentence."""
+    if value is None:
+        return "–"
     return f"{value:.4g}" if isinstance(value, float) else str(plain(value))
 
 
@@ -159,7 +166,7 @@ def read_sweep(folder: str | PathLike[str], columns: Sequence[str] = ()) -> "pya
         keys, columns_of_sweep = header_of(store)
         there = [column.name for column in columns_of_sweep]
         asked = [*columns_of_sweep, *(read_column(name) for name in columns if name not in there)]
-        return arrow_table([*keys, *STANDARD, *(column.name for column in asked)], table_rows(store, asked))
+        return arrow_table(names_of(keys, asked), table_rows(store, asked))
 
 
 def arrow_table(names: Sequence[str], rows: Iterator[list[Any]]) -> "pyarrow.Table":
@@ -209,6 +216,6 @@ def write_parquet(store: Store) -> None:
         import pyarrow.parquet
 
         keys, columns = header_of(store)
-        names = [*keys, *STANDARD, *(column.name for column in columns)]
+        names = names_of(keys, columns)
         with replaced(store.folder / PARQUET) as part:
             pyarrow.parquet.write_table(arrow_table(names, table_rows(store, columns)), part)
