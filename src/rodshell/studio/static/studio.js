@@ -444,11 +444,20 @@ function placeHandles() {
   Object.assign(handles, { group, dot, knob, plane });
   viewer.world.add(group);
   viewer.redraw();
+  requestAnimationFrame(tellHandles);
 }
 
-function screenDistance(object, event) {
+function onScreen(object) {
   const frame = viewer.canvas.getBoundingClientRect(), place = object.getWorldPosition(new THREE.Vector3()).project(viewer.camera);
-  return Math.hypot((0.5 + 0.5 * place.x) * frame.width + frame.left - event.clientX, (0.5 - 0.5 * place.y) * frame.height + frame.top - event.clientY);
+  return [(0.5 + 0.5 * place.x) * frame.width + frame.left, (0.5 - 0.5 * place.y) * frame.height + frame.top];
+}
+
+const screenDistance = (object, { clientX, clientY }) => Math.hypot(...onScreen(object).map((value, axis) => value - [clientX, clientY][axis]));
+
+// Where the handles are in the window [px], for whoever drives the page by a program.
+function tellHandles() {
+  const parts = handles.group ? { anchor: handles.dot, heading: handles.knob, base: handles.plane } : {};
+  byId("view").dataset.handles = JSON.stringify(Object.fromEntries(Object.entries(parts).filter(([, part]) => part).map(([name, part]) => [name, onScreen(part)])));
 }
 
 function ray(event) {
@@ -464,6 +473,7 @@ function onTarget(event) {
 
 function wireHandles() {
   const canvas = viewer.canvas;
+  viewer.orbit.addEventListener("change", () => requestAnimationFrame(tellHandles));
   canvas.addEventListener("pointerdown", event => {
     if (!handles.group || drawing) return;
     handles.held = [["anchor", "dot"], ["heading", "knob"], ["base", "plane"]].find(([, part]) => handles[part] && screenDistance(handles[part], event) < 16)?.[0];
