@@ -377,6 +377,7 @@ function showPlan() {
   const gone = leftOut();
   byId("left-out").replaceChildren(...(gone.length ? ["Left out: ", ...gone.map(id => make("button", { type: "button", textContent: `${id} \u00d7`, ariaLabel: `Put rod ${id} back`, onclick: () => toggle(id) }))] : []));
   byId("unseam").hidden = !(base.seams?.lines?.length);
+  markRod(marked);
 }
 
 function leftOut() {
@@ -389,7 +390,10 @@ function toggle(id) {
   change(next => set(next, "layout.left_out", rest.length < names.length ? (rest.length ? rest : undefined) : [...names, id]));
 }
 
+let marked = "";
+
 function markRod(id) {
+  marked = id;
   for (const line of byId("plan").querySelectorAll("line[data-line]")) line.classList.toggle("marked", line.dataset.line === id);
   const rod = facts?.plan.find(one => one.id === id);
   const size = rod && (rod.length < 10 ? `${(1000 * rod.length).toFixed(1)} mm` : `${rod.length.toFixed(4)} m`);
