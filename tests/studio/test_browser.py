@@ -48,6 +48,7 @@ def test_a_case_is_changed_undone_kept_refined_and_found_again_after_a_reload(tm
         assert second["all rods together"] != first["all rods together"]
         assert page.evaluate("document.activeElement.dataset.path") == "layout.spacing"
 
+        assert not page.is_disabled("#undo")
         page.keyboard.press("Control+z")
         page.wait_for_selector("#undo:disabled")
         assert figures() == first

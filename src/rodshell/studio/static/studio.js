@@ -111,7 +111,7 @@ function wireTools() {
   byId("loads").onclick = showLoads;
   form.onsubmit = ({ submitter }) => {
     if (submitter.value === "check") checkLoads(form.elements);
-    else change(next => { delete next.loads; delete next.combinations; });
+    if (submitter.value === "without") change(next => { delete next.loads; delete next.combinations; });
   };
 }
 
@@ -153,6 +153,7 @@ async function open() {
 
 function hear(news) {
   if (news.kind === "session") return restore(news);
+  if (news.kind === "history") return showHistory(news);
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
   if (news.kind === "stage" && news.serial >= shown) {
     shown = news.serial;
@@ -177,9 +178,7 @@ let pending = true;  // a new target: the view begins anew
 function restore(state) {
   history = state;
   const from = state.cases[state.at];
-  byId("undo").disabled = state.at <= 0;
-  byId("redo").disabled = state.at >= state.cases.length - 1;
-  byId("tries").hidden = state.cases.length > 2;
+  showHistory({ at: state.at, count: state.cases.length });
   showVariants();
   if (restore.known && JSON.stringify(from) === JSON.stringify(base)) return;
   const linked = restore.known ? null : restore.linked;
@@ -190,19 +189,41 @@ function restore(state) {
   buildControls();
 }
 
+function showHistory({ at, count }) {
+  byId("undo").disabled = at <= 0;
+  byId("redo").disabled = at >= count - 1;
+  byId("tries").hidden = count > 2;
+}
+
 function say(text, wrong = false) {
   byId("state").textContent = text;
   byId("state").classList.toggle("wrong", wrong);
 }
 
 function failed(sentence) {
-  say(sentence, true);
-  const box = byId("verdict");
+  say("");
+  const box = byId("verdict"), key = named(sentence);
   box.className = "failed";
   box.replaceChildren(make("strong", { textContent: sentence }));
+  if (key) box.append(make("button", { type: "button", textContent: `Go to ${key.path}`, onclick: () => goTo(key) }));
+  document.body.classList.add("old");  // the shapes are those of a case before
+}
+
+// The key that a sentence asks for, as in a case file (target.unit) or as an option (--unit).
+function named(sentence) {
+  const usable = start.keys.filter(key => !IDLE.includes(key.path) && (!key.path.startsWith("target.") || !key.kinds.length || key.kinds.includes(base.target?.kind)));
+  return usable.find(({ path }) => sentence.includes(path)) || usable.find(({ path }) => new RegExp(`--${path.split(".").pop()}\\b`).test(sentence));
+}
+
+function goTo({ path }) {
+  const fields = [...byId("controls").querySelectorAll(`[data-path="${path}"]`)], field = fields.at(-1);
+  gui.folders.find(({ _title }) => _title === `[${path.split(".")[0]}]`)?.open();
+  field?.focus();
+  field?.scrollIntoView({ block: "center" });
 }
 
 function showFacts() {
+  document.body.classList.remove("old");
   byId("figures").tBodies[0].replaceChildren(...facts.figures.map(([name, value]) => make("tr", {}, make("th", { textContent: name, scope: "row" }), make("td", { textContent: value }))));
   const box = byId("verdict");
   if (facts.verdict) {
@@ -608,8 +629,12 @@ function wire() {
   byId("undo").onclick = () => order({ kind: "step", by: -1 });
   byId("redo").onclick = () => order({ kind: "step", by: 1 });
   byId("link").onclick = async () => { await remember(); await navigator.clipboard?.writeText(location.href).catch(() => {}); say("The link is copied: it holds the whole case"); };
-  byId("python").onclick = () => { byId("script").querySelector("pre").textContent = script(); byId("script").showModal(); };
-  for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button").onclick = () => dialog.close();
+  byId("python").onclick = () => {
+    const files = [get(base, "target.file"), get(base, "target.boundary")].filter(Boolean).map(name => name.replace("upload:", ""));
+    byId("needs").textContent = files.length ? `Run it in a folder with ${files.join(" and ")}; the download has it in inputs/.` : "";
+    byId("script").querySelector("pre").textContent = script(); byId("script").showModal();
+  };
+  for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button")?.addEventListener("click", () => dialog.close());
   wireTools();
   const controls = byId("controls");
   for (const begin of ["input", "pointerdown"]) controls.addEventListener(begin, () => { typing = true; });
