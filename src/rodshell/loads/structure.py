@@ -13,6 +13,7 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.errors import ConvergenceError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.layout import GridMesh
@@ -146,7 +147,7 @@ class Structure:
         return result
 
     def frequencies(self, count: int) -> Floats:
-        """(k,) the lowest natural frequencies without loads, ascending [Hz]; none without mass, or if unstable.
+        """(k,) the lowest natural frequencies without loads, ascending [Hz]; none where they are not known.
 
         Rods' mass is spread along their edges, so that the frequencies of bending are of fourth order in their length
         (see `solve.modes.frequencies`); joints and bracing are at the nodes.
@@ -165,7 +166,10 @@ class Structure:
         spread[: len(of_rods)] = of_rods
         if self.equilibrium.tangent.negative_modes or not of_rods.all():
             return np.zeros(0)
-        return frequencies(self.equilibrium, mass, count, edge_mass=spread).frequencies
+        try:
+            return frequencies(self.equilibrium, mass, count, edge_mass=spread).frequencies
+        except ConvergenceError:  # one figure of many: it is missing, and the others stand
+            return np.zeros(0)
 
     def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
         """The model of the laths of a third layer alone and its state; None: there are none.
