@@ -18,7 +18,8 @@ pop_up = { ends = "clamped" }
 checks = { stages = 0 }
 """
 LOADED = """
-loads = [{ name = "gale", kind = "wind", value = "0.4 kN/m2", coefficient = -0.5 }, { name = "weight", kind = "self_weight" }]
+loads = [{ name = "gale", kind = "wind", value = "0.4 kN/m2", coefficient = -0.5 },
+         { name = "weight", kind = "self_weight" }]
 combinations = [{ name = "storm", factors = { gale = 1.5, weight = 1.0 } }]
 """
 SPACING = "input[data-path='layout.spacing']"
