@@ -373,6 +373,8 @@ def refine(
     ratio: float = 8.0,
     per: Literal["shell", "family", "rod"] = "shell",
     varies: Literal["size", "width", "height", "a", "b"] = "size",
+    under: str = "nothing",
+    tolerance: float | None = None,
     progress: Progress = silent,
     time_limit: float | None = None,
 ) -> Form:
@@ -391,11 +393,14 @@ def refine(
     ratio : of the largest EI to the smallest along a taper [-].
     per : one taper for the whole shell, one for each family of rods, or one for each rod.
     varies : what of the section a taper changes: "size", all its lengths alike, or one of them by its name.
+    under : "nothing": unloaded; "weight": with its own weight; or the name of a combination of the form's case.
+    tolerance : largest error of a span between two joints as it is built [m]; None: 0.05 % of the target's size.
     progress, time_limit : as of `Job.run`.
 
     Raises
     ------
-    InputError : a value is of the wrong kind; the form comes from a table of rods.
+    InputError : a value is of the wrong kind; the form comes from a table of rods, or has no such combination; one of
+        its loads is not a force.
     """
     instance("form", form, Form, FOUND)
     if form.from_table:
@@ -403,6 +408,7 @@ def refine(
     asked = form.case.ends
     end = choice("ends", ends, ENDS) if ends is not None else (asked or ENDS)[0]
     changes: dict[str, object] = {"vary": vary, "ends": end, "ratio": ratio, "per": per, "varies": varies}
+    changes |= {"under": under, "tolerance": tolerance}
     job = Job.of_case(form.case).changed({f"refine.{key}": value for key, value in changes.items()})
     if end not in asked:
         job = job.changed({"pop_up.ends": end})

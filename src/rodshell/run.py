@@ -143,10 +143,16 @@ class Run:
             return earlier.refined
         from rodshell.refining.acceptance import refined  # it takes a tenth of a second to load, which few jobs need
 
-        table = case.refine
+        table, weight, forces = case.refine, float(case.refine.under == "weight"), None
+        ends = stages.ends[0] if table.ends is None else table.ends
+        loads = case.built_loads() if table.under in case.combination_names else None
+        if loads is not None and ends in stages.ends:
+            from rodshell.loads.fixed import fixed_forces
+
+            weight, forces = fixed_forces(stages, ends, loads, table.under)
         return refined(
-            stages, vary,
-            ends=table.ends, under_weight=table.under == "weight", start=table.start, progress=self.progress,
+            stages, vary, ends=ends, under_weight=weight, dead_loads=forces, span_error=table.tolerance,
+            start=table.start, progress=self.progress,
         )  # fmt: skip
 
     def _decided(self, case: Case, found: Built) -> tuple[Case, Built, Search | None]:

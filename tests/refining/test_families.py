@@ -48,7 +48,7 @@ def structure(ends: Ends, laths: bool = False, symmetric: bool = False, weighs: 
     if weighs:
         rod = rs.Rod(rod.section, rs.Material(youngs_modulus=1e6, density=7.0))
     found = structure_of(rs.find_form(target, layout, rod, ends=(ends,), joint=joint).stages, ends)  # type: ignore[arg-type]
-    return replace(found, weighs=weighs)
+    return replace(found, weight=float(weighs))
 
 
 def free_design(shell: Structure, family: Family) -> Design:

@@ -13,6 +13,7 @@ from rodshell.formfinding.trim import Footprint
 from rodshell.layout import FlatGrid, FlatRod, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import Crossings
 from rodshell.refining import acceptance, refine
+from rodshell.refining import gates as gates_module
 from rodshell.refining.gates import GATES, SPAN_ERROR, Gates, _from_flat, gates, misfit, with_errors
 from rodshell.solve.equilibrium import find_equilibrium
 
@@ -152,6 +153,26 @@ def test_another_shape_than_from_flat_is_refused() -> None:
     assert made > 5
 
 
+def test_a_path_from_flat_that_takes_too_long_is_refused_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gates_module, "MOST_FROM_FLAT", 5)
+    reason, made = _from_flat(stages(), silent)
+    assert reason == "that it comes to this shape from flat is not shown within 5 factorisations"
+    assert 5 <= made < 15  # of the first steps; the whole path takes 25 or more
+
+
+def test_errors_are_solved_in_few_factorisations_from_the_state_that_is_foreseen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    form = with_profile(rs.Profile.symmetric((0.4, 0.9, 1.0)))
+    at_once = list(with_errors(form, 3))
+    assert all(popped.report.factorizations <= 4 for popped in at_once)
+    monkeypatch.setattr(gates_module, "MOST_AT_ONCE", -1)
+    in_steps = list(with_errors(form, 3))
+    assert all(popped.report.factorizations >= 8 for popped in in_steps)
+    for popped, other in zip(at_once, in_steps, strict=True):
+        assert np.abs(popped.state - other.state).max() < 1e-8
+
+
 def test_a_shell_that_is_not_stable_is_tried_at_no_other_gate() -> None:
     form = stages()
     popped = form.popped["pinned"]
@@ -172,7 +193,7 @@ def refused_after(count: int, monkeypatch: pytest.MonkeyPatch, halvings: int = 0
     monkeypatch.setattr(acceptance, "FIRMER", ())
     tried = list[PatchForm]()
 
-    def some(form: PatchForm, *, all_of_them: bool = True, progress: object = None) -> Gates:
+    def some(form: PatchForm, *, all_of_them: bool = True, span_error: object = None, progress: object = None) -> Gates:
         tried.append(form)
         good = len(tried) > count
         return Gates(dict.fromkeys(GATES, good), "" if good else f"tolerance: number {len(tried)}", 7)
@@ -239,7 +260,8 @@ def test_where_none_passes_the_form_stays_as_it_was(monkeypatch: pytest.MonkeyPa
     tried = refused_after(99, monkeypatch)
     found = acceptance.refined(stages(), (refine.FAMILIES["taper"],))
     assert found.after is stages()
-    assert found.refused == "tolerance: number 1"
+    assert found.refused.startswith("tolerance: number 1; the form as it is then has up to ")
+    assert found.refused.endswith("give the largest error as refine.tolerance")
     assert found.gap_after == found.gap_before
     assert not any(found.gates.values())
     assert found.gate_factorizations >= 7 * len(tried)

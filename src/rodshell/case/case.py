@@ -225,8 +225,21 @@ class Case(Table):
         loads = self.built_loads()
         if loads is not None and loads.locked_joints is not None:
             loads.locked_joints.require_pins(joint)
+        if self.refine.under not in ("nothing", "weight", *self.combination_names):
+            known = ", ".join(("nothing", "weight", *self.combination_names))
+            raise InputError(
+                f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
+            )
         rod = self.rod_on(target, layout, anchor=anchor)
-        self.output_options().require_known_stress(rod, joint)
+        options = self.output_options()
+        options.require_known_stress(rod, joint)
+        if self.strength != StrengthTable():
+            from rodshell.loads.strength import net_section
+
+            strength = self.strength.build()
+            options.limits(rod, strength)
+            if strength.hole:
+                net_section(rod.section, strength.hole)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
 
     def _require_stock(self, layout: "GridLayout") -> None:
@@ -252,6 +265,11 @@ class Case(Table):
         ):
             if value != default:
                 raise InputError(f"{key} = {shown(value)}: {instead}")
+
+    @property
+    def combination_names(self) -> tuple[str, ...]:
+        """Names of the combinations of loads."""
+        return tuple(row.name for row in self.combinations)
 
     def built_loads(self) -> "Loads | None":
         """What the shell is to be checked under; None where the case has no loads.

@@ -175,8 +175,13 @@ class RefineTable(Table):
     varies: Literal["size", "width", "height", "a", "b"] = Field(
         default="size", description="what of the section a taper changes: all lengths, or one"
     )
-    under: Literal["nothing", "weight"] = Field(
-        default="nothing", description="meet the target unloaded, or carrying the own weight"
+    under: str = Field(
+        default="nothing",
+        description="meet the target under nothing, weight, or a combination of loads",
+    )
+    tolerance: Length | None = Field(
+        default=None,
+        description="largest error of a span as it is built; default: 0.05 % of the size",
     )
     start: Numbers | None = Field(default=None, description="design to begin with, as an interrupted search prints it")
     offer: Literal["on", "off"] = Field(default="on", description="say of any form what double laths would gain")

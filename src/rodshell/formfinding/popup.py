@@ -101,6 +101,7 @@ def pop_up(
     warm_start: PopUp | None = None,
     joint: Joint | Sequence[Joint] | None = None,
     like: PopUp | None = None,
+    most_factorizations: int | None = None,
     progress: Progress = silent,
 ) -> PopUp:
     """Move the rod ends of `footprint` to `boundary` and find the equilibrium of the free grid.
@@ -119,6 +120,8 @@ def pop_up(
         of their distance above or below the draped surface, and the boundary's ends lie there.
     like : a pop-up of the same footprint, such as with other ends. Where its matrices have the same pattern they are
         not analysed again, which saves time and changes nothing else.
+    most_factorizations : with start="flat", about how many each path (of the ends, and of the clamps) may take before
+        it is given up; None: no such limit.
 
     Raises
     ------
@@ -150,7 +153,7 @@ def pop_up(
             f"{length_text(apart)} apart: drape it with the same joint"
         )
     known = like.equilibrium.problem.pattern if like is not None else None
-    stages = _Stages(footprint, boundary, rod, joint, progress, known)
+    stages = _Stages(footprint, boundary, rod, joint, progress, known, most_factorizations)
     if start == "draped":
         shell, found = (stages.again(warm_start) if warm_start else None) or stages.release(ends)
     else:
@@ -172,6 +175,7 @@ class _Stages:
     joint: Joint | Sequence[Joint]
     progress: Progress
     pattern: Pattern | None = None
+    most_factorizations: int | None = None
 
     def _counting(self, what: str, most: int) -> Callable[[int, float], None]:
         return lambda k, step: self.progress("pop-up", f"{what} {k} of at most {most}", step)
@@ -278,6 +282,7 @@ class _Stages:
             np.zeros(len(mesh.edges)),
             first_step=FIRST_RISE,
             snap=True,
+            most_factorizations=self.most_factorizations,
             progress=lambda t, k, step: self.progress("pop-up", f"from flat, {100 * t:.0f} %, iteration {k}", step),
         )
         return shell, found
@@ -298,6 +303,7 @@ class _Stages:
             start,
             pinned.forces,
             first_step=CLAMP_STEP,
+            most_factorizations=self.most_factorizations,
             progress=lambda t, k, step: self.progress(
                 "pop-up", f"turning clamps, {100 * t:.0f} %, iteration {k}", step
             ),

@@ -9,12 +9,15 @@ stays as it was. Each patch of a form is refined by itself: its ends at the seam
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
 from rodshell.formfinding.popup import Ends
 from rodshell.formfinding.progress import Progress, silent
-from rodshell.refining.gates import GATES, Gates, gates
+from rodshell.refining.gates import GATES, SPAN_ERROR, Gates, gates, worst_with_errors
 from rodshell.refining.gauss_newton import Step
 from rodshell.refining.refine import LEAST_EIGENVALUE, Candidate, Refinement, between, loaded_gap, popped_up, refine
 from rodshell.refining.variables import Family
@@ -22,8 +25,18 @@ from rodshell.units import percent_text
 
 Stages = PatchForm | PatchedForm
 FIRMER = (0.75, 1.0)  # shares of the lowest eigenvalue that are asked for where a shell does not withstand errors
+EARLIER = 3  # designs that are tried where the best is refused
 HALVINGS = 3  # between a design that passes and a better one that does not
 NEARER = 1.0 - 1e-6  # of the gap before: more is not a gain
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What a refined shell carries when it is to meet its target, and how exactly it is built; see `refined`."""
+
+    weight: float
+    dead_loads: Floats | None
+    span_error: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +98,8 @@ class Refined:
 
 
 def refined(
-    stages: Stages, vary: Sequence[Family], *, ends: Ends | None = None, under_weight: bool = False,
+    stages: Stages, vary: Sequence[Family], *, ends: Ends | None = None, under_weight: float = 0.0,
+    dead_loads: Floats | None = None, span_error: float | None = None,
     start: Sequence[float] | None = None, progress: Progress = silent,
 ) -> Refined:  # fmt: skip
     """Refine a form, patch by patch.
@@ -95,7 +109,9 @@ def refined(
     stages : the form.
     vary : what is varied.
     ends : the only end condition of the refined form; None: the first asked for.
-    under_weight : bring the shell that carries its own weight to the target, in place of the unloaded one.
+    under_weight : factor on its own weight with which the shell is brought to the target, in place of the unloaded one.
+    dead_loads : (n, 3) further fixed loads on the nodes with which it is brought there [N]; of a form in one piece.
+    span_error : largest error of each span between two joints as it is built [m]; None: 0.05 % of the target's size.
     start : `Refined.design` of an earlier refinement, from which to continue.
     progress : called as progress(stage, detail, residual). An OutOfTimeError that it raises ends the search, and the
         gates are tried without it. A KeyboardInterrupt is raised again with a text that says where the search was.
@@ -104,18 +120,21 @@ def refined(
     ------
     InputError : the form has no target, or no pop-up with these ends; `start` does not fit.
     """
+    asked = _Asked(under_weight, dead_loads, span_error)
     end = stages.ends[0] if ends is None else ends
     if isinstance(stages, PatchForm):
-        return _of_piece(stages, vary, end, under_weight, start, progress)
+        return _of_piece(stages, vary, end, asked, start, progress)
     if start is not None:
         raise InputError("refine.start: each patch of a form has a design of its own: leave it out")
+    if dead_loads is not None:
+        raise InputError("a form in patches is refined unloaded or under its own weight alone: set refine.under so")
     parts, patches = dict[str, Refined](), dict[str, PatchForm]()
     for name, patch in stages.patches.items():
 
         def of_patch(stage: str, detail: str, residual: float, name: str = name) -> None:
             progress(stage, f"patch {name}, {detail}", residual)
 
-        parts[name] = _of_piece(patch, vary, end, under_weight, None, of_patch)
+        parts[name] = _of_piece(patch, vary, end, asked, None, of_patch)
         form = parts[name].after
         assert isinstance(form, PatchForm)
         patches[name] = form if parts[name].changed else _alone(patch, end)
@@ -133,37 +152,54 @@ def refined(
 
 
 def _of_piece(
-    stages: PatchForm, vary: Sequence[Family], ends: Ends, under_weight: bool, start: Sequence[float] | None,
+    stages: PatchForm, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
     progress: Progress,
 ) -> Refined:  # fmt: skip
     """Of a form in one piece: where the best design is refused, what refused it is respected in another search."""
     names = tuple(family.name for family in vary)
     progress("refine", ", ".join(names), 0.0)
     if ends in stages.popped and not stages.popped[ends].report.stable:
-        judged = gates(_alone(stages, ends), progress=progress)
+        judged = gates(_alone(stages, ends), span_error=asked.span_error, progress=progress)
         return Refined(names, ends, stages, stages, judged.passed, judged.reason, 0, judged.factorizations)
-    first = best = last = _searched(stages, vary, ends, under_weight, start, LEAST_EIGENVALUE, progress)
+    first = best = last = _searched(stages, vary, ends, asked, start, LEAST_EIGENVALUE, progress)
     firmer, again = list(FIRMER), stages
     while last.refused and not last.stopped:
         gate = last.refused.partition(":")[0]
-        if gate == "remeshed" and again is stages:
+        if gate == "remeshed" and again is stages and asked.dead_loads is None:  # loads act on nodes of this mesh
             again = meshed_again(stages, ends)
             if not again.popped[ends].report.stable:
                 break
         elif gate not in ("tolerance", "from_flat") or not firmer:
             break
         least = firmer.pop(0) if gate != "remeshed" else LEAST_EIGENVALUE
-        last = _searched(again, vary, ends, under_weight, start, least, progress)
+        last = _searched(again, vary, ends, asked, start, least, progress)
         made = best.factorizations + last.factorizations, best.gate_factorizations + last.gate_factorizations
         nearer = last.changed and (not best.changed or last.gap_after.rms < best.gap_after.rms)
         best = replace(last if nearer else best, factorizations=made[0], gate_factorizations=made[1])
     if not best.changed:
-        return replace(best, before=stages, after=stages, refused=first.refused, stopped=last.stopped)
+        refused, more = _explained(first.refused, _alone(stages, ends), asked)
+        more += best.gate_factorizations
+        return replace(
+            best, before=stages, after=stages, refused=refused, gate_factorizations=more, stopped=last.stopped
+        )
     return replace(best, before=stages, stopped=last.stopped)
 
 
+def _explained(refused: str, stages: PatchForm, asked: _Asked) -> tuple[str, int]:
+    """A refusal, of the gate of tolerance with what errors do to the form as it is; and the factorisations of that."""
+    if not refused.startswith("tolerance") or not stages.popped[stages.ends[0]].report.stable:
+        return refused, 0
+    error = SPAN_ERROR * stages.target.size if asked.span_error is None else asked.span_error
+    worst, made = worst_with_errors(stages, error)
+    if worst is None:
+        now = "the form as it is has no stable state nearby with them either"
+    else:
+        now = f"the form as it is then has up to {percent_text(worst)}"
+    return f"{refused}; {now}. If it is built more exactly, give the largest error as refine.tolerance", made
+
+
 def _searched(
-    stages: PatchForm, vary: Sequence[Family], ends: Ends, under_weight: bool, start: Sequence[float] | None,
+    stages: PatchForm, vary: Sequence[Family], ends: Ends, asked: _Asked, start: Sequence[float] | None,
     least_eigenvalue: float, progress: Progress,
 ) -> Refined:  # fmt: skip
     """One search, and the best of its designs that passes the gates."""
@@ -178,10 +214,10 @@ def _searched(
 
     try:
         found = refine(
-            stages, vary, ends=ends, under_weight=under_weight, start=start,
+            stages, vary, ends=ends, under_weight=asked.weight, dead_loads=asked.dead_loads, start=start,
             least_eigenvalue=least_eigenvalue, progress=searching,
         )  # fmt: skip
-        form, design, judged, refused, made = _accepted(found, silent if found.stopped else progress)
+        form, design, judged, refused, made = _accepted(found, asked.span_error, silent if found.stopped else progress)
     except KeyboardInterrupt as stopped:
         raise KeyboardInterrupt(_where(best) or str(stopped)) from stopped
     loaded: tuple[Agreement, ...] = ()
@@ -203,7 +239,9 @@ def _where(best: list[Step]) -> str:
     return f"the gap was down to {percent_text(best[0].rms)} rms; to continue from there: --refine.start={values}"
 
 
-def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, Candidate | None, Gates, str, int]:
+def _accepted(
+    found: Refinement, span_error: float | None, progress: Progress
+) -> tuple[PatchForm | None, Candidate | None, Gates, str, int]:
     """The best design that passes all gates, and its form, or None; its gates, or those of the best one found; why that
     one was refused; and the factorisations that all took.
 
@@ -211,19 +249,20 @@ def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, 
     between it and the one that was refused last.
     """
     before = found.gap_before if found.loaded is None else found.loaded[0]
-    nearer = [design for design in found.designs if design.point.rms < NEARER * before.rms_relative]
+    least = NEARER * before.rms_relative
+    nearer = [design for design in found.designs if design.point.rms < least]
     if not nearer:
-        judged = gates(found.before, progress=progress)
+        judged = gates(found.before, span_error=span_error, progress=progress)
         return None, None, judged, "no nearer design was found", judged.factorizations
-    form, judged, made = _judged(found, nearer[-1], True, progress)
+    form, judged, made = _judged(found, nearer[-1], span_error, True, progress)
     if judged.open:
         return form, nearer[-1], judged, "", made
     best, accepted, refused, low = judged, None, nearer[-1], found.designs[0]
-    for design in nearer[-2::-1]:
-        form, judged, more = _judged(found, design, False, progress)
+    for design in _some(nearer[-2::-1]):
+        form, judged, more = _judged(found, design, span_error, False, progress)
         made += more
         if judged.open:
-            accepted, low = (form, design, judged), design
+            accepted, low, least = (form, design, judged), design, design.point.rms
             break
         refused = design
     for _ in range(HALVINGS):
@@ -231,23 +270,31 @@ def _accepted(found: Refinement, progress: Progress) -> tuple[PatchForm | None, 
         made += spent
         if middle is None:
             break
-        form, judged, more = _judged(found, middle, False, progress)
+        form, judged, more = _judged(found, middle, span_error, False, progress)
         made += more
-        if judged.open and middle.point.rms < low.point.rms:
-            accepted, low = (form, middle, judged), middle
-        else:
+        if not judged.open:
             refused = middle
+            continue
+        low = middle
+        if middle.point.rms < least:
+            accepted, least = (form, middle, judged), middle.point.rms
     if accepted is None:
         return None, None, best, best.reason, made
     return *accepted, best.reason, made
 
 
+def _some(designs: Sequence[Candidate]) -> list[Candidate]:
+    """At most `EARLIER` of a row of designs: the first, the last, and those evenly between them."""
+    picked = np.unique(np.linspace(0, len(designs) - 1, min(EARLIER, len(designs))).round().astype(int))
+    return [designs[k] for k in picked]
+
+
 def _judged(
-    found: Refinement, design: Candidate, all_of_them: bool, progress: Progress
+    found: Refinement, design: Candidate, span_error: float | None, all_of_them: bool, progress: Progress
 ) -> tuple[PatchForm, Gates, int]:
     """A design popped up, its gates, and the factorisations of both; tried at all gates, or until one refuses it."""
     form, spent = popped_up(found.before, design, found.ends)
-    judged = gates(form, all_of_them=all_of_them, progress=progress)
+    judged = gates(form, all_of_them=all_of_them, span_error=span_error, progress=progress)
     return form, judged, spent + judged.factorizations
 
 

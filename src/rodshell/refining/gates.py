@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array, eye_array
+from scipy.sparse import coo_array, csc_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from rodshell.arrays import Floats, Ints
@@ -21,10 +21,12 @@ from rodshell.formfinding.pipeline import PatchForm, agreement, meshed_again
 from rodshell.formfinding.popup import PopUp, pop_up
 from rodshell.formfinding.progress import Progress, silent
 from rodshell.layout import GridMesh
-from rodshell.model.edge_properties import EI1, LENGTH, EdgeProperties
+from rodshell.model.edge_properties import EI1, LENGTH, PROPERTIES, EdgeProperties
 from rodshell.model.rod_sections import RodSections
-from rodshell.solve.equilibrium import find_equilibrium
-from rodshell.units import percent_text
+from rodshell.solve.equilibrium import Equilibrium, find_equilibrium, find_stable
+from rodshell.solve.problem import Problem
+from rodshell.solve.sensitivity import Parameters, Sensitivity
+from rodshell.units import length_text, percent_text
 
 GATES = ("stable", "flat", "remeshed", "tolerance", "from_flat")
 """In the order in which they are tried: those that take the least work first."""
@@ -33,10 +35,12 @@ SAME_SHAPE = 1e-6  # largest distance of the shape reached from flat
 MISFIT = 5e-4  # largest distance of a joint's two holes in the plane: the workshop's error, see SPAN_ERROR
 REMESHED, REMESHED_LEAST = 0.05, 2e-5  # change of the rms gap: a share of it, or so much
 SAMPLES = 8
-ERROR_STEPS = (0.25, 0.5, 0.75, 1.0)  # shares of the errors, one after the other
+MOST_AT_ONCE = 10  # iterations from the state that is foreseen to first order
+ERROR_STEPS = (0.25, 0.5, 0.75, 1.0)  # shares of the errors, one after the other, where that leads to no stable state
 SPAN_ERROR = 0.1e-3 / 0.2  # largest, of each span's length: 0.1 mm where the target's size is 0.2 m
 STIFFNESS_ERROR = 0.05  # largest, of each rod's EI and GJ
 WORSE, WORSE_BY = 1.5, 0.0015  # with errors the rms gap may be so many times its value, and so much more
+MOST_FROM_FLAT = 600  # factorisations; the paths that arrive take 25 to 470
 FITS = 20  # steps of the fit of rods in a plane
 
 
@@ -61,19 +65,25 @@ class Gates:
         return not self.reason
 
 
-def gates(form: PatchForm, *, all_of_them: bool = True, progress: Progress = silent) -> Gates:
+def gates(
+    form: PatchForm, *, all_of_them: bool = True, span_error: float | None = None, progress: Progress = silent
+) -> Gates:
     """Try a design at every gate.
 
     Parameters
     ----------
     form : the design, popped up with one end condition.
     all_of_them : try the others too after a gate has refused it.
+    span_error : largest error of each span as it is built [m]; None: `SPAN_ERROR` of the target's size.
     progress : called as progress(stage, detail, residual).
     """
     passed, first, factorizations = dict[str, bool](), "", 0
     for name in GATES:
         progress("refine", f"gate {name}", 0.0)
-        reason, made = _TRIALS[name](form, progress)
+        if name == "tolerance":
+            reason, made = _tolerance(form, span_error, progress)
+        else:
+            reason, made = _TRIALS[name](form, progress)
         passed[name], factorizations = not reason, factorizations + made
         if reason and not first:
             first = f"{name}: {reason}"
@@ -116,25 +126,50 @@ def _remeshed(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return f"meshed again, its gap is {percent_text(after)} rms and not {percent_text(before)}", made
 
 
-def _tolerance(form: PatchForm, progress: Progress) -> tuple[str, int]:
-    most, worst, made = WORSE * _rms(form) + WORSE_BY, 0.0, 0
-    for sample, popped in enumerate(with_errors(form), start=1):
+def _tolerance(form: PatchForm, span_error: float | None, progress: Progress) -> tuple[str, int]:
+    error = SPAN_ERROR * form.target.size if span_error is None else span_error
+    built = f"built with errors of up to {length_text(error)} in every span"
+    most = WORSE * _rms(form) + WORSE_BY
+    worst, made = worst_with_errors(form, error, progress)
+    if worst is None:
+        return f"{built}, the shell has no stable state nearby", made
+    if worst <= most:
+        return "", made
+    return f"{built}, its gap is up to {percent_text(worst)} rms, more than {percent_text(most)}", made
+
+
+def worst_with_errors(form: PatchForm, span_error: float, progress: Progress = silent) -> tuple[float | None, int]:
+    """The largest rms gap of the shell built with errors, over the target's size, and the factorisations that it took.
+
+    Parameters
+    ----------
+    form : the design, popped up with one end condition.
+    span_error : largest error of each span's length [m].
+    progress : called as progress(stage, detail, residual).
+
+    Returns
+    -------
+    None in place of the gap where one of them has no stable state nearby.
+    """
+    worst, made = 0.0, 0
+    for sample, popped in enumerate(with_errors(form, span_error=span_error), start=1):
         progress("refine", f"gate tolerance, sample {sample} of {SAMPLES}", 0.0)
         made += popped.report.factorizations
         if not popped.report.stable:
-            return "built with errors, the shell is not stable", made
+            return None, made
         worst = max(worst, agreement(popped, form.target).rms_relative)
-    if worst <= most:
-        return "", made
-    return f"built with errors, its gap is up to {percent_text(worst)} rms, more than {percent_text(most)}", made
+    return worst, made
 
 
 def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
     (ends,) = form.popped
     found = pop_up(
-        form.footprint, form.boundary, form.rod, ends=ends, start="flat", joint=form.joint, progress=progress
-    )
+        form.footprint, form.boundary, form.rod, ends=ends, start="flat", joint=form.joint,
+        most_factorizations=MOST_FROM_FLAT, progress=progress,
+    )  # fmt: skip
     made = found.report.factorizations
+    if not found.report.converged and made >= MOST_FROM_FLAT:
+        return f"that it comes to this shape from flat is not shown within {MOST_FROM_FLAT} factorisations", made
     if not found.report.converged:
         return "pushed up from flat, the shell is lost on the way", made
     last = found.equilibrium
@@ -146,43 +181,61 @@ def _from_flat(form: PatchForm, progress: Progress) -> tuple[str, int]:
     return f"pushed up from flat, it comes to another shape, {percent_text(apart)} of the size away", made
 
 
-_TRIALS = {
-    "stable": _stable, "flat": _flat, "remeshed": _remeshed, "tolerance": _tolerance, "from_flat": _from_flat,
-}  # fmt: skip
+_TRIALS = {"stable": _stable, "flat": _flat, "remeshed": _remeshed, "from_flat": _from_flat}
 
 
-def with_errors(form: PatchForm, samples: int = SAMPLES) -> Iterator[PopUp]:
+def with_errors(form: PatchForm, samples: int = SAMPLES, *, span_error: float | None = None) -> Iterator[PopUp]:
     """The shell built with errors: each span is too long or too short, each rod too stiff or too soft, by chance.
+
+    It is solved from the state that is foreseen to first order. Where that does not lead to a stable equilibrium, the
+    errors grow in steps, and a shell that loses its stability on the way slides to the stable state next to it.
 
     Parameters
     ----------
     form : the design, popped up with one end condition.
     samples : of a random generator with the seeds 0, 1, ...
+    span_error : largest error of each span's length [m]; None: `SPAN_ERROR` of the target's size.
     """
     popped = _popped(form)
     mesh, shell, found = popped.shell.mesh, popped.shell, popped.equilibrium
     sections = RodSections.of(mesh, [form.rod] * len(mesh.grid.rods))
     table = np.column_stack([sections.stretch, sections.edges, mesh.edge_lengths])
-    span = spans(mesh)
-    edges, lengths = int(span[-1]) + 1, np.bincount(span, mesh.edge_lengths)
     exact = EdgeProperties.of(shell, form.joint, table)
-    for seed in range(samples):
-        random = np.random.default_rng(seed)
-        errors = (SPAN_ERROR * form.target.size * random.uniform(-1.0, 1.0, edges) / lengths)[span]
-        softer = STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))[mesh.edge_rods, None]
-        here, made = found, 0
-        for share in ERROR_STEPS:  # all at once may lead to an unstable state next to the one that the shell goes to
-            varied = table.copy()
-            varied[:, LENGTH] *= 1.0 + share * errors
-            varied[:, EI1:LENGTH] *= 1.0 + share * softer
-            other = exact.at(here.elements).varied(varied).shell
-            problem = replace(here.problem, elements=other.elements, stretch=other.stretch)
-            here = find_equilibrium(problem, here.state, here.forces)
-            made += here.report.factorizations
-            if not here.report.stable:
-                break
-        report = replace(here.report, factorizations=made)
+    errors = np.stack([_errors(form, span_error, seed) for seed in range(samples)])
+    by_errors = np.log1p(errors).reshape(samples, -1).T
+    foreseen = Sensitivity(found, exact).response(Parameters(csc_array(by_errors)))
+    for sample, error in enumerate(errors):
+
+        def built(here: Equilibrium, share: float, error: Floats = error) -> Problem:
+            other = exact.at(here.elements).varied(table * (1.0 + share * error)).shell
+            return replace(here.problem, elements=other.elements, stretch=other.stretch)
+
+        state, forces = found.state + foreseen.motions[sample], found.forces + foreseen.forces[sample]
+        problem = built(found, 1.0).refreshed(state)
+        here = find_equilibrium(problem, state, forces, most_iterations=MOST_AT_ONCE)
+        reports = [here.report]
+        if not here.report.stable:
+            here = found
+            for share in ERROR_STEPS:
+                here = find_stable(built(here, share), here.state, here.forces)
+                reports.append(here.report)
+                if not here.report.stable:
+                    break
+        report = here.report.after(*(report for report in reports if report is not here.report))
+        other = exact.at(here.elements).varied(table * (1.0 + error)).shell
         yield replace(popped, shell=other.with_elements(here.elements), equilibrium=replace(here, report=report))
+
+
+def _errors(form: PatchForm, span_error: float | None, seed: int) -> Floats:
+    """(e, 5) relative errors of the edges' properties: of the lengths of spans, and of the EI and GJ of rods."""
+    mesh, random = form.footprint.mesh, np.random.default_rng(seed)
+    span = spans(mesh)
+    result = np.zeros((len(span), PROPERTIES))
+    error = SPAN_ERROR * form.target.size if span_error is None else span_error
+    longer = error * random.uniform(-1.0, 1.0, int(span[-1]) + 1)
+    result[:, LENGTH] = (longer / np.bincount(span, mesh.edge_lengths))[span]
+    result[:, EI1:LENGTH] = STIFFNESS_ERROR * random.uniform(-1.0, 1.0, len(mesh.grid.rods))[mesh.edge_rods, None]
+    return result
 
 
 def spans(mesh: GridMesh) -> Ints:

@@ -20,9 +20,9 @@ from rodshell.formfinding.trim import Footprint
 from rodshell.joints.joint import Elastic
 from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
-from rodshell.refining.gauss_newton import Step, gauss_newton
+from rodshell.refining.gauss_newton import Found, Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
-from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress
+from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress, residuals
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
 from rodshell.refining.structure import Point, Structure, under_load
@@ -30,6 +30,7 @@ from rodshell.refining.variables import Design, Family, Grid, design_of
 from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import find_equilibrium
 from rodshell.solve.problem import Problem
+from rodshell.units import percent_text
 from rodshell.validation import choice
 
 FAMILIES: dict[str, Family] = {
@@ -40,6 +41,7 @@ FAMILIES: dict[str, Family] = {
 
 STIFFNESSES = ("taper", "double", "sections")  # the others work by compressing rods, too
 STIFFER = 1.02  # of the eigenvalue before, since EA does not follow EI
+OPPOSITE = 0.5  # of the way that lengths go, to the other side: all of it mostly has no stable equilibrium
 LEAST_EIGENVALUE = 0.5  # of the lowest one before
 Progress = Callable[[Step], None]
 
@@ -88,6 +90,10 @@ class Refinement:
     stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
 
+    def __repr__(self) -> str:
+        gap = f"{percent_text(self.gap_before.rms_relative)} -> {percent_text(self.gap_after.rms_relative)} rms"
+        return f"<Refinement by {', '.join(self.vary)}, {self.ends}: {gap}, {self.factorizations} factorisations>"
+
     @property
     def gap_before(self) -> Agreement:
         """Distance to the target before."""
@@ -106,10 +112,10 @@ def refine(
     ends: Ends | None = None,
     objectives: Sequence[Objective] | None = None,
     least_eigenvalue: float = LEAST_EIGENVALUE,
-    under_weight: bool = False,
+    under_weight: float = 0.0,
     dead_loads: Floats | None = None,
     start: Sequence[float] | None = None,
-    most_evaluations: int = 30,
+    most_evaluations: int = 60,
     progress: Progress = lambda step: None,
 ) -> Refinement:
     """Bring a popped-up shell nearer to its target.
@@ -121,10 +127,11 @@ def refine(
     ends : how the rods' ends are held; None: as first asked for.
     objectives : what is made small; None: the mean square of the gap and, where not only stiffness varies, compression.
     least_eigenvalue : share of the lowest eigenvalue before below which no design is accepted [-].
-    under_weight : bring the shell that carries its own weight to the target; unloaded it then stands above.
+    under_weight : factor on its own weight with which the shell is brought to the target, such as 1.0; unloaded it then
+        stands above.
     dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
     start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
-    most_evaluations : designs that are tried.
+    most_evaluations : designs that are tried; where only lengths, clamps or supports vary, twice as many.
     progress : called after each; an OutOfTimeError that it raises ends the search with what was found.
 
     Raises
@@ -134,18 +141,31 @@ def refine(
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
-    structure = replace(structure_of(stages, ends), weighs=under_weight, dead_loads=dead_loads)
+    structure = replace(structure_of(stages, ends), weight=under_weight, dead_loads=dead_loads)
     variables = design_of(structure, families)
     here, spent = first_point(structure, variables, start)
     before = structure.lowest if here.equilibrium.problem.load is None else float(here.modes.values[0])
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
     goals = [Gap(), *stressed] if objectives is None else list(objectives)
-    found = gauss_newton(
-        variables, here, [*goals, floor],
-        allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
-    )  # fmt: skip
+
+    def searched(first: Point) -> Found:
+        return gauss_newton(
+            variables, first, [*goals, floor],
+            allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
+        )  # fmt: skip
+
+    found = searched(here)
     accepted = found.accepted
+    if start is None and not found.stopped and not any(family.name in STIFFNESSES for family in families):
+        opposite, more = _opposite(variables, here, accepted[-1])
+        spent += more
+        if opposite is not None:
+            other = searched(opposite)
+            steps, made = (*found.steps, *other.steps), found.factorizations + other.factorizations
+            nearer = _cost([*goals, floor], other.accepted[-1]) < _cost([*goals, floor], accepted[-1])
+            accepted = (here, *other.accepted) if nearer else accepted
+            found = replace(other if nearer else found, factorizations=made, steps=steps, stopped=other.stopped)
     if any(sizes is not None for sizes in variables.stock):
         chosen, more = rounded(variables, accepted[-1], [*goals, floor], floor.allows)
         spent += more
@@ -162,6 +182,24 @@ def refine(
         names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
         found.steps, variables, found.stopped, loaded,
     )  # fmt: skip
+
+
+def _opposite(variables: Design, first: Point, found: Point) -> tuple[Point | None, int]:
+    """A design on the other side of the first one than that which was found, and the factorisations that it took.
+
+    Lengths act by bowing spans, outwards or inwards, so that the gap has several minima: what is found from both sides
+    is compared.
+    """
+    box = variables.box
+    values = np.clip(first.values - OPPOSITE * (found.values - first.values), box.lower, box.upper)
+    if np.array_equal(values, first.values):
+        return None, 0
+    return first.tried(values, variables.change(values))
+
+
+def _cost(goals: Sequence[Objective], here: Point) -> float:
+    """The sum of squares that is made small."""
+    return float(np.sum(residuals(goals, here) ** 2))
 
 
 def between(refinement: Refinement, low: Candidate, high: Candidate, share: float) -> tuple[Candidate | None, int]:
@@ -319,10 +357,10 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
     shell = shell.with_elements(tuple(map(_with_frames, shell.elements, here.elements)))
     problem = Problem.of_shell(shell, grid.boundary.points, pattern=here.problem.pattern)
     if here.problem.load is None:
-        found = find_equilibrium(problem, here.state, here.forces)
+        found, made = find_equilibrium(problem, here.state, here.forces), 0
     else:
         found = find_equilibrium(replace(problem, load=here.problem.load), here.state, here.forces)
-        unloaded, _ = under_load(found, np.zeros_like(here.state))
+        unloaded, made = under_load(found, np.zeros_like(here.state))
         found = replace(unloaded or found, problem=replace((unloaded or found).problem, load=None))
     shell = shell.with_elements(found.elements)
     footprint = Footprint(grid.mesh)
@@ -331,7 +369,7 @@ def popped_up(stages: PatchForm, design: Candidate, ends: Ends) -> tuple[PatchFo
         stages, ends=(ends,), footprint=footprint, boundary=grid.boundary,
         popped={ends: popped}, agreement={ends: agreement(popped, stages.target)},
     )  # fmt: skip
-    return result, found.report.factorizations
+    return result, found.report.factorizations + made
 
 
 def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
@@ -346,8 +384,8 @@ def loaded_gap(stages: PatchForm, design: Candidate, ends: Ends) -> Agreement:
     popped, here, structure = stages.popped[ends], design.point.equilibrium, design.point.structure
     load = np.zeros_like(popped.state)
     nodes = slice(0, popped.shell.first_angle)
-    if structure.weighs:
-        load[nodes, 2] = -STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
+    if structure.weight:
+        load[nodes, 2] = -structure.weight * STANDARD_GRAVITY * popped.shell.mass[nodes, 2]
     if structure.dead_loads is not None:
         load[: len(structure.dead_loads)] += structure.dead_loads
     shell = popped.shell.with_elements(tuple(map(_with_frames, popped.shell.elements, here.elements)))

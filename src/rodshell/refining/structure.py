@@ -37,7 +37,7 @@ class Structure:
     rod : section and material of its rods, which have no profiles.
     joint : where they cross.
     target : the shape wanted.
-    weighs : whether the shell is wanted there under its own weight.
+    weight : factor on the shell's own weight under which it is wanted there [-]; 0: without it.
     dead_loads : (n, 3) loads on the mesh's nodes under which it is wanted there [N]; None: none.
     """
 
@@ -45,7 +45,7 @@ class Structure:
     rod: Rod
     joint: Joint
     target: Target
-    weighs: bool = False
+    weight: float = 0.0
     dead_loads: Floats | None = None
 
     @property
@@ -57,8 +57,8 @@ class Structure:
         """The edges before any design."""
         table = np.column_stack([self.stiffness(self.mesh), self.mesh.edge_lengths])
         edges = EdgeProperties.of(self.popped.shell, self.joint, table)
-        weight = np.full(len(table), STANDARD_GRAVITY * self.rod.mass_per_length / self.rod.stretch_stiffness)
-        return replace(edges, weight=weight) if self.weighs else edges
+        by_stiffness = self.weight * STANDARD_GRAVITY * self.rod.mass_per_length / self.rod.stretch_stiffness
+        return replace(edges, weight=np.full(len(table), by_stiffness)) if self.weight else edges
 
     @cached_property
     def constant_load(self) -> Floats:
@@ -66,8 +66,10 @@ class Structure:
         shell, edges = self.popped.shell, self.edges
         result = np.zeros((len(shell.like), 3))
         nodes = slice(0, shell.first_angle)
-        if self.weighs:
-            result[nodes, 2] = -STANDARD_GRAVITY * shell.mass[nodes, 2] - edges.load(len(result))[nodes, 2]
+        if self.weight:
+            result[nodes, 2] = (
+                -self.weight * STANDARD_GRAVITY * shell.mass[nodes, 2] - edges.load(len(result))[nodes, 2]
+            )
         if self.dead_loads is not None:
             result[: len(self.dead_loads)] += self.dead_loads
         return result
@@ -79,7 +81,7 @@ class Structure:
         ----------
         edges : of the design.
         """
-        if not self.weighs and self.dead_loads is None:
+        if not self.weight and self.dead_loads is None:
             return None
         return edges.load(len(self.popped.shell.like)) + self.constant_load
 

@@ -45,6 +45,7 @@ def follow(
     *,
     first_step: float,
     snap: bool = False,
+    most_factorizations: int | None = None,
     progress: Callable[[float, int, float], None] | None = None,
 ) -> Equilibrium:
     """Move from t = 0 to t = 1 by steps that shrink on failure and grow back.
@@ -57,6 +58,7 @@ def follow(
     state, forces : equilibrium, or a guess of it, at t = 0.
     snap : where short steps fail, as at a limit point, go down the energy to the next stable equilibrium, as the
         structure itself would; its constraint must be `Supports`.
+    most_factorizations : no step is begun after so many, and no descent takes many more; None: as many as it takes.
 
     Returns
     -------
@@ -88,11 +90,14 @@ def follow(
             break
         if snap and last is not None and step < SNAP and not found.report.converged:
             there = min(1.0, t + SNAP)
-            found = _fallen(going_on(problem_at(there), last), last, found)
+            left = None if most_factorizations is None else most_factorizations - _made(reports)
+            found = _fallen(going_on(problem_at(there), last), last, found, most_factorizations=left)
             reports.append(found.report)
             if found.report.stable:
                 t, state, forces, last, step = there, found.state, found.forces, found, 4 * SNAP
         if t < 1.0 and (step < SMALLEST_STEP or sum(report.iterations for report in reports) > MOST_OF_ALL):
+            break
+        if t < 1.0 and most_factorizations is not None and _made(reports) >= most_factorizations:
             break
     ended = last or found
     report = ended.report.after(*(report for report in reports if report is not ended.report))
@@ -101,6 +106,11 @@ def follow(
     late = found.report.status is Status.OUT_OF_TIME
     status = Status.OUT_OF_TIME if late else Status.STALLED
     return replace(ended, report=replace(report, status=status, reason=found.report.reason))
+
+
+def _made(reports: list[SolveReport]) -> int:
+    """Factorisations of several solves."""
+    return sum(report.factorizations for report in reports)
 
 
 @dataclass(frozen=True)
@@ -220,11 +230,13 @@ def farthest(here: Equilibrium, there: Equilibrium) -> float:
     return float(np.linalg.norm(there.state[nodes] - here.state[nodes], axis=1).max())
 
 
-def _fallen(problem: Problem, here: Equilibrium, found: Equilibrium) -> Equilibrium:
+def _fallen(
+    problem: Problem, here: Equilibrium, found: Equilibrium, *, most_factorizations: int | None = None
+) -> Equilibrium:
     """The stable equilibrium down the energy, the supports being where the problem has them.
 
     By Newton's method with shifted Hessians, which takes a fifth of the work of the steepest descent and mostly leads
-    to the same equilibrium; by the descent where that fails or gains energy.
+    to the same equilibrium; by the descent where that fails or gains energy, and factorisations are left for it.
     """
     supports, state, forces = problem.constraint, here.state, here.forces
     assert isinstance(supports, Supports)
@@ -236,7 +248,10 @@ def _fallen(problem: Problem, here: Equilibrium, found: Equilibrium) -> Equilibr
         return down
     state = state.copy()
     state[supports.moved] = supports.goals
-    slid = relax(problem, state)
+    left = None if most_factorizations is None else most_factorizations - down.report.factorizations
+    if left is not None and left <= 0:
+        return down
+    slid = relax(problem, state, most_factorizations=left)
     return replace(slid, report=slid.report.after(down.report))
 
 
@@ -247,13 +262,17 @@ STILL = 1e-5  # of the length: a long step that moves by less has arrived near e
 MOST_STEPS = 400
 
 
-def relax(problem: Problem, state: Floats, *, progress: Callable[[int, float], None] | None = None) -> Equilibrium:
+def relax(
+    problem: Problem, state: Floats, *,
+    most_factorizations: int | None = None, progress: Callable[[int, float], None] | None = None,
+) -> Equilibrium:  # fmt: skip
     """The stable equilibrium that lies below a state; the last steps are those of `find_stable`.
 
     Parameters
     ----------
     problem : with elastic edges.
     state : (N, 3) to begin with [m, at twist angles rad].
+    most_factorizations : no step down is taken after so many; None: as many as `MOST_STEPS` take.
     progress : called with the number and the length of each step; an OutOfTimeError that it raises ends the descent.
 
     Returns
@@ -288,6 +307,8 @@ def relax(problem: Problem, state: Floats, *, progress: Callable[[int, float], N
         except OutOfTimeError:
             break  # the solve that follows ends at its first iteration, and says so
         if length > LONG and moved < STILL * problem.length:
+            break
+        if most_factorizations is not None and factorizations >= most_factorizations:
             break
         length = min(GROWTH * length, GROWTH * LONG)
     forces = problem.stretch.stiffness * problem.stretch.strains(state)
