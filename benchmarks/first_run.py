@@ -98,7 +98,8 @@ def section(*, jit: bool = False, pip: bool = False, earlier: str = EARLIER) -> 
               f"{_both(run.install)}, {_both(run.first)}, {_both(run.second)} s; {run.size:.0f} MB")
           for name, run in ((f"commit {earlier}", then), ("now", now))),
     ]  # fmt: skip
-    return Section(f"First run, {how}", f"{' '.join((section.__doc__ or '').split())} Seconds on the clock (of processors).", rows)
+    said = " ".join((section.__doc__ or "").split())
+    return Section(f"First run, {how}", f"{said} Seconds on the clock (of processors).", rows)
 
 
 def _both(seconds: Seconds) -> str:
