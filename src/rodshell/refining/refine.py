@@ -22,6 +22,7 @@ from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
+from rodshell.refining.load_limits import Deflection, LoadFactor
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress, residuals
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
@@ -76,6 +77,7 @@ class Refinement:
     variables : what was varied.
     stopped : when and where the search was out of time, or "".
     loaded : gaps before and after under the loads, where it was refined under loads; else None.
+    as_found : whether its stiffnesses are built as they were found, see `built`.
     """
 
     vary: tuple[str, ...]
@@ -89,6 +91,7 @@ class Refinement:
     variables: Design
     stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
+    as_found: bool = False
 
     def __repr__(self) -> str:
         gap = f"{percent_text(self.gap_before.rms_relative)} -> {percent_text(self.gap_after.rms_relative)} rms"
@@ -171,7 +174,8 @@ def refine(
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    designs = tuple(Candidate(point, built(variables, point)) for point in accepted)
+    as_found = any(isinstance(goal, (Deflection, LoadFactor)) for goal in goals)
+    designs = tuple(Candidate(point, built(variables, point, as_found=as_found)) for point in accepted)
     after, made = popped_up(stages, designs[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
@@ -180,7 +184,7 @@ def refine(
     names = tuple(family.name for family in families)
     return Refinement(
         names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
-        found.steps, variables, found.stopped, loaded,
+        found.steps, variables, found.stopped, loaded, as_found,
     )  # fmt: skip
 
 
@@ -223,10 +227,10 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
     point, made = here.tried(values, variables.change(values))
     if point is None:
         return None, made + 1
-    return Candidate(point, built(variables, point)), made + 1
+    return Candidate(point, built(variables, point, as_found=refinement.as_found)), made + 1
 
 
-def built(variables: Design, point: Point) -> Grid:
+def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
     """The grid of a design.
 
     A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
@@ -236,13 +240,14 @@ def built(variables: Design, point: Point) -> Grid:
     ----------
     variables : what is varied.
     point : the design.
+    as_found : leave that factor as it is, since limits under loads decide on it.
     """
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
     joint = structure.joint
     given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
     springs = any(0.0 < stiffness < inf for stiffness in given)
-    if point.equilibrium.problem.load is None and not springs:
+    if point.equilibrium.problem.load is None and not springs and not as_found:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
         least = STIFFER * structure.lowest / float(point.modes.values[0])
