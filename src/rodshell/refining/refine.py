@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.errors import InputError
+from rodshell.errors import ConvergenceError, InputError
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
 from rodshell.formfinding.popup import Ends, PopUp
@@ -139,8 +139,8 @@ def refine(
 
     Raises
     ------
-    InputError : no such family; the shell has no target, no pop-up with these ends, is not stable, or falls under the
-        loads.
+    InputError : no such family; the shell has no target, no pop-up with these ends, or is not stable.
+    ConvergenceError : it falls under the loads, or has no stable equilibrium with the design to start from.
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
@@ -315,7 +315,8 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
 
     Raises
     ------
-    InputError : it has no stable equilibrium near the shell's own; `start` is not as long as there are variables.
+    InputError : `start` is not as long as there are variables.
+    ConvergenceError : it has no stable equilibrium near the shell's own; the shell falls under the loads.
     """
     box = variables.box
     values = box.start
@@ -334,12 +335,14 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
         here = find_equilibrium(problem, here.state, here.forces)
         made = here.report.factorizations
         if not here.report.stable:
-            raise InputError("the first design has no stable equilibrium near the shell's own: vary something else")
+            raise ConvergenceError(
+                "the first design has no stable equilibrium near the shell's own: vary something else"
+            )
     load = structure.load(edges)
     if load is not None:
         loaded, more = under_load(here, load)
         if loaded is None:
-            raise InputError("the shell falls under these loads: clamp its ends, or choose stiffer rods")
+            raise ConvergenceError("the shell falls under these loads: clamp its ends, or choose stiffer rods")
         here, made = loaded, made + more
     return Point(structure, values, change, edges.at(here.elements), here), made
 
