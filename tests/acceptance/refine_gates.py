@@ -80,24 +80,22 @@ def over_fitted() -> Iterator[Row]:
 def with_all_gates() -> Iterator[Row]:
     """Two designs of many variables, whose figures without gates are in `refine_designs`: what of them can be built.
 
-    The limits are those without gates. Where the gate of tolerance keeps a design from them it is told what errors do to
-    the form as it was: below a certain gap they decide, whatever the rods.
+    Errors of 0.05 % of the size in every span spoil a shallow shell whatever its rods, so that the gate of tolerance
+    keeps the second one from its figure. Built five times as exactly it reaches it.
     """
-    cases: tuple[tuple[str, Ends, list[Family], float], ...] = (
-        ("two bumps", "clamped", [FAMILIES["clamps"], Taper(per="rod", stations=3)], 0.06),
-        ("freeform.obj", "pinned", [Taper(ratio=4.0, per="rod")], 0.016),
+    cases: tuple[tuple[str, Ends, list[Family], float, float | None], ...] = (
+        ("two bumps", "clamped", [FAMILIES["clamps"], Taper(per="rod", stations=3)], 0.06, None),
+        ("freeform.obj", "pinned", [Taper(ratio=4.0, per="rod")], 0.016, None),
+        ("freeform.obj", "pinned", [Taper(ratio=4.0, per="rod")], 0.016, 1e-4),
     )
-    for shell, ends, vary, most in cases:
+    for shell, ends, vary, most, error in cases:
         stages = stages_of(shell, ends, 0.015)
-        found = refined(stages, vary, ends=ends)
-        gap = 100 * found.gap_after.rms_relative
+        found = refined(stages, vary, ends=ends, span_error=None if error is None else error * stages.target.size)
+        name = f"{shell}, {ends}: taper a rod, all gates{'' if error is None else f', spans to {100 * error:g} %'}"
+        before, gap = (100 * agreement.rms_relative for agreement in (found.gap_before, found.gap_after))
         note = f"without gates {most} % is asked; {found.words}"
-        yield Row(f"{shell}, {ends}: taper a rod, all gates", "not accepted", float(not found.changed), 0, note=note)
-        before = 100 * found.gap_before.rms_relative
-        yield Row(f"{shell}, {ends}: taper a rod, all gates", "gap rms over the size", gap, before, "%", note)
-        exact = refined(stages, vary, ends=ends, span_error=1e-4 * stages.target.size)
-        gap = 100 * exact.gap_after.rms_relative
-        yield Row(f"{shell}, {ends}: the same, spans to 0.01 %", "gap rms over the size", gap, most, "%", exact.words)
+        yield Row(name, "gap rms over the size", gap, before if error is None else most, "%", note)
+        yield Row(name, "neither nearer nor told why", float(gap >= before and not found.refused), 0)
 
 
 def against_genetic(shell: str) -> Iterator[Row]:
@@ -145,9 +143,9 @@ def refined_pieces(found: Refined) -> Iterator[tuple[str, PatchForm]]:
     if isinstance(found.after, PatchForm):
         yield "", found.after
         return
-    for name, patch in found.after.patches.items():
-        if any(rod.profile is not None for rod in patch.footprint.rods):
-            yield f", patch {name}", patch
+    for name, piece in found.after.patches.items():
+        if any(rod.profile is not None for rod in piece.footprint.rods):
+            yield f", patch {name}", piece
 
 
 def missed(form: PatchForm) -> list[str]:
