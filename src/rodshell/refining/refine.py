@@ -118,7 +118,7 @@ def refine(
     under_weight: float = 0.0,
     dead_loads: Floats | None = None,
     start: Sequence[float] | None = None,
-    most_evaluations: int = 60,
+    most_evaluations: int | None = None,
     progress: Progress = lambda step: None,
 ) -> Refinement:
     """Bring a popped-up shell nearer to its target.
@@ -134,7 +134,7 @@ def refine(
         stands above.
     dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
     start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
-    most_evaluations : designs that are tried; where only lengths, clamps or supports vary, twice as many.
+    most_evaluations : designs that are tried; None: 60, or 30 on either side where only lengths, clamps or supports vary.
     progress : called after each; an OutOfTimeError that it raises ends the search with what was found.
 
     Raises
@@ -151,16 +151,18 @@ def refine(
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
     goals = [Gap(), *stressed] if objectives is None else list(objectives)
+    stiff = any(family.name in STIFFNESSES for family in families)
+    most = (60 if stiff else 30) if most_evaluations is None else most_evaluations
 
     def searched(first: Point) -> Found:
         return gauss_newton(
             variables, first, [*goals, floor],
-            allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
+            allows=floor.allows, lowest_before=before, most=most, progress=progress,
         )  # fmt: skip
 
     found = searched(here)
     accepted = found.accepted
-    if start is None and not found.stopped and not any(family.name in STIFFNESSES for family in families):
+    if start is None and found.converged and not stiff:
         opposite, more = _opposite(variables, here, accepted[-1])
         spent += more
         if opposite is not None:
