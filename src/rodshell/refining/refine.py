@@ -134,7 +134,7 @@ def refine(
         stands above.
     dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
     start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
-    most_evaluations : designs that are tried; None: 60, or 30 on either side where only lengths, clamps or supports vary.
+    most_evaluations : designs that are tried; None: 60, or 30 on either side where no stiffness varies.
     progress : called after each; an OutOfTimeError that it raises ends the search with what was found.
 
     Raises
