@@ -297,8 +297,8 @@ def _widths(archive: Archive, rods: list[GridRod]) -> Floats | None:
     flat, along = archive.states["flat"], [rod.record.stiffness for rod in rods]
     return np.concatenate(
         [
-            np.ones((len(rod.nodes), 2)) if one is None else widths_along(one, flat[rod.nodes])
-            for rod, one in zip(rods, along, strict=True)
+            np.ones((len(rod.nodes), 2)) if stiffness is None else widths_along(stiffness, flat[rod.nodes])
+            for rod, stiffness in zip(rods, along, strict=True)
         ]
     )
 
