@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
     from rodshell.loads.check import LoadChecks
     from rodshell.loads.combinations import Loads
-    from rodshell.loads.strength import Limits, Strength
     from rodshell.refining.acceptance import Refined
 
 Stages = PatchForm | PatchedForm
@@ -390,7 +389,7 @@ class Form:
             results = with_seam_forces(results, self.stages, checks)
         results = checked_results(
             results, self.footprint.mesh, checks, self.fabrication,
-            limits=_limits(self, self.case.strength.build()), shear_strength=strengths.shear_strength,
+            limits=self.options.limits(self.rod, self.case.strength.build()), shear_strength=strengths.shear_strength,
             strength=strengths.strength, strength_of=strengths.strength_of,
         )  # fmt: skip
         if self.loaded is not None:
@@ -424,16 +423,4 @@ def check_loads(form: Form, loads: "Loads", *, progress: Progress = silent) -> "
 
     instance("form", form, Form)
     instance("loads", loads, Loads, "a rodshell.Loads(...)")
-    return check_shells(form.stages, loads, limits=_limits(form, loads.strength), progress=progress)
-
-
-def _limits(form: Form, asked: "Strength") -> "Limits":
-    """What a form's rods are judged by, with loads and without."""
-    from rodshell.loads.strength import Limits
-
-    judged_by = form.options.judged_by(form.rod)
-    return Limits.of(
-        form.rod, asked,
-        characteristic=judged_by.strength, of_preset=form.options.strength is None,
-        shear_weight=judged_by.shear_weight,
-    )  # fmt: skip
+    return check_shells(form.stages, loads, limits=form.options.limits(form.rod, loads.strength), progress=progress)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import rodshell as rs
 from rodshell.errors import InputError
@@ -337,3 +338,42 @@ def test_a_table_of_rods_has_no_areas() -> None:
     assert form is not table
     with pytest.raises(InputError, match="comes from a table of rods"):
         rs.check_loads(table, one(rs.Snow(1.0)))
+
+
+def test_frequencies_are_those_of_the_rods_mass_wherever_nodes_are() -> None:
+    """Against twice as many edges: of fourth order in bending; an added lump at each joint slows by its share."""
+    cap, found = rs.Cap(10.0, 4.0), []
+    for edge in (1.5, 0.75):
+        form = rs.find_form(cap, grid(3.0, edge), TUBE, ends="pinned")
+        found.append(rs.check_loads(form, one(rs.Snow(1.0), stability=rs.Stability(modes=4))).frequencies["pinned"])
+    assert len(found[1]) == 4
+    np.testing.assert_allclose(found[0], found[1], rtol=0.03)
+    rods = sum(rod.length for rod in form.footprint.rods) * TUBE.mass_per_length
+    lump = rods / len(form.footprint.mesh.grid.crossings)
+    heavy = rs.find_form(cap, grid(3.0, 0.75), TUBE, ends="pinned", joint=rs.Ball(mass=lump))
+    slower = rs.check_loads(heavy, one(rs.Snow(1.0))).frequencies["pinned"]
+    # as much mass again, where modes of the whole shell move: between none of it and twice it at the crests
+    assert np.sqrt(1 / 3) < slower[0] / found[1][0] < np.sqrt(1 / 2) * 1.05
+
+
+def test_frequencies_of_a_shell_are_those_of_its_stiffness_and_mass() -> None:
+    """A second way: all modes of both matrices by LAPACK, the mass of edges put together from elements of Hermite's
+    linear shape functions."""
+    form = shell("tubes")
+    structure = Structure.erected(form.popped["pinned"], form.rod)
+    tangent, model = structure.equilibrium.tangent, structure.shell
+    upper = tangent.pattern.upper(tangent.values).toarray()
+    stiffness = upper + upper.T - np.diag(upper.diagonal())
+    size = structure.size
+    mass = np.zeros((3 * size, 3 * size))
+    for (a, b), length in zip(model.stretch.blocks.tolist(), model.mesh.edge_lengths.tolist(), strict=True):
+        part = TUBE.mass_per_length * length / 6.0
+        for axis in range(3):
+            p, q = 3 * a + axis, 3 * b + axis
+            mass[p, p] += 2 * part
+            mass[q, q] += 2 * part
+            mass[p, q] += part
+            mass[q, p] += part
+    units = np.array([tangent.freedom.expand(row).ravel() for row in np.eye(tangent.freedom.size)])
+    squares = eigh(stiffness, units @ mass @ units.T, eigvals_only=True)
+    np.testing.assert_allclose(structure.frequencies(3), np.sqrt(squares[:3]) / (2 * pi), rtol=1e-6)

@@ -7,6 +7,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.checks.reactions import cut_forces, reactions
+from rodshell.errors import InputError
 from rodshell.loads.strength import Limits, Spans, Utilisation, net_section, preset_limits
 from tests.loads.shells import ROPE, TUBE, grid, one, shell
 
@@ -142,7 +143,10 @@ def test_the_unloaded_shell_is_judged_by_the_same_strength_with_loads_and_withou
     shares = loaded.loads["winter"]["pinned"].utilisations
     assert shares is not None
     assert shares.permanent == pytest.approx(used, rel=1e-3)
-    assert {found.verdict.level for found in (alone, loaded) if found.verdict} == {"unbuildable"}
+    for found in (alone, loaded):
+        assert found.verdict is not None
+        assert found.verdict.level == "unbuildable"
+        assert sum("permanent design strength" in reason for reason in found.verdict.reasons) == 1
 
 
 def test_uniform_warmth_of_free_rods_is_no_stress() -> None:
@@ -200,3 +204,14 @@ def test_a_strength_of_rods_without_fibres_is_refused_in_one_sentence() -> None:
 def test_a_wrong_argument_is_refused_in_one_sentence(make: object, message: str) -> None:
     with pytest.raises(rs.InputError, match=message):
         make()  # type: ignore[operator]
+
+
+def test_what_does_not_suit_the_rod_is_refused_before_anything_is_formed() -> None:
+    """A service class of GFRP, and a bolt as wide as the tube."""
+    tube = {"section": {"kind": "tube", "radius": 0.02, "thickness": 0.003}, "material": {"preset": "gfrp"}}
+    lath = {"section": {"kind": "rectangle", "width": 0.035, "height": 0.05}, "material": {"preset": "larch"}}
+    case = {"target": {"kind": "cap", "radius": 10.0, "base": 4.0}}
+    for strength, words in (({"service_class": 2}, "only the strengths of timber"), ({"hole": 0.04}, "leaves nothing")):
+        with pytest.raises(InputError, match=words):
+            rs.Job.load({**case, "rod": tube, "strength": strength}).case.build()
+        rs.Job.load({**case, "rod": lath, "strength": strength}).case.build()

@@ -5,8 +5,9 @@ from functools import cache
 import pytest
 
 import rodshell as rs
-from rodshell.output.loads_page import loads_page
+from rodshell.output.loads_page import _stability, loads_page
 from rodshell.results import Archive
+from rodshell.results.loaded import LoadedShell
 
 CASE = {
     "target": {"kind": "cap", "radius": "10 m", "base": "7 m"},
@@ -62,3 +63,23 @@ def test_every_figure_of_the_page_is_that_of_the_result() -> None:
 def test_without_loads_there_is_no_page() -> None:
     plain = {key: CASE[key] for key in ("target", "layout", "rod", "joint", "pop_up", "checks")}
     assert loads_page(rs.Job.load(plain).run().archive()) is None
+
+
+@pytest.mark.parametrize(
+    ("limit", "kind", "imperfect", "imperfect_kind", "said"),
+    [
+        (1.0, "bifurcation", 1.2, "limit point", "1.2 (the bifurcation is stable)"),
+        (1.0, "bifurcation", None, "none", "over 100 (the bifurcation is stable)"),
+        (1.0, "bifurcation", 1.002, "limit point", "1"),  # as near as factors are found
+        (1.0, "bifurcation", 0.8, "limit point", "0.8"),
+        (1.0, "limit point", 1.2, "limit point", "1.2"),
+        (1.0, "bifurcation", 1.2, "not followed", "1.2"),
+        (1.0, "bifurcation", None, None, "not asked for"),
+        (None, "none", None, "none", "over 100"),
+    ],
+)
+def test_a_factor_that_imperfections_raise_is_explained(
+    limit: float | None, kind: str, imperfect: float | None, imperfect_kind: str | None, said: str
+) -> None:
+    shell = LoadedShell(limit_factor=limit, limit_kind=kind, imperfect_factor=imperfect, imperfect_kind=imperfect_kind)  # type: ignore[call-arg]
+    assert _stability("winter", "pinned", shell)[-1] == said

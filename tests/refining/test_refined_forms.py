@@ -10,7 +10,10 @@ import pytest
 import rodshell as rs
 from rodshell.case.stage_tables import FAMILIES as WORDS
 from rodshell.cli import main
+from rodshell.formfinding.pipeline import PatchForm
 from rodshell.output.viewer.scene import scene_of
+from rodshell.refining import acceptance
+from rodshell.refining.gates import Gates
 from rodshell.refining.offer import offer
 from rodshell.refining.refine import FAMILIES
 
@@ -185,3 +188,24 @@ def test_the_command_says_what_is_wrong_in_a_line(
     assert said in error
     assert error.startswith("rodshell: error: ")
     assert error.count("\n") == 1
+
+
+def test_a_design_that_passes_all_gates_but_is_not_nearer_than_the_form_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """From a taper the wrong way, with a gate that whatever is nearer than the form as it is cannot pass."""
+    before = rs.Job.load("hemisphere", layout__spacing="60 mm", checks__stages=0, pop_up__ends="pinned").run(
+        until="pop-up"
+    )
+    gap, tried = before.agreement["pinned"].rms, list[float]()
+
+    def gates(form: PatchForm, **_: object) -> Gates:
+        tried.append(form.agreement["pinned"].rms)
+        return Gates({"tolerance": tried[-1] > gap}, "" if tried[-1] > gap else "tolerance: refused", 0)
+
+    monkeypatch.setattr(acceptance, "gates", gates)
+    monkeypatch.setattr(acceptance, "FIRMER", ())
+    found = acceptance.refined(before.stages, [FAMILIES["taper"]], ends="pinned", start=[1.0, 0.0, 0.0, 0.0, 0.0])
+    assert max(tried) > gap
+    assert not found.changed
+    assert found.refused.startswith("tolerance: refused")

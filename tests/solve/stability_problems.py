@@ -167,16 +167,23 @@ def prandtls_cantilever(edges: int = 80) -> Loaded:
 
 def michells_ring(edges: int = 96) -> Loaded:
     """A straight rod bent to a ring, its ends clamped to each other; factor 1 turns one end by 2 pi sqrt(3) EI/GJ, at
-    which the ring leaves its plane [Michell 1889; Goriely 2006]."""
+    which the ring leaves its plane [Michell 1889; Goriely 2006].
+
+    The first edge and the last are the same one, which is held: each free node then lies between two equal edges, and
+    the twist has no force across the plane. Clamps at a node would have one, of first order in the edge, which makes of
+    the bifurcation a limit point next to it.
+    """
     gj = 0.7
-    angle = 2 * pi * np.arange(edges + 1) / edges
+    angle = 2 * pi * (np.arange(edges + 2) - 0.5) / edges
     nodes = np.column_stack([np.sin(angle), 1 - np.cos(angle), 0 * angle]) / (2 * edges * np.sin(pi / edges))
     kind = rs.Rod(rs.GivenSection(EA=1e6, EI1=1.0, EI2=1.0, GJ=gj))
-    rod = rs.ElasticRod.of(nodes, kind, clamped={"start": X, "end": X})
-    free = rod.freedom().with_directions(np.array([edges // 2]), X, Y)  # it would turn freely about its clamps' line
+    rod = rs.ElasticRod.of(nodes, kind, twist=True)
+    angles = np.arange(rod.block_count)[rod.angles]
+    free = rod.freedom().with_directions(np.array([0, 1, edges, edges + 1])).with_directions(angles[[0, -1]])
+    free = free.with_directions(np.array([edges // 2]), X, Y)  # it would turn freely about the line of its clamps
     problem, state = of_rod(rod, free, 0.16)
     turn = np.zeros_like(state)
-    turn[rod.ghost_angles[1], 0] = 2 * pi * sqrt(3) / gj
+    turn[angles[-1], 0] = 2 * pi * sqrt(3) / gj
     return Loaded(at_rest(problem, state), Load(motions=turn), {"factor": 1.0})
 
 

@@ -165,6 +165,25 @@ def test_a_session_shows_each_stage_and_ends_with_the_command_line_s_form(tmp_pa
         assert socket.receive_json()["at"] == state["at"] - 1
 
 
+@pytest.mark.slow
+def test_no_path_of_the_server_is_told(tmp_path: Path) -> None:
+    roof = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 2 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
+    with TestClient(studio_app(settings(tmp_path))) as client:
+        session = new_session(client)
+        file = client.post(f"/api/sessions/{session}/uploads?name=roof.obj", content=roof.encode()).json()["file"]
+        with client.websocket_connect(f"/api/sessions/{session}/live") as socket:
+            socket.receive_json()
+            for serial, more in enumerate(({}, {"unit": "m", "base": "9 m"}), start=1):
+                case = {"target": {"kind": "mesh", "file": file, **more}}
+                socket.send_json({"kind": "case", "serial": serial, "case": case})
+                said = until_done(socket, serial)[-1]["sentence"]
+                assert "roof.obj" in said
+                assert str(tmp_path) not in said
+            smooth = {"target": {"kind": "mesh", "file": file, "unit": "m"}, **{k: DOME[k] for k in ("rod", "checks")}}
+            socket.send_json({"kind": "case", "serial": 9, "case": smooth})
+            assert str(tmp_path) not in json.dumps([{**m, "content": ""} for m in until_done(socket, 9)])
+
+
 def last_state(folder: Path) -> dict[str, Any]:
     (path,) = folder.glob("sessions/*/session.json")
     state: dict[str, Any] = json.loads(path.read_text())

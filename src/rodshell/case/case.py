@@ -231,7 +231,15 @@ class Case(Table):
                 f"refine.under = {shown(self.refine.under)}: not a combination of loads: give one of {known}"
             )
         rod = self.rod_on(target, layout, anchor=anchor)
-        self.output_options().require_known_stress(rod, joint)
+        options = self.output_options()
+        options.require_known_stress(rod, joint)
+        if self.strength != StrengthTable():
+            from rodshell.loads.strength import net_section
+
+            strength = self.strength.build()
+            options.limits(rod, strength)
+            if strength.hole:
+                net_section(rod.section, strength.hole)
         return Built(target, layout, rod, joint, method, anchor, self.ends)
 
     def _require_stock(self, layout: "GridLayout") -> None:

@@ -20,7 +20,8 @@ def command(source: str, loads: str | None, **values: Any) -> int:
     """Check a shell under loads: deflections, reactions, stability and utilisation under each combination.
 
     DIR is an earlier result, whose case is run again. CASE is a case file or the name of a built-in case. The loads are
-    those of the case, or of FILE, which has tables [[loads]], [[combinations]], [bracing] and [stability].
+    those of the case, or of FILE, which has tables [[loads]], [[combinations]], [bracing], [locked_joints],
+    [stability] and [strength].
     """
     output = read_output_options(values)
     path = Path(source)

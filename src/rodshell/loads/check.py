@@ -8,7 +8,7 @@ whole combination, with the shell's weight if that is in it.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -133,6 +133,7 @@ class LoadChecks:
     braced : (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are none.
     limits : what the rods are judged by.
     stopped, missing : when a time limit came, or "", and which combinations were not reached.
+    frequencies : lowest natural frequencies of the shells without loads, with bracing and locked joints [Hz].
     """
 
     asked: Loads
@@ -141,6 +142,7 @@ class LoadChecks:
     limits: Limits
     stopped: str = ""
     missing: tuple[str, ...] = ()
+    frequencies: Mapping[Ends, Floats] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         late = f", {self.stopped}" if self.stopped else ""
@@ -211,13 +213,14 @@ def check_shells(
     done = {ends: popped for ends, popped in _popped_up(stages).items() if popped.report.converged}
     found: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
     missing = [f"{name} with {ends} ends" for ends in done for name in loads.combinations]
-    stopped, braced = "", np.empty((0, 2), dtype=np.intp)
+    stopped, braced, vibrations = "", np.empty((0, 2), dtype=np.intp), dict[Ends, Floats]()
     try:
         for ends, popped in done.items():
             if limits.bending:
                 require_known_stress(stages.rod, twisted=rod_frames(popped.shell) is not None)
             structure = _locked(popped, ends, loads, stages)
             braced = structure.braced
+            vibrations[ends] = structure.frequencies(loads.stability.modes)
             nodes = LoadedNodes(popped.positions, structure.mass, areas, min(stages.layout.spacing))
             acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
             for name, load in acting.items():
@@ -228,7 +231,7 @@ def check_shells(
                 missing.pop(0)
     except OutOfTimeError as late:
         stopped = str(late)
-    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else ())
+    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else (), vibrations)
 
 
 def _said(progress: Progress, where: str, what: str) -> None:
@@ -453,14 +456,15 @@ def _with_imperfections(
     amplitude = loads.stability.amplitude(float(np.ptp(points[:, :2], axis=0).min()))
     if amplitude is None or buckling is None or not len(buckling.shapes):
         return None, None, 0
-    ends, work = list[tuple[float, Limit]](), 0
-    for sign in (1.0, -1.0):
-        try:
-            start = imperfect(structure.equilibrium, buckling.shapes, sign * amplitude)
-        except ConvergenceError:
-            return None, "lost", work
-        path = load_path(start, load, most=MOST, stations=(), progress=progress)
+    try:
+        starts = [imperfect(structure.equilibrium, buckling.shapes, sign * amplitude) for sign in (1.0, -1.0)]
+    except ConvergenceError:
+        return None, "lost", 0
+    kind: Limit = "none"
+    least, work = np.inf, 0
+    for start in starts:  # the second only as far as it could be the smaller
+        path = load_path(start, load, most=min(MOST, least), stations=(), progress=progress)
         work += path.factorizations
-        ends.append((np.inf if path.limit == "none" else path.factor, path.limit))
-    least, kind = min(ends)
+        if path.limit != "none" and path.factor < least:
+            least, kind = path.factor, path.limit
     return (None if np.isinf(least) else least), kind, work

@@ -13,13 +13,16 @@ import numpy as np
 
 from rodshell.arrays import Floats, Ints
 from rodshell.checks.reactions import Reactions, reactions
+from rodshell.errors import ConvergenceError
 from rodshell.formfinding.popup import PopUp
 from rodshell.joints.relative_rotation import RelativeRotation
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
+from rodshell.model.rod_sections import RodSections
 from rodshell.rods.cable import CableStretch
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium
+from rodshell.solve.modes import frequencies
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +145,31 @@ class Structure:
             assert isinstance(element, RelativeRotation)
             result[crossings] = element.moments(found.state)[:, 0]
         return result
+
+    def frequencies(self, count: int) -> Floats:
+        """(k,) the lowest natural frequencies without loads, ascending [Hz]; none where they are not known.
+
+        Rods' mass is spread along their edges, so that the frequencies of bending are of fourth order in their length
+        (see `solve.modes.frequencies`); joints and bracing are at the nodes.
+
+        Parameters
+        ----------
+        count : so many, or as many as there are.
+        """
+        shell, mass = self.shell, np.zeros((self.size, 3))
+        mass[: len(shell.mass)] = shell.mass
+        if self.bracing_mass is not None:
+            mass[: shell.node_count] += self.bracing_mass[:, None]
+        spread = np.zeros(len(self.equilibrium.problem.stretch.blocks))
+        mesh = self.mesh
+        of_rods = RodSections.of(mesh, [self.rod] * len(mesh.grid.rods)).mass * mesh.edge_lengths
+        spread[: len(of_rods)] = of_rods
+        if self.equilibrium.tangent.negative_modes or not of_rods.all():
+            return np.zeros(0)
+        try:
+            return frequencies(self.equilibrium, mass, count, edge_mass=spread).frequencies
+        except ConvergenceError:  # one figure of many: it is missing, and the others stand
+            return np.zeros(0)
 
     def laths_alone(self, found: Equilibrium) -> tuple[Shell, Floats] | None:
         """The model of the laths of a third layer alone and its state; None: there are none.

@@ -6,6 +6,7 @@ parts where several are as near. So the areas add up to those of the surface and
 triangles' size, and those of a symmetric shell are symmetric: the triangles are laid along its rods from its anchor.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -71,21 +72,24 @@ def tributary_areas(
     a, b, c = (corners[faces[:, k]] for k in range(3))
     vector = 0.5 * np.cross(b - a, c - a)
     shares = np.column_stack([np.linalg.norm(vector, axis=1), vector]) / 3.0
-    at_corners = np.zeros((len(corners), 4))
-    for k in range(3):
-        np.add.at(at_corners, faces[:, k], shares)
+    at_corners = _sums(faces.T, [shares] * 3, len(corners))
     wanted = range(1, 1 + min(NEIGHBOURS, len(positions)))
     distance, nearest = map(np.asarray, cKDTree(positions).query(corners, k=list(wanted)))
     as_near = distance <= distance[:, :1] + AS_NEAR * target.size
     weight = as_near / as_near.sum(axis=1, keepdims=True)
-    result, moments = np.zeros((len(positions), 4)), np.zeros((len(positions), 2))
-    for k in range(nearest.shape[1]):
-        part = weight[:, k, None] * at_corners
-        np.add.at(result, nearest[:, k], part)
-        np.add.at(moments, nearest[:, k], part[:, 3:] * corners[:, :2])
+    parts = [weight[:, k, None] * at_corners for k in range(nearest.shape[1])]
+    result = _sums(nearest.T, parts, len(positions))
+    moments = _sums(nearest.T, [part[:, 3:] * corners[:, :2] for part in parts], len(positions))
     plan = result[:, 3]
     middle = np.where(plan[:, None] > 0, moments / np.maximum(plan, 1e-300)[:, None], positions[:, :2])
     return Tributary(result[:, 0], plan, result[:, 1:], middle)
+
+
+def _sums(indices: Ints, parts: Sequence[Floats], count: int) -> Floats:
+    """(count, j) sums of the rows of each of the `parts` (k, n, j) by their `indices` (k, n)."""
+    columns = range(parts[0].shape[1])
+    each = [[np.bincount(at, part[:, j], count) for j in columns] for at, part in zip(indices, parts, strict=True)]
+    return np.asarray(np.sum(each, axis=0).T)
 
 
 def surface_triangles(

@@ -15,6 +15,7 @@ from rodshell.results.records import Ends
 from rodshell.results.wording import millimetres, percent, rounded, rounding_of, stress
 from rodshell.units import percent_text
 
+CLOSE = 1.005  # both factors are found within 0.2 %: a larger ratio of theirs says something
 MOST_NAMES = 4  # of joints that slip
 MOST_MODES = 3  # pictures, of the combination that falls first
 BY = {
@@ -60,6 +61,7 @@ def loads_page(archive: Archive) -> dict[str, Any] | None:
         "strength": [_strength(results, *each) for each in shells],
         "deflection": [_deflection(results, *each) for each in shells],
         "stability": [_stability(*each) for each in shells],
+        "frequencies": list(_frequencies(shells)),
         "modes": pictures,
         "foundations": [_foundation(results, *each) for each in shells],
         "joints": [_joints(*each) for each in shells if each[2].joint_moments],
@@ -134,14 +136,25 @@ def _factor(value: float | None, missing: str) -> str:
 
 def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Three figures side by side."""
-    imperfect = "not asked for" if shell.imperfect_kind is None else "over 100"
+    imperfect = _factor(shell.imperfect_factor, "not asked for" if shell.imperfect_kind is None else "over 100")
+    above = (shell.imperfect_factor or np.inf) > CLOSE * (shell.limit_factor or np.inf)
+    if above and shell.limit_kind == "bifurcation" and shell.imperfect_kind not in (None, "not followed"):
+        imperfect += " (the bifurcation is stable)"
     return [
         name,
         ends,
         _factor(shell.linear_factor, "over 100"),
         f"{_factor(shell.limit_factor, 'over 100')} ({shell.limit_kind})",
-        _factor(shell.imperfect_factor, imperfect),
+        imperfect,
     ]
+
+
+def _frequencies(shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[str]:
+    """Natural frequencies with each kind of ends: they do not depend on the combination."""
+    for ends, shell in {ends: shell for _, ends, shell in shells}.items():
+        known = [rounded(value) for value in shell.frequencies if value is not None]
+        if known:
+            yield f"{ends} ends: {', '.join(known)} Hz"
 
 
 def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Iterator[tuple[str, Ends, str]]:

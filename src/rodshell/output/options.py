@@ -4,7 +4,7 @@ import datetime
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rodshell.checks.bending import VON_MISES, require_known_stress
 from rodshell.errors import InputError
@@ -14,6 +14,9 @@ from rodshell.output.drawing import LAYERS
 from rodshell.output.dxf import FORBIDDEN
 from rodshell.rods.section import Rod
 from rodshell.validation import described, instance, positive
+
+if TYPE_CHECKING:
+    from rodshell.loads.strength import Limits, Strength
 
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 MOST_STAGES = 1000
@@ -127,6 +130,26 @@ class OutputOptions:
             shear_strength=material.shear_strength,
             strength_of=material.name,
         )
+
+    def limits(self, rod: Rod, asked: "Strength") -> "Limits":
+        """What rods are judged by, with loads and without.
+
+        Parameters
+        ----------
+        rod : section and material of every rod.
+        asked : what was given for it.
+
+        Raises
+        ------
+        InputError : a service class is given, and nothing depends on it.
+        """
+        from rodshell.loads.strength import Limits  # many options are made only to be written
+
+        judged_by = self.judged_by(rod)
+        return Limits.of(
+            rod, asked,
+            characteristic=judged_by.strength, of_preset=self.strength is None, shear_weight=judged_by.shear_weight,
+        )  # fmt: skip
 
     def require_known_stress(self, rod: Rod, joint: Joint) -> None:
         """InputError where a strength is given and the stress that it stands against cannot be known.

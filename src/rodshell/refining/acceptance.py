@@ -254,7 +254,8 @@ def _accepted(
     between it and the one that was refused last.
     """
     before = found.gap_before if found.loaded is None else found.loaded[0]
-    nearer = [design for design in found.designs if design.point.rms < NEARER * before.rms_relative]
+    least = NEARER * before.rms_relative
+    nearer = [design for design in found.designs if design.point.rms < least]
     if not nearer:
         judged = gates(found.before, span_error=span_error, progress=progress)
         return None, None, judged, "no nearer design was found", judged.factorizations
@@ -266,7 +267,7 @@ def _accepted(
         form, judged, more = _judged(found, design, span_error, False, progress)
         made += more
         if judged.open:
-            accepted, low = (form, design, judged), design
+            accepted, low, least = (form, design, judged), design, design.point.rms
             break
         refused = design
     for _ in range(HALVINGS):
@@ -276,10 +277,12 @@ def _accepted(
             break
         form, judged, more = _judged(found, middle, span_error, False, progress)
         made += more
-        if judged.open and middle.point.rms < low.point.rms:
-            accepted, low = (form, middle, judged), middle
-        else:
+        if not judged.open:
             refused = middle
+            continue
+        low = middle
+        if middle.point.rms < least:
+            accepted, least = (form, middle, judged), middle.point.rms
     if accepted is None:
         return None, None, best, best.reason, made
     return *accepted, best.reason, made

@@ -27,7 +27,12 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
     found = results.changed(
         loads={
             name: {
-                ends: _record(mesh, shell, _in_order(results, mesh, checks.braced, shell.bracing_forces))
+                ends: _record(
+                    mesh,
+                    shell,
+                    _in_order(results, mesh, checks.braced, shell.bracing_forces),
+                    checks.frequencies.get(ends, np.zeros(0)),
+                )
                 for ends, shell in by_ends.items()
             }
             for name, by_ends in checks.shells.items()
@@ -71,7 +76,7 @@ def _in_order(results: Results, mesh: GridMesh, braced: Ints, forces: Floats) ->
     return tuple(known.get(frozenset((brace.start, brace.end))) for brace in rows) if known else ()
 
 
-def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ...]) -> LoadedShell:
+def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ...], frequencies: Floats) -> LoadedShell:
     governs = None if shell.governs is None else _place(mesh, shell.governs[1], shell.governs[0])
     names = joint_names(mesh)
     return LoadedShell(
@@ -101,6 +106,7 @@ def _record(mesh: GridMesh, shell: CheckedShell, bracing: tuple[float | None, ..
         joint_moment_at=names[int(np.argmax(np.abs(shell.joint_moments)))] if len(shell.joint_moments) else None,
         slipping=tuple(names[k] for k in _slipping(mesh, shell)),
         mode_factors=tuple(shell.mode_factors.tolist()),
+        frequencies=tuple(frequencies.tolist()),
     )
 
 

@@ -71,6 +71,9 @@ class LoadedShell(Record):
     joint_moment_at: Text | None = key("id of the joint whose moment is largest; null: none is locked")
     slipping: Rows[Text] = rows("ids of the joints that slip")
     mode_factors: Rows[Number] = rows("linear buckling factors of the lowest modes")
+    frequencies: Rows[Number] = rows(
+        "lowest natural frequencies without loads, of rods, joints and bracing; empty: not known", "Hz"
+    )
 
 
 LoadCases = dict[str, ByEnds[LoadedShell]]

@@ -157,8 +157,9 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
         elif limit is not None and limit < 1 and found.limit_kind != "not followed":
             how = "snaps through" if found.limit_kind == "limit point" else "buckles"
             yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded(limit)} times these loads"
-        if used is not None and used > 1:
-            place = found.governs
+        place = found.governs
+        said = place is not None and place.by == "permanent" and (_bent(results, ends).utilisation or 0.0) > 1
+        if used is not None and used > 1 and not said:
             where = "" if place is None else f" in {place.rod}, {_mm(results, place.at)} from its start"
             at = "" if found.at_factor == 1 else f" already at {rounded(found.at_factor or 0.0)} times these loads"
             share = f"{max(101, round(100 * used))} %"

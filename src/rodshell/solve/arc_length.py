@@ -35,6 +35,7 @@ STRAYED = 0.3  # of a step: a point so far off its prediction may be on another 
 NEGLIGIBLE = 1e-6  # of the length: a path no farther off than this is the same
 SETTLED, SETTLED_FORCE = 1e-10, 1e-8  # of the length and of the largest axial force: last change of a point
 CHORD, SLOW = 5e-3, 0.2  # as in `newton_step`
+FINE = 1e-3  # of how far a point may stray: steps that small, and no longer smaller, are round-off next to a singular K
 SAME_STIFFNESS = 1e-5, 1e-4  # of length and force: factors from this near are those of the point
 PROBE, PROBE_FACTOR = 1e-5, 0.1  # of the length; at most, of the factor: over which the stiffness's change is taken
 PER_FACTOR = 1e-8  # of the length: what a unit of the factor counts as, so that a load may grow where nothing moves
@@ -241,7 +242,9 @@ class ArcLength:
                 moved = float(np.abs(motion).max()) / length
                 if not self.reach(state + motion - first) <= near:
                     return None
-                if chord and moved > SLOW * last:
+                stalled = chord and moved > SLOW * last
+                at_round_off = stalled and max(moved, last) * length < FINE * near < np.inf
+                if stalled and not at_round_off:
                     chord = False
                     continue
                 after = stretch.stiffness * strains + loaded.change(at, motion, taken, more)
@@ -250,7 +253,7 @@ class ArcLength:
                 state, forces, factor = state + motion, after, factor + more
                 elements = loaded.load.elements(elements, state, factor)
                 last, chord = moved, moved < CHORD
-                if moved < SETTLED and changed < SETTLED_FORCE:
+                if (moved < SETTLED or at_round_off) and changed < SETTLED_FORCE:
                     since = float(np.abs(state - at).max()) / length, float(np.abs(forces - axial).max()) / size
                     if since[0] > SAME_STIFFNESS[0] or since[1] > SAME_STIFFNESS[1]:
                         tangent, along = self._tangent(elements, state, forces, factor)
@@ -348,8 +351,8 @@ class ArcLength:
         """With its modes and the nearest singular stiffness, as the stiffness of the lowest modes changes here."""
         values, modes = self._lowest_modes(tangent, start)
         step = min(PROBE * self.length / max(self.reach(here.motion), TINY), PROBE_FACTOR / abs(here.rate))
-        behind, ahead = (self._values_near(here, side * step) for side in (-1.0, 1.0))
-        change = _between(modes, tangent.pattern.upper((ahead - behind) / (2 * step)))
+        ahead = self._values_near(here, step)
+        change = _between(modes, tangent.pattern.upper((ahead - tangent.values) / step))
         root = 1.0 / np.sqrt(values)
         loss = np.linalg.eigvalsh(-change * root[:, None] * root)  # 1/m: the modes' stiffness vanishes at 1/loss
         return replace(

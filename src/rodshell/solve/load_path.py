@@ -79,8 +79,9 @@ class LoadPath:
     factor : the largest t up to which the path is stable, `close` to where it is lost; 0 where the unloaded structure
         is not stable.
     limit : what ends the stable path: "limit point", the load cannot grow; "bifurcation", the structure leaves the path
-        sideways; "none", nothing up to the largest factor asked for; "lost", the path could not be followed
-        further, and nothing is known above `factor`; "unstable unloaded".
+        sideways (one that is not quite symmetric has a limit point nearby instead); "none", nothing up to the largest
+        factor asked for; "lost", the path could not be followed further, and nothing is known above `factor`;
+        "unstable unloaded".
     points : in the order of the path; the stable ones come first.
     mode : (n, 3) how it gives way, the largest component of a node's displacement being 1; None unless the limit is a
         limit point or a bifurcation.

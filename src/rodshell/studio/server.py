@@ -227,8 +227,10 @@ async def _live(socket: WebSocket) -> None:
             message = json.loads(await socket.receive_text())
             if error := _obey(session, message):
                 await socket.send_json({"kind": "failed", "serial": message.get("serial", 0), "sentence": error})
-            if message.get("kind") in ("step", "keep", "drop", "restore"):
+            if message.get("kind") in ("step", "keep", "drop"):
                 await socket.send_json({"kind": "session", **vars(session.state)})
+            elif not message.get("live"):
+                await socket.send_json({"kind": "history", "at": session.state.at, "count": len(session.state.cases)})
     except (WebSocketDisconnect, json.JSONDecodeError):
         pass
     finally:

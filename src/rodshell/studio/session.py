@@ -13,7 +13,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -179,7 +179,7 @@ class Session:
     """
 
     def __init__(self, folder: Path, *, time_limit: float = 120.0) -> None:
-        self.folder, self.time_limit = folder, time_limit
+        self.folder, self.time_limit = folder.absolute(), time_limit
         self.uploads.mkdir(parents=True, exist_ok=True)
         self.state = State()
         if (folder / "session.json").is_file():
@@ -267,12 +267,22 @@ class Session:
         new.replace(self.folder / "session.json")
 
     def _hear(self, news: News) -> None:
+        news = replace(news, facts=_with_names(news.facts, f"{self.uploads}{os.sep}"))
         if news.kind == "stage" and news.facts.get("stage") == "checks":
             self._facts, self._scene = news.facts, news.content
         elif news.kind == "taken":
             self._facts = {}
         for listener in list(self.listeners):
             listener(news)
+
+
+def _with_names(value: Any, folder: str) -> Any:
+    """The same value, in whose texts uploaded files have their names alone: no path of the server leaves it."""
+    if isinstance(value, str):
+        return value.replace(folder, "")
+    if isinstance(value, Mapping):
+        return {key: _with_names(inner, folder) for key, inner in value.items()}
+    return [_with_names(inner, folder) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def with_uploads(case: Mapping[str, Any], uploads: Mapping[str, Path]) -> dict[str, Any]:

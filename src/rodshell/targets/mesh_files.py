@@ -106,7 +106,7 @@ def in_metres(vertices: Floats, faces: Ints, unit: float | None, path: Path) -> 
     extent = np.ptp(used, axis=0) if len(used) and np.isfinite(used).all() else np.full(3, np.nan)
     size = " x ".join(f"{float(f'{side:.4g}'):.10g}" for side in extent)
     if unit is None:
-        if path.suffix.lower() not in IN_METRES:
+        if path.suffix.lower() not in IN_METRES and np.isfinite(extent).all():  # else it is refused for that
             raise InputError(
                 f"{path} does not state its unit (it is {size} units wide): give it, such as --unit mm (in Python "
                 "unit=0.001)"

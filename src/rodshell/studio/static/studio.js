@@ -111,7 +111,7 @@ function wireTools() {
   byId("loads").onclick = showLoads;
   form.onsubmit = ({ submitter }) => {
     if (submitter.value === "check") checkLoads(form.elements);
-    else change(next => { delete next.loads; delete next.combinations; });
+    if (submitter.value === "without") change(next => { delete next.loads; delete next.combinations; });
   };
 }
 
@@ -153,6 +153,7 @@ async function open() {
 
 function hear(news) {
   if (news.kind === "session") return restore(news);
+  if (news.kind === "history") return showHistory(news);
   if (news.kind === "progress" && news.serial === serial) say(`${news.stage}: ${news.detail}`);
   if (news.kind === "stage" && news.serial >= shown) {
     shown = news.serial;
@@ -177,9 +178,7 @@ let pending = true;  // a new target: the view begins anew
 function restore(state) {
   history = state;
   const from = state.cases[state.at];
-  byId("undo").disabled = state.at <= 0;
-  byId("redo").disabled = state.at >= state.cases.length - 1;
-  byId("tries").hidden = state.cases.length > 2;
+  showHistory({ at: state.at, count: state.cases.length });
   showVariants();
   if (restore.known && JSON.stringify(from) === JSON.stringify(base)) return;
   const linked = restore.known ? null : restore.linked;
@@ -190,19 +189,41 @@ function restore(state) {
   buildControls();
 }
 
+function showHistory({ at, count }) {
+  byId("undo").disabled = at <= 0;
+  byId("redo").disabled = at >= count - 1;
+  byId("tries").hidden = count > 2;
+}
+
 function say(text, wrong = false) {
   byId("state").textContent = text;
   byId("state").classList.toggle("wrong", wrong);
 }
 
 function failed(sentence) {
-  say(sentence, true);
-  const box = byId("verdict");
+  say("");
+  const box = byId("verdict"), key = named(sentence);
   box.className = "failed";
   box.replaceChildren(make("strong", { textContent: sentence }));
+  if (key) box.append(make("button", { type: "button", textContent: `Go to ${key.path}`, onclick: () => goTo(key) }));
+  document.body.classList.add("old");  // the shapes are those of a case before
+}
+
+// The key that a sentence asks for, as in a case file (target.unit) or as an option (--unit).
+function named(sentence) {
+  const usable = start.keys.filter(key => !IDLE.includes(key.path) && (!key.path.startsWith("target.") || !key.kinds.length || key.kinds.includes(base.target?.kind)));
+  return usable.find(({ path }) => sentence.includes(path)) || usable.find(({ path }) => new RegExp(`--${path.split(".").pop()}\\b`).test(sentence));
+}
+
+function goTo({ path }) {
+  const fields = [...byId("controls").querySelectorAll(`[data-path="${path}"]`)], field = fields.at(-1);
+  gui.folders.find(({ _title }) => _title === `[${path.split(".")[0]}]`)?.open();
+  field?.focus();
+  field?.scrollIntoView({ block: "center" });
 }
 
 function showFacts() {
+  document.body.classList.remove("old");
   byId("figures").tBodies[0].replaceChildren(...facts.figures.map(([name, value]) => make("tr", {}, make("th", { textContent: name, scope: "row" }), make("td", { textContent: value }))));
   const box = byId("verdict");
   if (facts.verdict) {
@@ -356,6 +377,7 @@ function showPlan() {
   const gone = leftOut();
   byId("left-out").replaceChildren(...(gone.length ? ["Left out: ", ...gone.map(id => make("button", { type: "button", textContent: `${id} \u00d7`, ariaLabel: `Put rod ${id} back`, onclick: () => toggle(id) }))] : []));
   byId("unseam").hidden = !(base.seams?.lines?.length);
+  markRod(marked);
 }
 
 function leftOut() {
@@ -368,7 +390,10 @@ function toggle(id) {
   change(next => set(next, "layout.left_out", rest.length < names.length ? (rest.length ? rest : undefined) : [...names, id]));
 }
 
+let marked = "";
+
 function markRod(id) {
+  marked = id;
   for (const line of byId("plan").querySelectorAll("line[data-line]")) line.classList.toggle("marked", line.dataset.line === id);
   const rod = facts?.plan.find(one => one.id === id);
   const size = rod && (rod.length < 10 ? `${(1000 * rod.length).toFixed(1)} mm` : `${rod.length.toFixed(4)} m`);
@@ -423,11 +448,20 @@ function placeHandles() {
   Object.assign(handles, { group, dot, knob, plane });
   viewer.world.add(group);
   viewer.redraw();
+  requestAnimationFrame(tellHandles);
 }
 
-function screenDistance(object, event) {
+function onScreen(object) {
   const frame = viewer.canvas.getBoundingClientRect(), place = object.getWorldPosition(new THREE.Vector3()).project(viewer.camera);
-  return Math.hypot((0.5 + 0.5 * place.x) * frame.width + frame.left - event.clientX, (0.5 - 0.5 * place.y) * frame.height + frame.top - event.clientY);
+  return [(0.5 + 0.5 * place.x) * frame.width + frame.left, (0.5 - 0.5 * place.y) * frame.height + frame.top];
+}
+
+const screenDistance = (object, { clientX, clientY }) => Math.hypot(...onScreen(object).map((value, axis) => value - [clientX, clientY][axis]));
+
+// Where the handles are in the window [px], for whoever drives the page by a program.
+function tellHandles() {
+  const parts = handles.group ? { anchor: handles.dot, heading: handles.knob, base: handles.plane } : {};
+  byId("view").dataset.handles = JSON.stringify(Object.fromEntries(Object.entries(parts).filter(([, part]) => part).map(([name, part]) => [name, onScreen(part)])));
 }
 
 function ray(event) {
@@ -443,6 +477,7 @@ function onTarget(event) {
 
 function wireHandles() {
   const canvas = viewer.canvas;
+  viewer.orbit.addEventListener("change", () => requestAnimationFrame(tellHandles));
   canvas.addEventListener("pointerdown", event => {
     if (!handles.group || drawing) return;
     handles.held = [["anchor", "dot"], ["heading", "knob"], ["base", "plane"]].find(([, part]) => handles[part] && screenDistance(handles[part], event) < 16)?.[0];
@@ -608,8 +643,12 @@ function wire() {
   byId("undo").onclick = () => order({ kind: "step", by: -1 });
   byId("redo").onclick = () => order({ kind: "step", by: 1 });
   byId("link").onclick = async () => { await remember(); await navigator.clipboard?.writeText(location.href).catch(() => {}); say("The link is copied: it holds the whole case"); };
-  byId("python").onclick = () => { byId("script").querySelector("pre").textContent = script(); byId("script").showModal(); };
-  for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button").onclick = () => dialog.close();
+  byId("python").onclick = () => {
+    const files = [get(base, "target.file"), get(base, "target.boundary")].filter(Boolean).map(name => name.replace("upload:", ""));
+    byId("needs").textContent = files.length ? `Run it in a folder with ${files.join(" and ")}; the download has it in inputs/.` : "";
+    byId("script").querySelector("pre").textContent = script(); byId("script").showModal();
+  };
+  for (const dialog of document.querySelectorAll("dialog")) dialog.querySelector(":scope > button")?.addEventListener("click", () => dialog.close());
   wireTools();
   const controls = byId("controls");
   for (const begin of ["input", "pointerdown"]) controls.addEventListener(begin, () => { typing = true; });
