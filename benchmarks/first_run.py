@@ -1,9 +1,9 @@
 """The first run: README's first command as it stands (environment, installation, build, first job) beside that of an
 earlier commit.
 
-    python -m benchmarks.first_run [--jit] [--pip] [--commit COMMIT]
+    python -m benchmarks.first_run [--jit] [--uv] [--commit COMMIT]
 
---jit installs without compiled kernels, as where there is no C compiler; --pip installs by pip where README uses uv.
+--jit installs without compiled kernels, as where there is no C compiler; --uv installs by uv where README uses pip.
 Each checkout is a clone of this repository. Caches are empty, as a newcomer's are, so that downloads count.
 """
 
@@ -37,15 +37,16 @@ class FirstRun:
         return self.install[0] + self.first[0], self.install[1] + self.first[1]
 
 
-def first_run(commit: str, *, jit: bool = False, pip: bool = False) -> FirstRun:
+def first_run(commit: str, *, jit: bool = False, uv: bool = False) -> FirstRun:
     """Of README's first command, as it stands at a commit, and of its job again."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "source"
         subprocess.run(["git", "clone", "--quiet", str(ROOT), str(source)], check=True)
         subprocess.run(["git", "checkout", "--quiet", commit], check=True, cwd=source)
         parts = command_of((source / "README.md").read_text(encoding="utf-8"))
-        if pip:
-            parts = [part.replace("uv pip", "pip") for part in parts if part != "pip install uv"]
+        if uv:
+            at = parts.index("pip install .")
+            parts[at : at + 1] = ["pip install uv", "uv pip install ."]
         parts.append(f"{parts[-1]}-again")
         kept = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "NUMBA", "RODSHELL"))}
         caches = {name: f"{folder}/caches/{name}" for name in ("XDG_CACHE_HOME", "PIP_CACHE_DIR", "UV_CACHE_DIR")}
@@ -78,15 +79,15 @@ def _seconds(said: str) -> list[Seconds]:
     return [(clock - clocks[k], one - used[k]) for k, (clock, one) in enumerate(ends)]
 
 
-def section(*, jit: bool = False, pip: bool = False, earlier: str = EARLIER) -> Section:
+def section(*, jit: bool = False, uv: bool = False, earlier: str = EARLIER) -> Section:
     """README's first command: environment, installation, build, first job; then the job again. An earlier commit's
     first. Caches are empty. On a busy machine the clock depends on what else runs."""
-    then, now = first_run(earlier), first_run("HEAD", jit=jit, pip=pip)
-    how = ("without a compiler" if jit else "with a compiler") + ", by pip" * pip
+    then, now = first_run(earlier), first_run("HEAD", jit=jit, uv=uv)
+    how = ("without a compiler" if jit else "with a compiler") + ", by uv" * uv
     clock, processors = (ours / theirs for ours, theirs in zip(now.whole, then.whole, strict=True))
     rows = [
         Row(f"README's first command, {how}, on the clock, over commit {earlier}", f"{clock:.2f}",
-            "" if pip else "at most 0.75" if jit else "at most 0.7"),
+            "" if uv else "at most 0.75" if jit else "at most 0.7"),
         Row("   in seconds of processors", f"{processors:.2f}"),
         Row("   its installation, on the clock", f"{now.install[0] / then.install[0]:.2f}"),
         Row("   its first run, on the clock", f"{now.first[0] / then.first[0]:.2f}", "at most 0.6" if jit else ""),
@@ -109,8 +110,8 @@ def _both(seconds: Seconds) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--jit", action="store_true")
-    parser.add_argument("--pip", action="store_true")
+    parser.add_argument("--uv", action="store_true")
     parser.add_argument("--commit", default=EARLIER)
     given = parser.parse_args()
-    for row in section(jit=given.jit, pip=given.pip, earlier=given.commit).rows:
+    for row in section(jit=given.jit, uv=given.uv, earlier=given.commit).rows:
         print(f"{row.what}: {row.figure}" + f"   [{row.asked}]" * bool(row.asked))
