@@ -1,5 +1,6 @@
 """The studio, a report and a notebook in a browser, driven by a robot that clicks what a user clicks."""
 
+import json
 import re
 import time
 from collections.abc import Iterator
@@ -79,6 +80,17 @@ class Robot:
         time.sleep(0.3)
         self.checked()
 
+    def dragged_handle(self, name: str, by: tuple[int, int]) -> None:
+        """Drag a handle in space by some pixels, and let go."""
+        x, y = json.loads(self.page.get_attribute("#view", "data-handles") or "{}")[name]
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        for k in range(1, 9):
+            self.page.mouse.move(x + by[0] * k / 8, y + by[1] * k / 8)
+            time.sleep(0.05)
+        self.page.mouse.up()
+        self.checked()
+
     def keep(self, name: str) -> None:
         self.page.fill("#name", name)
         self.page.click("#keep button")
@@ -99,6 +111,13 @@ def flow(robot: Robot) -> list[str]:
     robot.dragged_slider("Heading")
     robot.picture("heading")
     wrong += ["heading"] if page.url == before or page.input_value("input[data-path='layout.rotate']") == "0" else []
+    handles = [("anchor", "drape.anchor"), ("heading", "layout.rotate"), ("base", "target.base")]
+    for handle, key in handles[: 2 if robot.name == "dome" else 3]:
+        before = page.url
+        robot.dragged_handle(handle, (24, 6) if handle != "base" else (0, -12))
+        field = page.locator(f"input[data-path='{key}']").last.input_value()
+        wrong += [f"handle of {handle}"] if page.url == before or field in ("", "0") else []
+        robot.picture(handle)
     lines = page.locator("#plan line.hit")
     name = lines.nth(2).get_attribute("data-rod")
     lines.nth(2).dispatch_event("pointerover")

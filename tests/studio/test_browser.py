@@ -1,6 +1,10 @@
 """The studio as somebody uses it who has a keyboard and a mouse, in Chromium."""
 
+import json
+import zlib
+from base64 import urlsafe_b64decode
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +16,11 @@ layout = { spacing = "60 mm", edge = "30 mm" }
 rod = { section = { radius = "1 mm" }, material = { youngs_modulus = "1 MPa" } }
 pop_up = { ends = "clamped" }
 checks = { stages = 0 }
+"""
+LOADED = """
+loads = [{ name = "gale", kind = "wind", value = "0.4 kN/m2", coefficient = -0.5 },
+         { name = "weight", kind = "self_weight" }]
+combinations = [{ name = "storm", factors = { gale = 1.5, weight = 1.0 } }]
 """
 SPACING = "input[data-path='layout.spacing']"
 
@@ -71,4 +80,43 @@ def test_a_case_is_changed_undone_kept_refined_and_found_again_after_a_reload(tm
         assert figures() == refined
         assert page.locator("#variants li span").all_inner_texts() == ["wider", "refined"]
         assert not page.is_disabled("#undo")
+    assert errors(said) == []
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_dialog_of_loads_keeps_those_that_the_case_has(tmp_path: Path) -> None:
+    from tests.acceptance.studio import server
+    from tests.acceptance.studio_browser import browser_page, errors
+
+    (tmp_path / "case.toml").write_text(CASE + LOADED)
+    said: list[str] = []
+    with server(tmp_path / "sessions", str(tmp_path / "case.toml")) as (address, _), browser_page(said) as page:
+        page.set_default_timeout(20_000)
+
+        def tables() -> dict[str, Any]:
+            code = page.url.partition("#case=")[2]
+            found: dict[str, Any] = json.loads(zlib.decompress(urlsafe_b64decode(code + "=" * (-len(code) % 4)), -15))
+            return found
+
+        page.goto(address)
+        page.wait_for_selector("#loads[aria-pressed=true]")
+        page.click("#loads")
+        assert page.input_value("input[name=snow]") == ""
+        assert "gale (wind)" in page.inner_text("#other-loads")
+        assert "1.5 \u00d7 gale" in page.inner_text("#combined")
+        page.fill("input[name=snow]", "0.3 kN/m2")
+        page.fill("input[name=self_weight]", "2 kg/m2")
+        page.click("#load-values button[value=check]")
+        page.click("#loads")
+        case = tables()
+        assert [load["name"] for load in case["loads"]] == ["gale", "weight", "snow"]
+        assert case["loads"][0]["kind"] == "wind"
+        assert case["loads"][1]["cladding"] == "2 kg/m2"
+        assert case["loads"][2] == {"name": "snow", "kind": "snow", "value": "0.3 kN/m2"}
+        assert case["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0, "snow": 1}}]
+        page.fill("input[name=snow]", "")
+        page.click("#load-values button[value=check]")
+        page.click("#loads")
+        assert tables()["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}]
     assert errors(said) == []

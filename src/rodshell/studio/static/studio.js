@@ -377,6 +377,7 @@ function showPlan() {
   const gone = leftOut();
   byId("left-out").replaceChildren(...(gone.length ? ["Left out: ", ...gone.map(id => make("button", { type: "button", textContent: `${id} \u00d7`, ariaLabel: `Put rod ${id} back`, onclick: () => toggle(id) }))] : []));
   byId("unseam").hidden = !(base.seams?.lines?.length);
+  markRod(marked);
 }
 
 function leftOut() {
@@ -389,7 +390,10 @@ function toggle(id) {
   change(next => set(next, "layout.left_out", rest.length < names.length ? (rest.length ? rest : undefined) : [...names, id]));
 }
 
+let marked = "";
+
 function markRod(id) {
+  marked = id;
   for (const line of byId("plan").querySelectorAll("line[data-line]")) line.classList.toggle("marked", line.dataset.line === id);
   const rod = facts?.plan.find(one => one.id === id);
   const size = rod && (rod.length < 10 ? `${(1000 * rod.length).toFixed(1)} mm` : `${rod.length.toFixed(4)} m`);
@@ -444,11 +448,20 @@ function placeHandles() {
   Object.assign(handles, { group, dot, knob, plane });
   viewer.world.add(group);
   viewer.redraw();
+  requestAnimationFrame(tellHandles);
 }
 
-function screenDistance(object, event) {
+function onScreen(object) {
   const frame = viewer.canvas.getBoundingClientRect(), place = object.getWorldPosition(new THREE.Vector3()).project(viewer.camera);
-  return Math.hypot((0.5 + 0.5 * place.x) * frame.width + frame.left - event.clientX, (0.5 - 0.5 * place.y) * frame.height + frame.top - event.clientY);
+  return [(0.5 + 0.5 * place.x) * frame.width + frame.left, (0.5 - 0.5 * place.y) * frame.height + frame.top];
+}
+
+const screenDistance = (object, { clientX, clientY }) => Math.hypot(...onScreen(object).map((value, axis) => value - [clientX, clientY][axis]));
+
+// Where the handles are in the window [px], for whoever drives the page by a program.
+function tellHandles() {
+  const parts = handles.group ? { anchor: handles.dot, heading: handles.knob, base: handles.plane } : {};
+  byId("view").dataset.handles = JSON.stringify(Object.fromEntries(Object.entries(parts).filter(([, part]) => part).map(([name, part]) => [name, onScreen(part)])));
 }
 
 function ray(event) {
@@ -464,6 +477,7 @@ function onTarget(event) {
 
 function wireHandles() {
   const canvas = viewer.canvas;
+  viewer.orbit.addEventListener("change", () => requestAnimationFrame(tellHandles));
   canvas.addEventListener("pointerdown", event => {
     if (!handles.group || drawing) return;
     handles.held = [["anchor", "dot"], ["heading", "knob"], ["base", "plane"]].find(([, part]) => handles[part] && screenDistance(handles[part], event) < 16)?.[0];
