@@ -90,7 +90,7 @@ def beside(quick: bool) -> Section:
         try:
             source = earlier_source(Path(folder) / "earlier", BEFORE)
         except SystemExit as reason:
-            return Section(f"Beside commit {BEFORE}", str(reason), ())
+            return Section(f"Compared with commit {BEFORE}", str(reason), ())
         path = os.pathsep.join(str(root / "src") for root in (ROOT, source))
         one = _run(SMALL, [str(5 if quick else 25)], path, threads=1)
         (calls, before), (now, then) = one["calls"], one["seconds"]
@@ -113,7 +113,7 @@ def beside(quick: bool) -> Section:
                 Row("   CPU time, over then", f"{cpu:.2f} ({ours['cpu']:.2f} s)", "at most 1.05"),
                 Row("   memory", f"{ours['memory'] / 2**30:.2f} GB", "under 3 GB" if whole else ""),
             ]  # fmt: skip
-    return Section(f"Beside commit {BEFORE}", said, rows)
+    return Section(f"Compared with commit {BEFORE}", said, rows)
 
 
 def _run(job: str, arguments: Sequence[str], path: str, *, threads: int) -> dict[str, Any]:

@@ -35,7 +35,7 @@ OF_BARE = {ALL_FILES: "at most 8", TABLES: "at most 3"}
 
 def earlier(pairs: int) -> Section:
     """Commands now over then, the median of the pairs' ratios, and over `BARE`."""
-    rows, title = list[Row](), "Beside earlier commits"
+    rows, title = list[Row](), "Compared with earlier commits"
     with tempfile.TemporaryDirectory() as folder:
         bare = median(_cpu_seconds(ROOT, BARE) for _ in range(pairs))
         for commit, what, asked in LIMITS:

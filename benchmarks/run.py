@@ -45,6 +45,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "startup": lambda quick: startup.section(3 if quick else 7),
     "first": lambda _: first_run.section(),
     "first-jit": lambda _: first_run.section(jit=True),
+    "first-pip": lambda _: first_run.section(pip=True),
     "loads": lambda quick: loads.loads(1 if quick else 3),
     "sameness": sameness.sameness,
     "sweeps": lambda quick: sweeps.sweeps(20 if quick else 100),

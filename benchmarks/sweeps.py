@@ -10,7 +10,7 @@ from benchmarks.rows import Row, Section, ms
 
 SAID = """
 The hemisphere with 13 x 13 rods, spacings of 26 to 34 mm, until the pop-up. "In a loop" is the same jobs in one
-process; the coordinator is all that the sweep does besides its jobs.
+process; the coordinator is all that the sweep does in addition to its jobs.
 """
 ENGINES = {
     "processes, 1 worker": {"workers": 1},

@@ -240,6 +240,26 @@ def test_a_search_that_is_out_of_time_keeps_what_it_found() -> None:
     assert len(found.design) > 2
 
 
+@pytest.mark.parametrize("where", ["gate remeshed", "sample 3", "from flat"])
+def test_gates_that_are_out_of_time_are_tried_to_their_end(where: str) -> None:
+    def late(stage: str, detail: str, residual: float) -> None:
+        if where in detail:
+            raise rs.OutOfTimeError("out of time after 3 s")
+
+    found = acceptance.refined(stages(), (refine.FAMILIES["taper"],), progress=late)
+    assert found.stopped == "out of time after 3 s"
+    assert found.changed
+    assert all(found.gates.values())
+
+
+def test_a_shell_that_falls_under_its_loads_is_refused_and_kept() -> None:
+    heavy = np.zeros((stages().footprint.mesh.node_count, 3))
+    heavy[:, 2] = -1.0
+    found = acceptance.refined(stages(), (refine.FAMILIES["taper"],), dead_loads=heavy)
+    assert found.after is stages()
+    assert found.refused == "stable: the shell falls under these loads: clamp its ends, or choose stiffer rods"
+
+
 def test_an_interrupted_search_says_how_to_go_on_and_goes_on_there() -> None:
     def interrupted(stage: str, detail: str, residual: float) -> None:
         if "design 2" in detail:

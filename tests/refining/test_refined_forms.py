@@ -11,6 +11,7 @@ import rodshell as rs
 from rodshell.case.stage_tables import FAMILIES as WORDS
 from rodshell.cli import main
 from rodshell.formfinding.pipeline import PatchForm
+from rodshell.output.viewer.scene import scene_of
 from rodshell.refining import acceptance
 from rodshell.refining.gates import Gates
 from rodshell.refining.offer import offer
@@ -57,6 +58,27 @@ def test_the_result_has_the_figures_before_and_after_and_the_refined_rods() -> N
     assert all(found["gates"].values())
     assert all(rod.stiffness is not None and max(rod.stiffness.factors) > 1.0 - 1e-12 for rod in results.rods)
     assert results.agreement["pinned"].rms == refined.gap_after.rms
+
+
+def test_the_viewer_has_the_widths_of_tapered_rods() -> None:
+    """EI of round rods is as the fourth power of their diameter; nodes are as far along as the flat grid says."""
+    kept = form().unchecked()
+    scene = scene_of(kept, schedules=False)
+    plain = scene_of(job("").run(until="pop-up").unchecked(), schedules=False)
+    assert scene is not None
+    assert plain is not None
+    assert "widths" not in plain.header
+    entry = scene.header["widths"]
+    widths = np.frombuffer(scene.data, "<f4", entry["count"], entry["at"]).reshape(-1, 2)
+    assert np.array_equal(widths[:, 0], widths[:, 1])
+    begin = 0
+    for drawn, record in zip(scene.header["rods"], kept.results.rods, strict=True):
+        own, begin = widths[begin : begin + drawn["count"], 0], begin + drawn["count"]
+        assert record.stiffness is not None
+        factors = record.stiffness.factors
+        assert own[[0, -1]] ** 4 == pytest.approx([factors[0], factors[-1]], rel=1e-5)
+        assert own.max() ** 4 == pytest.approx(max(factors), rel=0.05)  # at the node next to the thickest station
+        assert own.min() < 0.8 * own.max()
 
 
 def test_a_warm_start_takes_the_refinement_over_or_refines_the_same_shell_again() -> None:

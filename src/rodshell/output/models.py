@@ -238,7 +238,9 @@ def glb_bytes(archive: Archive, state: str) -> bytes:
     for k, rod in enumerate(rods):
         curve, along = shape.positions[rod.nodes], rod.record.stiffness
         widths = (
-            None if along is None or "flat" not in archive.states else _widths(along, archive.states["flat"][rod.nodes])
+            None
+            if along is None or "flat" not in archive.states
+            else widths_along(along, archive.states["flat"][rod.nodes])
         )
         points, normals, faces = swept(curve, outline, widths)
         shades = None if colours is None else np.repeat(colours[k], len(outline), axis=0)
@@ -266,8 +268,14 @@ def section_outline(section: Section | None, size: float) -> Floats:
     return np.column_stack([b * np.cos(angle), a * np.sin(angle)])
 
 
-def _widths(along: Stiffness, flat: Floats) -> Floats:
-    """(k, 2) widths across and up of a rod's section at its nodes, `flat` (k, 3), over those of the unchanged one."""
+def widths_along(along: Stiffness, flat: Floats) -> Floats:
+    """(k, 2) widths across and up of a rod's section at its nodes, over those of the unchanged one.
+
+    Parameters
+    ----------
+    along : how its EI changes.
+    flat : (k, 3) its nodes in the flat grid [m].
+    """
     stations = np.linalg.norm(flat - flat[0], axis=1)
     factors = np.interp(stations, along.at, along.factors)
     same = np.ones_like(factors)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.errors import InputError
+from rodshell.errors import ConvergenceError, InputError, OutOfTimeError
 from rodshell.formfinding.patches import PatchedForm, merged_agreement
 from rodshell.formfinding.pipeline import Agreement, PatchForm, meshed_again
 from rodshell.formfinding.popup import Ends
@@ -217,7 +217,12 @@ def _searched(
             stages, vary, ends=ends, under_weight=asked.weight, dead_loads=asked.dead_loads, start=start,
             least_eigenvalue=least_eigenvalue, progress=searching,
         )  # fmt: skip
-        form, design, judged, refused, made = _accepted(found, asked.span_error, silent if found.stopped else progress)
+        late = _Late(silent if found.stopped else progress, found.stopped)
+        form, design, judged, refused, made = _accepted(found, asked.span_error, late)
+    except ConvergenceError as lost:
+        judged = gates(_alone(stages, ends), span_error=asked.span_error, progress=progress)
+        names = tuple(family.name for family in vary)
+        return Refined(names, ends, stages, stages, judged.passed, f"stable: {lost}", 0, judged.factorizations)
     except KeyboardInterrupt as stopped:
         raise KeyboardInterrupt(_where(best) or str(stopped)) from stopped
     loaded: tuple[Agreement, ...] = ()
@@ -227,7 +232,7 @@ def _searched(
     values = () if design is None else tuple(design.point.values.tolist())
     return Refined(
         found.vary, ends, stages, form or stages, judged.passed, refused, found.factorizations, made,
-        found.stopped, values, loaded,
+        late.said, values, loaded,
     )  # fmt: skip
 
 
@@ -281,6 +286,20 @@ def _accepted(
     if accepted is None:
         return None, None, best, best.reason, made
     return *accepted, best.reason, made
+
+
+class _Late:
+    """Progress of the gates, which are tried to their end when the time is over, so that the search is not lost."""
+
+    def __init__(self, progress: Progress, said: str = "") -> None:
+        self._progress, self.said = progress, said
+
+    def __call__(self, stage: str, detail: str, residual: float) -> None:
+        if not self.said:
+            try:
+                self._progress(stage, detail, residual)
+            except OutOfTimeError as late:
+                self.said = str(late)
 
 
 def _some(designs: Sequence[Candidate]) -> list[Candidate]:

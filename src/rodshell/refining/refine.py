@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.errors import InputError
+from rodshell.errors import ConvergenceError, InputError
 from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.formfinding.pipeline import Agreement, PatchForm, agreement
 from rodshell.formfinding.popup import Ends, PopUp
@@ -22,6 +22,7 @@ from rodshell.model import Shell
 from rodshell.refining.end_families import Clamps, Supports
 from rodshell.refining.gauss_newton import Found, Step, gauss_newton
 from rodshell.refining.length_families import Holes, Offsets, Tails
+from rodshell.refining.load_limits import Deflection, LoadFactor
 from rodshell.refining.objectives import Gap, LowestEigenvalue, Objective, Prestress, residuals
 from rodshell.refining.stiffness_families import DoubleLaths, Sections, Taper
 from rodshell.refining.stock import rounded
@@ -76,6 +77,7 @@ class Refinement:
     variables : what was varied.
     stopped : when and where the search was out of time, or "".
     loaded : gaps before and after under the loads, where it was refined under loads; else None.
+    as_found : whether its stiffnesses are built as they were found, see `built`.
     """
 
     vary: tuple[str, ...]
@@ -89,6 +91,7 @@ class Refinement:
     variables: Design
     stopped: str = ""
     loaded: tuple[Agreement, Agreement] | None = None
+    as_found: bool = False
 
     def __repr__(self) -> str:
         gap = f"{percent_text(self.gap_before.rms_relative)} -> {percent_text(self.gap_after.rms_relative)} rms"
@@ -115,7 +118,7 @@ def refine(
     under_weight: float = 0.0,
     dead_loads: Floats | None = None,
     start: Sequence[float] | None = None,
-    most_evaluations: int = 60,
+    most_evaluations: int | None = None,
     progress: Progress = lambda step: None,
 ) -> Refinement:
     """Bring a popped-up shell nearer to its target.
@@ -131,13 +134,13 @@ def refine(
         stands above.
     dead_loads : (n, 3) further fixed loads on the nodes of the mesh under which it is brought there [N].
     start : values of the variables to begin with, as `Step.values` of an earlier search; None: no change.
-    most_evaluations : designs that are tried; where only lengths, clamps or supports vary, twice as many.
+    most_evaluations : designs that are tried; None: 60, or 30 on either side where no stiffness varies.
     progress : called after each; an OutOfTimeError that it raises ends the search with what was found.
 
     Raises
     ------
-    InputError : no such family; the shell has no target, no pop-up with these ends, is not stable, or falls under the
-        loads.
+    InputError : no such family; the shell has no target, no pop-up with these ends, or is not stable.
+    ConvergenceError : it falls under the loads, or has no stable equilibrium with the design to start from.
     """
     families = chosen_families(vary)
     ends = stages.ends[0] if ends is None else ends
@@ -148,16 +151,18 @@ def refine(
     floor = LowestEigenvalue(least=least_eigenvalue, before=before)
     stressed = [Prestress()] if any(family.name not in STIFFNESSES for family in families) else []
     goals = [Gap(), *stressed] if objectives is None else list(objectives)
+    stiff = any(family.name in STIFFNESSES for family in families)
+    most = (60 if stiff else 30) if most_evaluations is None else most_evaluations
 
     def searched(first: Point) -> Found:
         return gauss_newton(
             variables, first, [*goals, floor],
-            allows=floor.allows, lowest_before=before, most=most_evaluations, progress=progress,
+            allows=floor.allows, lowest_before=before, most=most, progress=progress,
         )  # fmt: skip
 
     found = searched(here)
     accepted = found.accepted
-    if start is None and not found.stopped and not any(family.name in STIFFNESSES for family in families):
+    if start is None and found.converged and not stiff:
         opposite, more = _opposite(variables, here, accepted[-1])
         spent += more
         if opposite is not None:
@@ -171,7 +176,8 @@ def refine(
         spent += more
         nearer = chosen is not None and chosen.rms < here.rms
         accepted = (here, chosen) if chosen is not None and nearer else (here,)
-    designs = tuple(Candidate(point, built(variables, point)) for point in accepted)
+    as_found = any(isinstance(goal, (Deflection, LoadFactor)) for goal in goals)
+    designs = tuple(Candidate(point, built(variables, point, as_found=as_found)) for point in accepted)
     after, made = popped_up(stages, designs[-1], ends)
     loaded = None
     if here.equilibrium.problem.load is not None:
@@ -180,7 +186,7 @@ def refine(
     names = tuple(family.name for family in families)
     return Refinement(
         names, ends, held, after, designs, found.converged, spent + found.factorizations + made,
-        found.steps, variables, found.stopped, loaded,
+        found.steps, variables, found.stopped, loaded, as_found,
     )  # fmt: skip
 
 
@@ -223,10 +229,10 @@ def between(refinement: Refinement, low: Candidate, high: Candidate, share: floa
     point, made = here.tried(values, variables.change(values))
     if point is None:
         return None, made + 1
-    return Candidate(point, built(variables, point)), made + 1
+    return Candidate(point, built(variables, point, as_found=refinement.as_found)), made + 1
 
 
-def built(variables: Design, point: Point) -> Grid:
+def built(variables: Design, point: Point, *, as_found: bool = False) -> Grid:
     """The grid of a design.
 
     A common factor on all stiffnesses changes no unloaded shape, unless joints are springs. It is chosen such that the
@@ -236,13 +242,14 @@ def built(variables: Design, point: Point) -> Grid:
     ----------
     variables : what is varied.
     point : the design.
+    as_found : leave that factor as it is, since limits under loads decide on it.
     """
     structure, values = point.structure, point.values
     grid = Grid(structure.mesh, structure.popped.boundary)
     joint = structure.joint
     given = (joint.shear, joint.out_of_plane, joint.twist) if isinstance(joint, Elastic) else ()
     springs = any(0.0 < stiffness < inf for stiffness in given)
-    if point.equilibrium.problem.load is None and not springs:
+    if point.equilibrium.problem.load is None and not springs and not as_found:
         profiles = [rod.profile for rod in variables.applied(grid, values).mesh.grid.rods]
         thickest = max(1.0 if profile is None else max(profile.factors) for profile in profiles)
         least = STIFFER * structure.lowest / float(point.modes.values[0])
@@ -310,7 +317,8 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
 
     Raises
     ------
-    InputError : it has no stable equilibrium near the shell's own; `start` is not as long as there are variables.
+    InputError : `start` is not as long as there are variables.
+    ConvergenceError : it has no stable equilibrium near the shell's own; the shell falls under the loads.
     """
     box = variables.box
     values = box.start
@@ -329,12 +337,14 @@ def first_point(structure: Structure, variables: Design, start: Sequence[float] 
         here = find_equilibrium(problem, here.state, here.forces)
         made = here.report.factorizations
         if not here.report.stable:
-            raise InputError("the first design has no stable equilibrium near the shell's own: vary something else")
+            raise ConvergenceError(
+                "the first design has no stable equilibrium near the shell's own: vary something else"
+            )
     load = structure.load(edges)
     if load is not None:
         loaded, more = under_load(here, load)
         if loaded is None:
-            raise InputError("the shell falls under these loads: clamp its ends, or choose stiffer rods")
+            raise ConvergenceError("the shell falls under these loads: clamp its ends, or choose stiffer rods")
         here, made = loaded, made + more
     return Point(structure, values, change, edges.at(here.elements), here), made
 

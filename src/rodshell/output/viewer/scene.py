@@ -18,7 +18,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.geometry.frames import cross, unit
 from rodshell.output.colour_scale import Colour, Scale, largest_gap, scale_of
 from rodshell.output.grid import GridJoint, GridRod, Shape, joints_of, rods_of, shape_names, shape_of
-from rodshell.output.models import section_outline
+from rodshell.output.models import section_outline, widths_along
 from rodshell.output.pictures import FAMILIES, SEGMENTS
 from rodshell.output.schedules import Table, heading, joints_table, rods_table
 from rodshell.results import Archive, wording
@@ -74,6 +74,7 @@ class Drawn:
     target : points (p, 3) and triangles (t, 3) of the target, if there is one.
     reactions : by shape, the forces (2 m, 3) at the start and end of each rod over the largest, and that one in words.
     rows : of the schedules, by the kind of part.
+    widths : (k, 2) of the section at each node, across and up, over those of `outline`; None: the same everywhere.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Drawn:
     target: tuple[NDArray[np.floating], Ints] | None = None
     reactions: Mapping[str, tuple[Floats, str]] = field(default_factory=dict)
     rows: Mapping[str, Any] = field(default_factory=dict)
+    widths: Floats | None = None
 
     def scene(self) -> Scene:
         """It as bytes for the viewer."""
@@ -120,6 +122,8 @@ class Drawn:
             ],
             "rows": self.rows,
         }
+        if self.widths is not None:
+            header["widths"] = data.add(self.widths[entries].astype("<f4"))
         if self.target is not None:
             points, faces = self.target
             header["target"] = {"points": frame.points(points), "faces": data.add(faces.astype("<u4"))}
@@ -162,6 +166,7 @@ def scene_of(archive: Archive, *, schedules: bool = True) -> Scene | None:
         None if target is None else (target, archive.states["target_faces"]),
         _reactions(archive, rods),
         {kind: _rows(table) for kind, table in tables.items()},
+        _widths(archive, rods),
     ).scene()
 
 
@@ -283,6 +288,19 @@ def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale) -> tuple[
     worst = int(np.nanargmax(np.abs(scale.values)))
     unit = scale.caption.split(" in ")[-1].split(",")[0]
     return shape.positions[archive.states["rod_nodes"][worst]], f"{scale.values[worst]:.3g} {unit}"
+
+
+def _widths(archive: Archive, rods: list[GridRod]) -> Floats | None:
+    """Of the rods' sections, see `Drawn`; None where no section changes, or the flat grid is not known."""
+    if "flat" not in archive.states or not any(rod.record.stiffness for rod in rods):
+        return None
+    flat, along = archive.states["flat"], [rod.record.stiffness for rod in rods]
+    return np.concatenate(
+        [
+            np.ones((len(rod.nodes), 2)) if stiffness is None else widths_along(stiffness, flat[rod.nodes])
+            for rod, stiffness in zip(rods, along, strict=True)
+        ]
+    )
 
 
 def _laths(outline: Floats) -> bool:

@@ -226,6 +226,7 @@ export function createViewer(root, { controls = true } = {}) {
   // The section swept along every rod: across = normal x tangent, up = normal; of round sections any normal serves.
   function tubes(points, tint, normals) {
     const outline = scene.outline, s = outline.length, count = points.length / 3;
+    const widths = scene.widths ? scene.array(scene.widths) : null;  // of rods whose sections change along them
     const vertices = new Float32Array(3 * s * count), colour = new Float32Array(3 * s * count);
     const faces = new Uint32Array(6 * s * scene.first.length);
     const t = new THREE.Vector3(), n = new THREE.Vector3(), across = new THREE.Vector3();
@@ -239,9 +240,10 @@ export function createViewer(root, { controls = true } = {}) {
         if (n.lengthSq() < 1e-6) n.set(1, 0, 0).addScaledVector(t, -t.x);
         n.normalize();
         across.crossVectors(n, t);
+        const [wider, higher] = widths ? [widths[2 * entry], widths[2 * entry + 1]] : [1, 1];
         outline.forEach(([wide, high], j) => {
           for (let c = 0; c < 3; c++) {
-            vertices[3 * (s * entry + j) + c] = points[3 * entry + c] + wide * across.getComponent(c) + high * n.getComponent(c);
+            vertices[3 * (s * entry + j) + c] = points[3 * entry + c] + wider * wide * across.getComponent(c) + higher * high * n.getComponent(c);
             colour[3 * (s * entry + j) + c] = tint[3 * entry + c];
           }
         });
