@@ -32,6 +32,7 @@ SNOW = 1000.0  # N/m2
 NAMES = {"cap": "tube 41.7 x 3.5, cap R 10 base 4", "paraboloid": "larch 50 x 35, 16 m, rise 4"}
 BRACING = {
     "cables": rs.Cables(rod=ROPE, prestrain=1e-3),
+    "cables to the supports": rs.Cables(rod=ROPE, prestrain=1e-3, ends_at="supports"),
     "third layer": rs.Laths(),
     "third layer, 40 mm above": rs.Laths(eccentricity=0.04),
 }

@@ -380,7 +380,10 @@ def bad_input_rows(folder: Path) -> Iterator[Row]:
         updates = other.show(dragged(20), live=True)
         disturbed = other.until("stage", "failed", serial=updates)["kind"] != "stage"
         said = page.until("done", "failed", serial=serial, seconds=120)
-        sentence = said.get("sentence", said["kind"])
+        shown = [
+            message["status"] for message in page.heard if message["kind"] == "stage" and message["serial"] == serial
+        ]
+        sentence = said.get("sentence", (shown or [said["kind"]])[-1])  # a shape that was not finished is shown
         yield Row(
             "formula that takes for ever", "not ended in time", float("out of time" not in sentence), 0, note=sentence
         )

@@ -7,6 +7,7 @@ import pytest
 
 from rodshell.errors import ConvergenceError, InputError, StabilityError
 from rodshell.solve import modes
+from rodshell.solve.load import Load
 from rodshell.solve.load_path import load_path
 from rodshell.solve.modes import frequencies, linear_buckling
 from tests.solve import stability_problems as known
@@ -121,3 +122,17 @@ def test_modes_of_what_is_not_stable_are_refused() -> None:
         frequencies(column.unloaded, -np.ones_like(fallen.state))
     with pytest.raises(InputError, match="the mass has the shape"):
         frequencies(column.unloaded, np.ones(3))
+
+
+def test_that_a_load_only_stiffens_is_found_by_inertia_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A column that is drawn has no factor; Lanczos' method would look for its largest eigenvalue, next to zero, among
+    many others, and took minutes under the wind's suction on braced shells."""
+    column = known.eulers_column(40)
+    assert column.load.forces is not None
+    drawn = Load(forces=-column.load.forces)
+    monkeypatch.setattr(modes, "_lanczos", None)
+    assert len(linear_buckling(column.unloaded, drawn, 3, most=100.0).factors) == 0
+    monkeypatch.undo()
+    for count, found in ((1, 1), (3, 3), (4, 4), (9, 4)):  # 1 and 4, in both planes; 9 is above the largest asked for
+        factors = linear_buckling(column.unloaded, column.load, count, most=5.0).factors
+        np.testing.assert_allclose(factors, [1.0, 1.0, 4.0, 4.0][:found], rtol=5e-3)

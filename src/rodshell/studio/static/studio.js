@@ -29,7 +29,7 @@ const IDLE = ["drape.frames", "target.file", "target.boundary", "seams.file"];  
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
 
 let start, session, socket, viewer, gui, drawn;
-let base = {}, resolved = null, serial = Date.now(), waiting = null, shown = 0, facts = null, stage = "", history = { at: -1, cases: [], variants: [] };
+let base = {}, resolved = null, serial = Date.now(), waiting = null, shown = 0, facts = null, history = { at: -1, cases: [], variants: [] };
 
 // The case, and what is sent
 
@@ -159,7 +159,6 @@ function hear(news) {
     shown = news.serial;
     drawn = news.serial;
     facts = news;
-    stage = news.stage;
     showFacts();
   }
   if (news.kind === "done" && news.serial === serial) say("");
