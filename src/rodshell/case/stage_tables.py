@@ -260,7 +260,7 @@ class SeamsTable(Table):
 
 class ChecksTable(Table):
     strength: Stress | None = Field(
-        default=None, description="bending strength, for the utilisation; default: a preset's design strengths"
+        default=None, description="design strength in bending; default: a preset's by its code"
     )
     stages: Whole = Field(default=8, description="equilibria of the deployment from flat; 0: it is not computed")
     shear_strength: Stress | None = Field(
