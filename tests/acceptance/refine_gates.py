@@ -13,7 +13,7 @@ from unittest.mock import patch
 import numpy as np
 
 import rodshell as rs
-from rodshell.checks.deployment import deploy
+from rodshell.checks.deployment import Deployment, deploy
 from rodshell.formfinding import PatchForm, agreement, pop_up
 from rodshell.formfinding.patches import PatchedForm
 from rodshell.formfinding.popup import Ends
@@ -131,8 +131,11 @@ def rows_of(name: str, stages: PatchForm | PatchedForm) -> Iterator[Row]:
     told = after < before or bool(found.refused)
     yield Row(f"{name}: taper", "neither nearer nor told why not", float(not told), 0, note=found.words)
     for piece, form in refined_pieces(found):
-        faults = missed(form)
+        way = deployment(form)
+        faults = missed(form, way)
         note = "; ".join(faults) or "none"
+        if way.reached_from_flat is None:
+            note += f"; not followed below {way.lost_at:.0%} of the deployment: from flat is shown by the gate alone"
         yield Row(f"{name}{piece}: taper", "gates missed by other code", float(len(faults)), 0, note=note)
 
 
@@ -148,14 +151,19 @@ def refined_pieces(found: Refined) -> Iterator[tuple[str, PatchForm]]:
             yield f", patch {name}", piece
 
 
-def missed(form: PatchForm) -> list[str]:
+def deployment(form: PatchForm) -> Deployment:
+    """Followed backwards from the popped-up shell, as the checks do."""
+    popped = form.popped["pinned"]
+    return deploy(popped.shell, popped.equilibrium, stages=3)
+
+
+def missed(form: PatchForm, way: Deployment) -> list[str]:
     """Gates that a design fails when they are tried in another way."""
-    popped, size = form.popped["pinned"], form.target.size
+    size = form.target.size
     gap, faults = form.agreement["pinned"].rms_relative, list[str]()
     if misfit(form.footprint.mesh) > 5e-4 * size:
         faults.append("flat")
-    way = deploy(popped.shell, popped.equilibrium, stages=3)
-    if not way.reached_from_flat:
+    if way.reached_from_flat is False:
         faults.append("from flat")
     mesh = form.footprint.mesh
     if not mesh.layered and form.boundary.draped is not None:
