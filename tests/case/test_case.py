@@ -1,7 +1,7 @@
 """The case file: what is left out, what is written back, and what is refused."""
 
 import tomllib
-from math import cos, tau
+from math import cos, pi, tau
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +71,7 @@ def test_built_in_cases_have_the_papers_values(name: str, target: dict[str, obje
         "rotate": 0.0,
         "offset": (0.0, 0.0),
         "left_out": (),
+        "crossing": pi / 2,
     }
     assert case.rod.model_dump(exclude_none=True) == {
         "section": {"kind": "circle", "radius": 0.001},

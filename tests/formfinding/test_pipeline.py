@@ -583,3 +583,23 @@ def test_every_stage_shows_itself_in_one_short_line():
     assert repr(gap) == f"<Agreement: {gap}>"
     assert re.fullmatch(r"gap to the target: max \S+ mm \(\S+ % of its size\) at .* mm, rms \S+ mm \(\S+ %\)", str(gap))
     assert repr(form.checks) == "<Checks of pinned, 9 stages of deployment>"
+
+
+@pytest.mark.parametrize("method", [rs.Gravity(), rs.Fall()])
+def test_a_crossing_angle_is_refused_where_the_grid_finds_its_angles_itself(method: rs.Gravity | rs.Fall) -> None:
+    layout = rs.GridLayout.orthogonal(spacing=0.1, crossing=1.2)
+    rod = rs.Rod(rs.Circle(0.001), rs.Material(1e6, 1000.0))
+    with pytest.raises(rs.InputError, match=r"layout crossing 68\.75 degrees: a grid that hangs or falls"):
+        rs.drape(layout, rod, rs.Hemisphere(0.2), method=method)
+
+
+def test_a_grid_with_oblique_families_is_draped_and_pops_up() -> None:
+    """The families begin at 60 degrees to each other; the drape keeps to the net to some percent of the size."""
+    rod = rs.Rod(rs.Circle(0.001), rs.Material(1e6, 1000.0))
+    layout = rs.GridLayout.orthogonal(spacing=0.05, crossing=np.pi / 3)
+    form = rs.find_form(rs.Paraboloid(0.2, 0.1), layout, rod, ends="clamped")
+    assert form.popped["clamped"].report.stable
+    assert form.agreement["clamped"].rms_relative < 0.005
+    net = form.draped.net
+    assert net is not None
+    assert np.degrees(net.min_angle) < 60

@@ -446,6 +446,7 @@ LAYOUT = {"rods": (3, 4), "spacing": 0.03, "length": 1.2, "edge": 0.005}
     ({"spacing": (0.03, -1.0)}, "layout spacing must be positive, not -1.0 m"),
     ({"spacing": nan}, "layout spacing must be positive, not nan m"),
     ({"edge": -0.005}, "layout edge must be positive"),
+    ({"crossing": 0.5}, "layout crossing 28.65 degrees: both families can begin at 30 to 150 degrees to each other"),
     ({"edge": 0.031}, "layout edge 0.031 m is longer than the spacing 0.03 m: use a shorter edge"),
     ({"length": 0}, "layout length must be positive, not 0 m"),
     ({"edge": "5 mm"}, "layout edge must be a number in m, not .5 mm"),

@@ -1,5 +1,6 @@
 """The tables of a case's stages: layout, drape, pop-up, seams, checks, fabrication and drawings."""
 
+from math import pi
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -58,6 +59,7 @@ class LayoutTable(Table):
     offset: Point = Field(
         default=(0.0, 0.0), description="shift x,y of the grid lines from the axes through the anchor"
     )
+    crossing: Angle = Field(default=pi / 2, description="angle between both families on the target, at the anchor")
     left_out: Names = Field(default=(), description="names of rods that are not built, such as U01, V03")
 
     def build(self, target: "Target | None" = None) -> "GridLayout":

@@ -1,6 +1,7 @@
 """Drape: lay the flat grid on the target, by one of three methods."""
 
 from collections.abc import Sequence
+from math import degrees, pi
 
 from rodshell.errors import InputError
 from rodshell.formfinding.bound_drape import bound_drape
@@ -45,7 +46,7 @@ def drape(
 
     Raises
     ------
-    InputError : a value is of the wrong kind, or the layout does not fit the target.
+    InputError : a value is of the wrong kind, or the layout does not fit the target or the method.
     NetLimitError : no net covers the target from this anchor and heading.
     StabilityError : the fall's time step is beyond the stability limit of explicit ties.
     """
@@ -59,6 +60,11 @@ def drape(
         instance("warm_start", warm_start, Draped, "what an earlier rodshell.drape returned")
     if anchor is not None:
         point("anchor", anchor)
+    if layout.crossing != pi / 2 and not isinstance(method, Bound):
+        raise InputError(
+            f"layout crossing {degrees(layout.crossing):.4g} degrees: a grid that hangs or falls on its target finds "
+            "its angles itself: leave it out, or bind the grid to the target (method = bound)"
+        )
     if isinstance(method, Bound):
         return bound_drape(target, layout, rod, anchor=anchor, warm_start=warm_start, joint=joint, progress=progress)
     if isinstance(method, Gravity):

@@ -1,6 +1,7 @@
-"""Two orthogonal families of parallel rods, before they are cut to a target."""
+"""Two families of parallel rods, orthogonal in the flat grid, before they are cut to a target."""
 
 from dataclasses import asdict, dataclass, fields
+from math import degrees, pi
 from numbers import Real
 from reprlib import repr as short
 from typing import Literal
@@ -14,6 +15,7 @@ from rodshell.validation import instance, number, numbers, positive
 
 Auto = Literal["auto"]
 
+FLATTEST = pi / 6 - 1e-9  # smallest crossing angle; and its supplement is the largest
 EDGES_A_SPAN = 6  # edges of the mesh per spacing, where the edge is "auto"
 
 
@@ -33,11 +35,12 @@ class GridLayout:
     lines : ascending offsets of rods of families u and v that are not equally spaced [m]; before the first and after
         the last of them the spacing continues. Empty for a family whose rods are all equally spaced.
     left_out : names of rods that are not built; their lines still shape the net.
+    crossing : angle between the families on the target, where its axes cross [rad]; the flat grid stays orthogonal.
 
     Raises
     ------
     InputError : a value of the wrong kind or not finite; a count below 2; a spacing, length or edge that is not
-        positive; an edge longer than the spacing.
+        positive; an edge longer than the spacing; a crossing angle below 30 or above 150 degrees.
     """
 
     rods: tuple[int, int] | Auto
@@ -48,6 +51,7 @@ class GridLayout:
     offset: tuple[float, float] = (0.0, 0.0)
     lines: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     left_out: tuple[str, ...] = ()
+    crossing: float = pi / 2
 
     def __post_init__(self) -> None:
         for name in ("spacing", "offset"):
@@ -58,6 +62,7 @@ class GridLayout:
             "edge": positive("layout edge", self.edge, "m"),
             "rotate": number("layout rotate", self.rotate, "rad"),
             "lines": _offsets(self.lines),
+            "crossing": number("layout crossing", self.crossing, "rad"),
         }
         if not _is_auto(self.length):
             values["length"] = positive("layout length", self.length, "m")
@@ -68,6 +73,11 @@ class GridLayout:
         values["left_out"] = tuple(self.left_out)
         for name, value in values.items():
             object.__setattr__(self, name, value)
+        if not FLATTEST <= self.crossing <= pi - FLATTEST:
+            raise InputError(
+                f"layout crossing {degrees(self.crossing):.4g} degrees: both families can begin at 30 to 150 degrees "
+                "to each other: choose an angle between these"
+            )
         if self.edge > min(self.spacing):
             raise InputError(
                 f"layout edge {self.edge} m is longer than the spacing {min(self.spacing)} m: use a shorter edge"
@@ -79,6 +89,8 @@ class GridLayout:
             values["edge"] = "auto"
         if any(self.lines):
             values["lines"] = "..."
+        if self.crossing == pi / 2:
+            del values["crossing"]
         if len(self.left_out) > 2:
             values["left_out"] = f"{len(self.left_out)} rods"
         shown = (f"{name}={value!r}" for name, value in values.items() if value not in (0.0, (0.0, 0.0), ((), ()), ()))
@@ -94,6 +106,7 @@ class GridLayout:
         rotate: float = 0.0,
         offset: tuple[float, float] = (0.0, 0.0),
         left_out: tuple[str, ...] = (),
+        crossing: float = pi / 2,
     ) -> "GridLayout":
         """Make a layout of equally spaced rods along x and along y.
 
@@ -106,6 +119,7 @@ class GridLayout:
         rotate : angle of family u against the target's x axis [rad].
         offset : shift (x, y) of the lattice against the axes through the anchor [m].
         left_out : names of rods that are not built.
+        crossing : angle between the families on the target, where its axes cross [rad].
 
         Raises
         ------
@@ -116,7 +130,7 @@ class GridLayout:
         _require_two("spacing", pair)
         pair = (positive("layout spacing", pair[0], "m"), positive("layout spacing", pair[1], "m"))
         longest = auto_edge(pair) if isinstance(edge, str) and edge == "auto" else edge
-        return GridLayout(rods, pair, length, longest, rotate, offset, left_out=left_out)
+        return GridLayout(rods, pair, length, longest, rotate, offset, left_out=left_out, crossing=crossing)
 
     def phase(self, family: Family) -> float:
         """Offset of one line of the lattice of a family [m]; the others are whole spacings away."""

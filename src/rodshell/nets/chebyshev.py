@@ -8,7 +8,7 @@ net: they are kept as virtual rods.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, degrees, sin
+from math import cos, degrees, pi, sin
 from string import ascii_lowercase
 
 import numpy as np
@@ -173,7 +173,8 @@ def chebyshev_net(
 
 
 def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | None) -> tuple[Floats, Floats]:
-    """The anchor, lifted vertically onto the target, and the tangent that points along the heading in plan."""
+    """The anchor, lifted vertically onto the target, and the tangent along the heading in plan; with that of the other
+    axis where the families do not cross at right angles."""
     x, y = anchor if anchor is not None else target.summit
     remedy = "leave it out for the highest point, or let a search choose (--anchor auto)"
     try:
@@ -184,7 +185,11 @@ def _start(target: Target, layout: GridLayout, anchor: tuple[float, float] | Non
         raise InputError(f"the anchor ({x:g}, {y:g}) m is outside the target: choose a point inside its rim, {remedy}")
     n = target.on_surface(lifted).normal[0]
     plan = np.array([cos(layout.rotate), sin(layout.rotate)])
-    return lifted[0], np.array([*plan * n[2], -plan @ n[:2]])
+    along = np.array([*plan * n[2], -plan @ n[:2]])
+    if layout.crossing == pi / 2:
+        return lifted[0], along
+    both = cos(layout.crossing) * along + sin(layout.crossing) * np.cross(n, along)
+    return lifted[0], np.stack([along, both])
 
 
 def _require_room(target: Target, net: Covering, height: float) -> None:

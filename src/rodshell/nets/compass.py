@@ -63,7 +63,8 @@ def march(
     target : the surface.
     u, v : ascending material coordinates of the lines, both containing 0 [m].
     anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there; its part in the tangent plane is used.
+    heading : (3,) direction of the u axis there, with the v axis across it; or (2, 3) directions of both. Their
+        parts in the tangent plane are used.
     heights : see `Net`.
     """
     points = np.full((len(u), len(v), 3), np.nan)
@@ -106,11 +107,11 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Floats:
     ----------
     target : the surface.
     anchor : (3,) point of the surface where the axes cross [m].
-    heading : (3,) direction of the u axis there; its part in the tangent plane is used.
+    heading : (3,) or (2, 3), see `march`.
     """
     normal = target.level(anchor[None])[1][0]
-    along = heading - (heading @ normal) / (normal @ normal) * normal
-    both = unit(np.stack([along, cross(normal, along)]))
+    along = heading - (heading @ normal / (normal @ normal))[..., None] * normal
+    both = unit(along if along.ndim == 2 else np.stack([along, cross(normal, along)]))
     return np.stack([both, -both], axis=1).reshape(4, 3)
 
 

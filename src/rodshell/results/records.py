@@ -165,6 +165,7 @@ class Layout(Record):
     edge: Number = key("longest edge of the mesh", "m")
     rotate: Number = key("angle of family u against the target's x axis", "rad")
     offset: Flat | None = key("shift of the lattice against the axes through the anchor", "m")
+    crossing: Number = key("angle between both families on the target, at the anchor", "rad")
 
 
 class Section(Record):

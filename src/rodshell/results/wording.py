@@ -78,7 +78,7 @@ CASE_UNITS: dict[str, tuple[float, str]] = {  # factor and unit of a number of t
     "fibre_distances": (1e3, "mm"),
     "torsion_modulus": (1e6, "cm\N{SUPERSCRIPT THREE}"),
     "density": (1.0, "kg/m\N{SUPERSCRIPT THREE}"),
-    **dict.fromkeys(("rotate", "turn"), (180 / pi, "\N{DEGREE SIGN}")),
+    **dict.fromkeys(("rotate", "turn", "crossing"), (180 / pi, "\N{DEGREE SIGN}")),
 }
 TURNING = (1.0, "N m/rad")
 JOINT_UNITS = {

@@ -20,6 +20,7 @@ const set = (tables, path, value) => {
 
 const SLIDERS = [  // key, name, and how its range follows from its value
   ["layout.spacing", "Spacing", "length"], ["layout.rotate", "Heading", "angle"],
+  ["layout.crossing", "Crossing", "crossing"],
   ["target.radius", "Radius", "length"], ["target.height", "Height", "length"], ["target.a", "Half-axis x", "length"],
   ["target.b", "Half-axis y", "length"], ["target.c", "Half-axis z", "length"], ["target.base", "Base plane", "place"],
   ["target.scale", "Scale", "factor"],
@@ -281,15 +282,16 @@ function value(path) {
 function addSlider(folder, path, name, kind) {
   const now = value(path);
   if (!Number.isFinite(now)) return;
-  const small = kind !== "angle" && (facts?.handles?.size || resolved?.target?.radius || now) < 1;
-  const unit = kind === "angle" ? 180 / Math.PI : kind === "factor" ? 1 : small ? 1000 : 1;
+  const turned = kind === "angle" || kind === "crossing";
+  const small = !turned && (facts?.handles?.size || resolved?.target?.radius || now) < 1;
+  const unit = turned ? 180 / Math.PI : kind === "factor" ? 1 : small ? 1000 : 1;
   const size = (facts?.handles?.size || 1) * unit;
-  const [low, high] = range(path, now * unit, kind === "angle" ? [-90, 90] : kind === "place" ? [now * unit - 0.5 * size, now * unit + 0.5 * size] : [now * unit / 2, now * unit * 2]);
+  const [low, high] = range(path, now * unit, kind === "angle" ? [-90, 90] : kind === "crossing" ? [30, 150] : kind === "place" ? [now * unit - 0.5 * size, now * unit + 0.5 * size] : [now * unit / 2, now * unit * 2]);
   const holder = { value: now * unit };
-  const symbol = kind === "angle" ? "\u00b0" : kind === "factor" ? "" : small ? "mm" : "m";
-  const step = kind === "angle" ? 0.5 : 10 ** Math.floor(Math.log10((high - low) / 400));
+  const symbol = turned ? "\u00b0" : kind === "factor" ? "" : small ? "mm" : "m";
+  const step = turned ? 0.5 : 10 ** Math.floor(Math.log10((high - low) / 400));
   const put = (live) => change(next => {
-    set(next, path, kind === "angle" ? holder.value / unit : Number((holder.value / unit).toPrecision(8)));
+    set(next, path, turned ? holder.value / unit : Number((holder.value / unit).toPrecision(8)));
     if (path.startsWith("target.")) pending = !live;
   }, live);
   const controller = folder.add(holder, "value", low, high, step).name(symbol ? `${name} [${symbol}]` : name);
