@@ -55,7 +55,7 @@ def test_a_case_is_changed_undone_kept_refined_and_found_again_after_a_reload(tm
         page.keyboard.press("Enter")
         second = figures()
         assert second["all rods together"] != first["all rods together"]
-        assert page.evaluate("document.activeElement.dataset.path") == "layout.spacing"
+        page.wait_for_selector(f"{SPACING}:focus")
 
         assert not page.is_disabled("#undo")
         page.keyboard.press("Control+z")

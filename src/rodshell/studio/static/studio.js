@@ -657,7 +657,7 @@ function wire() {
   addEventListener("pointerup", ({ target }) => { if (!target.closest?.("input, select")) settled(); });
   controls.addEventListener("keydown", ({ key, target }) => {  // Enter takes the focus away: Tab would begin anew
     const { path } = target.dataset;
-    if (key === "Enter" && path) requestAnimationFrame(() => controls.querySelector(`[data-path="${path}"]`)?.focus());
+    if (key === "Enter" && path) setTimeout(() => controls.querySelector(`[data-path="${path}"]`)?.focus());
   }, true);  // lil-gui lets no key through
   byId("seam").onclick = startSeam;
   byId("unseam").onclick = () => change(next => set(next, "seams.lines", undefined));
