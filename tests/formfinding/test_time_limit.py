@@ -153,7 +153,7 @@ def test_seams_end_with_the_patches_that_are_finished_or_before_all_have_their_n
 def test_checks_that_any_patch_did_not_reach_are_named_and_left_out_of_the_joined_result(clock):
     form, seconds, kinds = whole_sewn(), -2.5, set()
     while True:
-        seconds += 7
+        seconds += 4
         result = form.finished(TimeLimit(silent, seconds)).archive().results.plain()
         if result["status"] == "converged":
             break

@@ -5,7 +5,6 @@ import json
 import struct
 import xml.etree.ElementTree as ET
 import zlib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.grid import joints_of, rods_of
 from rodshell.output.models import section_outline, swept
-from rodshell.results import Results
+from rodshell.results.records import Section
 from tests.output.forms import archive, wished
 
 RADIUS = 1e-3  # m, of the rods
@@ -185,16 +184,9 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 def test_a_lath_lies_flat_on_the_shell() -> None:
     """A rectangle's width is along the grid's normal, its height within the grid."""
-    made = archive("dome")
-    lath = {"kind": "rectangle", "width": 1e-3, "height": 4e-3}
-    outline = section_outline(
-        replace(made, results=Results.of({**made.results.plain(), "rod": {"section": lath}})), 1.0
-    )
+    outline = section_outline(Section(kind="rectangle", width=1e-3, height=4e-3), 1.0)
     np.testing.assert_allclose(np.ptp(outline, axis=0), [4e-3, 1e-3])  # across, up
-    turned = {"kind": "ellipse", "a": 1e-3, "b": 3e-3}
-    outline = section_outline(
-        replace(made, results=Results.of({**made.results.plain(), "rod": {"section": turned}})), 1.0
-    )
+    outline = section_outline(Section(kind="ellipse", a=1e-3, b=3e-3), 1.0)
     np.testing.assert_allclose(np.ptp(outline, axis=0), [6e-3, 2e-3])
     points, _, _ = swept(np.column_stack([np.arange(4.0), np.zeros(4), np.zeros(4)]), outline)
     np.testing.assert_allclose(np.ptp(points, axis=0)[1:], [6e-3, 2e-3])  # level rod: across is y, up is z
