@@ -15,8 +15,8 @@ from rodshell.errors import InputError
 from rodshell.output import export
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.grid import joints_of, rods_of
-from rodshell.output.models import section_outline, swept
-from rodshell.results.records import Section
+from rodshell.output.models import section_outline, swept, widths_along
+from rodshell.results.records import Section, Stiffness
 from tests.output.forms import archive, wished
 
 RADIUS = 1e-3  # m, of the rods
@@ -190,3 +190,36 @@ def test_a_lath_lies_flat_on_the_shell() -> None:
     np.testing.assert_allclose(np.ptp(outline, axis=0), [6e-3, 2e-3])
     points, _, _ = swept(np.column_stack([np.arange(4.0), np.zeros(4), np.zeros(4)]), outline)
     np.testing.assert_allclose(np.ptp(points, axis=0)[1:], [6e-3, 2e-3])  # level rod: across is y, up is z
+
+
+@pytest.mark.parametrize(
+    ("section", "varies"),
+    [
+        (Section(kind="rectangle", width=1e-3, height=4e-3), "size"),
+        (Section(kind="rectangle", width=1e-3, height=4e-3), "width"),
+        (Section(kind="rectangle", width=1e-3, height=4e-3), "height"),
+        (Section(kind="ellipse", a=1e-3, b=3e-3), "a"),
+        (Section(kind="ellipse", a=1e-3, b=3e-3), "b"),
+    ],
+)
+def test_a_tapered_rod_is_drawn_as_stiff_as_it_is(section: Section, varies: Any) -> None:
+    """The second moment of the drawn section, of its polygon, follows the stiffness, linear between stations."""
+    flat = np.column_stack([np.linspace(0, 2, 5), np.zeros(5), np.zeros(5)])
+    along = Stiffness(at=[0.0, 1.0, 2.0], factors=[1.0, 8.0, 0.5], varies=varies, sizes=[])
+    widths = widths_along(along, flat)
+    outline = section_outline(section, 1.0)
+    drawn = [second_moment(outline * pair) / second_moment(outline) for pair in widths]
+    np.testing.assert_allclose(drawn, [1.0, 4.5, 8.0, 4.25, 0.5])
+
+
+def test_double_laths_are_drawn_twice_as_thick_along_the_normal() -> None:
+    """Two laths that slide on each other are twice as stiff, and twice as thick."""
+    flat = np.column_stack([np.linspace(0, 3, 4), np.zeros(4), np.zeros(4)])
+    along = Stiffness(at=[0.0, 0.5, 0.5, 3.0], factors=[1.0, 1.0, 2.0, 2.0], varies="laths", sizes=[])
+    np.testing.assert_allclose(widths_along(along, flat), [[1, 1], [1, 2], [1, 2], [1, 2]])
+
+
+def second_moment(polygon: np.ndarray) -> float:
+    """Of an area that is its own mirror image, about the axis across."""
+    (x, y), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
+    return float(np.sum((x * y1 - x1 * y) * (y * y + y * y1 + y1 * y1)) / 12)

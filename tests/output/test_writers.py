@@ -18,6 +18,7 @@ from rodshell.output.labels import Room, lines_meet
 from rodshell.output.pictures import DEPTHS, PAPER, drawing_png, picture
 from rodshell.output.svg import drawing_svg, number
 from rodshell.results import Archive, Results
+from tests.output.forms import archive as archive_of
 from tests.output.sample_archive import sample_archive
 
 numbers = st.floats(-1e6, 1e6).map(lambda x: float(np.round(x, 4))) | st.sampled_from([0.0, -0.001, 100.0, -0.5, 1.005])
@@ -181,6 +182,23 @@ def test_all_shapes_share_one_scale_of_stress_and_say_their_own_largest() -> Non
         "stage_1": (10.0, "stress in MPa, here up to 2"),
         "stage_2": (10.0, "stress in MPa, here up to 9"),
     }
+
+
+def test_utilisation_says_by_which_strength_it_is_counted() -> None:
+    dome = archive_of("dome")
+    bending = dome.results.bending
+    assert bending is not None
+    for erection, said in ((2e4, (", permanent", ", erection")), (1e4, ("", ""))):
+        known = bending.model_copy(update={"strength": 1e4, "erection_strength": erection})
+        archive = replace(dome, results=dome.results.model_copy(update={"bending": known}))
+        for name, strength, which in zip(("popped_pinned", "stage_1"), (1e4, erection), said, strict=True):
+            shape = shape_of(archive, name)
+            scale = scale_of(archive, shape, "stress")
+            assert scale is not None
+            assert shape.stress is not None
+            largest = 100 * shape.stress.max() / strength
+            assert scale.caption == f"utilisation in %{which}, here up to {largest:.3g}"
+            assert scale.values.max() == pytest.approx(largest)
 
 
 @pytest.mark.parametrize(("gap", "unit", "high"), [(3.3e-5, "mm", 0.04), (0.8, "mm", 800.0), (2.4, "m", 3.0)])

@@ -144,6 +144,8 @@ def _stress_scale(archive: Archive, shape: Shape) -> Scale:
     known = [(name, float(np.max(values))) for name, values in archive.states.items() if name in STRESSES]
     if strength and erection:
         unit, caption = (strength if final else erection) / 100, "utilisation in %"
+        if strength != erection:
+            caption += ", permanent" if final else ", erection"
         top = max(100 * largest / (erection if name == STAGES else strength) for name, largest in known)
     else:
         top = max(largest for _, largest in known)
