@@ -98,11 +98,12 @@ def bound_drape(
     warnings = [*target.warnings, *net.warnings]
     strong = None
     if joint and joint.holds_normals:
-        strong = strong_bending(target, mesh, found.state, touching[mesh.bends].all(axis=1), rod)
+        bends = np.asarray(touching[mesh.bends].all(axis=1))
+        strong = strong_bending(target, mesh, found.state, bends, rod)
     if strong is not None:
         warnings += strong.warnings
     if not eccentricity:
-        edges = touching[mesh.edges].all(axis=1)
+        edges = np.asarray(touching[mesh.edges].all(axis=1))
         warnings += thickness_warnings(normal, mesh, found.state, edges, rod, min(layout.spacing))
     if found.report.negative_modes:
         warnings.append(
