@@ -1,6 +1,7 @@
 """The DXF files: sound, with every line, mark and text where it was drawn."""
 
 import io
+import re
 from math import degrees, pi
 from pathlib import Path
 
@@ -66,6 +67,47 @@ def test_every_line_mark_and_text_is_where_it_was_drawn(names: dict[str, str]) -
         assert one.dxf.height == pytest.approx(CAPITAL * 2.1)
         assert one.plain_text() == "Stück 50 % ^ %%d Ω"
         assert one.dxf.style == ("SANS-BOLD" if text.bold else "SANS")
+
+
+def ezdxf_s(drawing: Drawing) -> str:
+    """The section of entities as ezdxf writes it, of a drawing on layers with the names of ours."""
+    document = written(Pencil().done("a", "b", 2.0))  # which has our styles and layers
+    space = document.modelspace()
+    for path in drawing.paths:
+        points, look = path.points.tolist(), {"layer": path.layer}
+        if not path.flat:
+            space.add_polyline3d(points, close=path.closed, dxfattribs=look)
+        elif len(points) == 2:
+            space.add_line(*points, dxfattribs=look)
+        else:
+            space.add_lwpolyline(points, close=path.closed, dxfattribs=look)
+    for mark in drawing.marks:
+        space.add_circle(mark.at.tolist(), mark.radius, dxfattribs={"layer": mark.layer})
+    for text in drawing.texts:
+        shown, size = text.text.replace("^", "^ ").replace("%%", "%%%%%%"), CAPITAL * text.size
+        look = {"layer": text.layer, "style": "SANS-BOLD" if text.bold else "SANS", "height": size}
+        added = space.add_text(shown, dxfattribs=look | {"rotation": degrees(text.angle)})
+        added.set_placement(text.at.tolist(), align=ALIGNMENTS[text.anchor])
+    stream = io.StringIO()
+    document.write(stream)
+    return section_of_entities(stream.getvalue())
+
+
+def section_of_entities(text: str) -> str:
+    """The section, its handles numbered from the first."""
+    handles = dict[str, str]()
+    section = text.split("\nENTITIES\n")[1].split("\nENDSEC\n")[0]
+    return re.sub(
+        r"^(  5|330)\n(.*)$",
+        lambda found: f"{found[1]}\n{handles.setdefault(found[2], str(len(handles)))}",
+        section,
+        flags=re.MULTILINE,
+    )
+
+
+def test_entities_are_those_of_ezdxf_to_the_last_byte() -> None:
+    drawing = one_of_each()
+    assert section_of_entities(drawing_dxf(drawing)) == ezdxf_s(drawing)
 
 
 def test_layers_have_the_colours_widths_and_dashes_of_the_drawing() -> None:
