@@ -120,13 +120,13 @@ def _records(drawing: Drawing, layers: Mapping[str, str], owner: str, next_handl
     for path in drawing.paths:
         points, closed = path.points.tolist(), int(path.closed)
         if not path.flat:
-            own, end = next_handle(), next_handle()
-            line = head("POLYLINE", path.layer, own)
+            handle, end = next_handle(), next_handle()
+            line = head("POLYLINE", path.layer, handle)
             yield f"{line}100\nAcDb3dPolyline\n 66\n1\n{_at(10, 0.0, 0.0)} 70\n{8 + closed}\n"
             for point in points:
                 vertex = head("VERTEX", path.layer)
                 yield f"{vertex}100\nAcDbVertex\n100\nAcDb3dPolylineVertex\n{_at(10, *point)} 70\n32\n"
-            yield head("SEQEND", path.layer, end, own)
+            yield head("SEQEND", path.layer, end, handle)
         elif len(points) == 2:
             start, stop = points
             yield f"{head('LINE', path.layer)}100\nAcDbLine\n{_at(10, *start)}{_at(11, *stop)}"
