@@ -239,7 +239,7 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     pulls = coo_matrix((np.tile(stiffness, 2), (np.append(i, j), np.append(j, i))), shape=size).tocsr()
     whole = (diags(np.asarray(pulls.sum(axis=1)).ravel()) - pulls).tocsr()
     upper = triu(whole[inner][:, inner], format="csc")
-    factors = Qdldl(upper.indptr, upper.indices).factor(upper.data)
+    factors = Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data)
     right = np.asarray(-(whole[inner][:, ends] @ positions[ends]))
     result = positions.copy()
     result[inner] = np.array([factors.solve(column) for column in right.T]).T
