@@ -13,7 +13,8 @@ from ezdxf.enums import TextEntityAlignment as Alignment
 
 from rodshell.output import export
 from rodshell.output.drawing import LAYERS, Drawing, Pencil
-from rodshell.output.dxf import CAPITAL, drawing_dxf
+from rodshell.output.dxf import CAPITAL, DOCUMENT, drawing_dxf
+from tests.output import dxf_document
 from tests.output.dxf_reader import read_dxf
 from tests.output.forms import TARGETS, archive, wished
 
@@ -108,6 +109,12 @@ def section_of_entities(text: str) -> str:
 def test_entities_are_those_of_ezdxf_to_the_last_byte() -> None:
     drawing = one_of_each()
     assert section_of_entities(drawing_dxf(drawing)) == ezdxf_s(drawing)
+
+
+def test_the_document_is_that_of_ezdxf_to_the_last_byte() -> None:
+    if ezdxf.__version__ != dxf_document.MADE_BY:
+        pytest.skip(f"needs ezdxf {dxf_document.MADE_BY}, by which the template was made")
+    assert DOCUMENT.read_text(encoding="utf-8") == dxf_document.template()
 
 
 def test_layers_have_the_colours_widths_and_dashes_of_the_drawing() -> None:
