@@ -28,8 +28,7 @@ class _Fields(Template):
     """Text with fields such as %%top."""
 
     delimiter = "%%"
-    idpattern = "[a-z]+|[A-Z-]+"
-    flags = 0
+    idpattern = "(?-i:[a-z]+|[A-Z-]+)"
 
 
 @cache
