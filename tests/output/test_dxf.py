@@ -150,19 +150,6 @@ def test_the_same_drawing_gives_the_same_bytes_and_leaves_ezdxf_as_it_was() -> N
     assert not ezdxf.options.write_fixed_meta_data_for_testing
 
 
-def test_other_threads_of_the_process_keep_their_dates(monkeypatch: pytest.MonkeyPatch) -> None:
-    """ezdxf's own switch would give their files fixed dates too, for as long as one of ours is written."""
-    seen, export_sections = list[bool](), Document.export_sections
-
-    def export_and_look(self: Document, writer: object) -> None:
-        seen.append(ezdxf.options.write_fixed_meta_data_for_testing)
-        export_sections(self, writer)
-
-    monkeypatch.setattr(Document, "export_sections", export_and_look)
-    assert "2451544.5" in drawing_dxf(one_of_each())
-    assert seen == [False]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*TARGETS, "wished"])
 def test_every_drawing_passes_the_audit(name: str, tmp_path: Path) -> None:
