@@ -27,11 +27,6 @@ def test_the_package_alone_imports_nothing(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
-def test_dxf_files_are_written_without_ezdxf(tmp_path: Path) -> None:
-    code = "from rodshell.output import drawing, dxf; dxf.drawing_dxf(drawing.Pencil().done('a', 'b', 2.0))"
-    assert "ezdxf" not in packages(imported(code, tmp_path))
-
-
 @pytest.mark.slow
 def test_a_form_imports_no_writers_and_no_targets_that_it_does_not_use(tmp_path: Path) -> None:
     modules = imported(FORM, tmp_path)
