@@ -44,7 +44,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "warm": lambda quick: jobs.warm(3 if quick else 9),
     "startup": lambda quick: startup.section(3 if quick else 7),
     "first": lambda _: first_run.section(),
-    "first-jit": lambda _: first_run.section(jit=True),
+    "first-compiled": lambda _: first_run.section(compiled=True),
     "first-uv": lambda _: first_run.section(uv=True),
     "loads": lambda quick: loads.loads(1 if quick else 3),
     "sameness": sameness.sameness,

@@ -15,7 +15,7 @@ from rodshell.rods.isotropic import IsotropicBend
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.problem import Problem, Supports
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, TangentAssembly, lowest_direction
+from rodshell.solve.tangent import Tangent, TangentAssembly
 from tests.formfinding.elastic_twins import ElasticTwin
 
 ROD = rs.Rod(section=rs.Circle(radius=1e-3), material=rs.Material(youngs_modulus=1e6, density=1e3))
@@ -186,19 +186,6 @@ def test_modes_without_mass_are_left_out_and_unstable_ones_refused() -> None:
     np.testing.assert_allclose(modes.values, exact, rtol=1e-8)
     with pytest.raises(SingularError, match="without mass"):
         column(4.5).tangent.lowest_modes(1, mass=mass)
-
-
-@pytest.mark.parametrize("vectors", [3, 8])
-def test_the_lowest_direction_is_lapacks(vectors: int) -> None:
-    random = np.random.default_rng(7)
-    turn = np.linalg.qr(random.standard_normal((60, 60)))[0]
-    values = np.concatenate([[-40.0, -9.0], np.geomspace(1.0, 1e-4, 58)])  # as of an inverse with two unstable modes
-    matrix = (turn * values) @ turn.T
-    found = lowest_direction(
-        lambda row: matrix @ row, np.ones(60), tolerance=1e-12, vectors=vectors, most_restarts=20
-    )  # fmt: skip
-    np.testing.assert_allclose(found * np.sign(found @ turn[:, 0]), turn[:, 0], atol=1e-11)  # residual over the gap
-    assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-14)
 
 
 def test_what_does_not_fit_is_refused() -> None:

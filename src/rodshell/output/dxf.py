@@ -1,39 +1,24 @@
-"""A drawing as DXF R2010 in millimetres: named layers, line types, text styles; the same bytes each time.
+"""A drawing as DXF R2010 in millimetres, by ezdxf: named layers, line types, text styles; the same bytes each time."""
 
-The document around the entities is ezdxf's, kept as a template: to import ezdxf and to have it write some thousand
-entities of five kinds takes longer than to find a form. Tests hold both against ezdxf, byte by byte.
-"""
-
-import pathlib
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Mapping
+from io import StringIO
 from itertools import chain, count
 from math import degrees
-from string import Template
+from typing import TYPE_CHECKING, Any
 
-from rodshell.output.drawing import LAYERS, Anchor, Drawing, Text
+from rodshell.output.drawing import LAYERS, Drawing, Path, Text
 from rodshell.results.records import printable
 
-DOCUMENT = pathlib.Path(__file__).parent / "templates" / "r2010.dxf"
-MODEL_SPACE, FIRST_HANDLE = "17", 0x3A  # handles: of what owns the entities, and the first that is free for them
-LATER = "first", "second", "third", "free"  # handles after those of the entities, the last for what a program adds
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing as Document
+    from ezdxf.layouts import Modelspace
+
 FORBIDDEN = '<>/\\":;?*|=`,'  # in a layer's name [DXF reference]; it holds LONGEST letters at most
 LONGEST = 200
 CAPITAL = 0.716  # height of Arial's capitals over the text size; a DXF text is as high as its capitals
-JUSTIFIED: dict[Anchor, str] = {"start": "", "middle": " 72\n1\n", "end": " 72\n2\n"}
+DATE = 2451544.5  # 2000-01-01, a Julian date
+IDENTIFIER = "{00000000-0000-0000-0000-000000000000}"
 STYLES = {False: ("SANS", "arial.ttf"), True: ("SANS-BOLD", "arialbd.ttf")}  # which every CAD program has or replaces
-
-
-class _Fields(Template):
-    """Text with fields such as %%top."""
-
-    delimiter = "%%"
-    idpattern = "(?-i:[a-z]+|[A-Z-]+)"
-
-
-@cache
-def _document() -> _Fields:
-    return _Fields(DOCUMENT.read_text(encoding="utf-8"))
 
 
 def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str:
@@ -44,15 +29,19 @@ def drawing_dxf(drawing: Drawing, names: Mapping[str, str] | None = None) -> str
     drawing : at 1:1 [mm].
     names : for some layers the name that they take in the file (see `layer_names`).
     """
-    layers, handles = layer_names(names or {}), map("{:X}".format, count(FIRST_HANDLE))
-    entities = "".join(_records(drawing, layers, handles))
-    (left, bottom), (right, top) = (corner.tolist() for corner in drawing.box())
-    width, height = 1.05 * (right - left), 1.05 * (top - bottom)
-    return _document().substitute(
-        layers | dict(zip(LATER, handles, strict=False)),
-        entities=entities, scale=float(drawing.pen_scale), left=left, bottom=bottom, right=right, top=top,
-        across=0.5 * (left + right), up=0.5 * (bottom + top), view=max(height, 0.5 * width),
-    )  # fmt: skip
+    import ezdxf
+
+    document = ezdxf.new("R2010", units=ezdxf.units.MM)
+    layers = layer_names(names or {})
+    _set_up(document, layers, drawing)
+    space = document.modelspace()
+    for path in drawing.paths:
+        _add_path(space, path, layers[path.layer])
+    for mark in drawing.marks:
+        space.add_circle(mark.at.tolist(), float(mark.radius), dxfattribs={"layer": layers[mark.layer]})
+    for text in drawing.texts:
+        _add_text(space, text, layers[text.layer])
+    return _written(document)
 
 
 def layer_names(names: Mapping[str, str]) -> dict[str, str]:
@@ -72,55 +61,67 @@ def layer_names(names: Mapping[str, str]) -> dict[str, str]:
     return shown
 
 
-def _records(drawing: Drawing, layers: Mapping[str, str], handles: Iterator[str]) -> Iterator[str]:
-    """The records of all entities: group codes and values on lines in turn [DXF reference].
+def _written(document: "Document") -> str:
+    """As `document.write`, but files of the same content are the same: no time of writing, no random identifiers.
 
-    Parameters
-    ----------
-    layers : name of each layer in the file.
-    handles : free ones.
+    ezdxf has a switch for that, which holds for the whole process, other threads included.
     """
+    from ezdxf.document import CREATED_BY_EZDXF, WRITTEN_BY_EZDXF
+    from ezdxf.lldxf.tagwriter import TagWriter
 
-    def head(kind: str, layer: str, handle: str = "", parent: str = MODEL_SPACE) -> str:
-        mine = handle or next(handles)
-        return f"  0\n{kind}\n  5\n{mine}\n330\n{parent}\n100\nAcDbEntity\n  8\n{layers[layer]}\n"
-
-    for path in drawing.paths:
-        points, closed = path.points.tolist(), int(path.closed)
-        if not path.flat:
-            handle, end = next(handles), next(handles)
-            line = head("POLYLINE", path.layer, handle)
-            yield f"{line}100\nAcDb3dPolyline\n 66\n1\n{_at(10, 0.0, 0.0)} 70\n{8 + closed}\n"
-            for point in points:
-                vertex = head("VERTEX", path.layer)
-                yield f"{vertex}100\nAcDbVertex\n100\nAcDb3dPolylineVertex\n{_at(10, *point)} 70\n32\n"
-            yield head("SEQEND", path.layer, end, handle)
-        elif len(points) == 2:
-            start, stop = points
-            yield f"{head('LINE', path.layer)}100\nAcDbLine\n{_at(10, *start)}{_at(11, *stop)}"
-        else:
-            corners = "".join(f" 10\n{x}\n 20\n{y}\n" for x, y in points)
-            yield f"{head('LWPOLYLINE', path.layer)}100\nAcDbPolyline\n 90\n{len(points)}\n 70\n{closed}\n{corners}"
-    for mark in drawing.marks:
-        middle = _at(10, *mark.at.tolist())
-        yield f"{head('CIRCLE', mark.layer)}100\nAcDbCircle\n{middle} 40\n{float(mark.radius)}\n"
-    for text in drawing.texts:
-        yield head("TEXT", text.layer) + _lettering(text)
+    for kind in sorted(document.entitydb.dxf_types_in_use()):
+        document.classes.add_class(kind)  # in a fixed order: `update_all` has that of a set
+    document.commit_pending_changes()
+    document.update_all()
+    for date in ("$TDCREATE", "$TDUCREATE", "$TDUPDATE", "$TDUUPDATE"):
+        document.header[date] = DATE
+    for identifier in ("$VERSIONGUID", "$FINGERPRINTGUID"):
+        document.header[identifier] = IDENTIFIER
+    about = document.ezdxf_metadata()
+    about[CREATED_BY_EZDXF] = about[WRITTEN_BY_EZDXF] = "rodshell"
+    stream = StringIO()
+    document.export_sections(TagWriter(stream, document.dxfversion))
+    return stream.getvalue()
 
 
-def _lettering(text: Text) -> str:
-    """The part of a TEXT that says what stands where."""
-    x, y = text.at.tolist()
-    turned = f" 50\n{degrees(text.angle)}\n" if text.angle else ""
-    return (
-        f"100\nAcDbText\n{_at(10, x, y)} 40\n{float(CAPITAL * text.size)}\n  1\n{_plain(text.text)}\n{turned}"
-        f"  7\n{STYLES[text.bold][0]}\n{JUSTIFIED[text.anchor]}{_at(11, x, y)}100\nAcDbText\n"
-    )
+def _set_up(document: "Document", layers: Mapping[str, str], drawing: Drawing) -> None:
+    """Layers with colour, line weight and line type, text styles, and a first view of the whole drawing."""
+    scale = drawing.pen_scale
+    for name, layer in LAYERS.items():
+        look: dict[str, Any] = {"color": layer.number, "lineweight": round(100 * layer.pen)}
+        if layer.dash:
+            dash, gap = layer.dash
+            look["linetype"] = "DASHED"
+            document.linetypes.add("DASHED", [dash + gap, dash, -gap], description="Dashed")
+        document.layers.add(layers[name], **look)
+    document.header["$LTSCALE"] = scale
+    for style, font in STYLES.values():
+        document.styles.add(style, font=font)
+    low, high = drawing.box()
+    width, height = (1.05 * (high - low)).tolist()
+    document.set_modelspace_vport(max(height, 0.5 * width), center=(0.5 * (low + high)).tolist())
+    space = document.modelspace()
+    space.dxf.extmin, space.dxf.extmax = (*low.tolist(), 0.0), (*high.tolist(), 0.0)
 
 
-def _at(code: int, x: float, y: float, z: float = 0.0) -> str:
-    """A place as group codes `code`, and 10 and 20 more."""
-    return f" {code}\n{x}\n {code + 10}\n{y}\n {code + 20}\n{z}\n"
+def _add_path(space: "Modelspace", path: Path, layer: str) -> None:
+    points, look = path.points.tolist(), {"layer": layer}
+    if not path.flat:
+        space.add_polyline3d(points, close=path.closed, dxfattribs=look)
+    elif len(points) == 2:
+        space.add_line(*points, dxfattribs=look)
+    else:
+        space.add_lwpolyline(points, close=path.closed, dxfattribs=look)
+
+
+def _add_text(space: "Modelspace", text: Text, layer: str) -> None:
+    from ezdxf.enums import TextEntityAlignment as Alignment
+
+    look = {
+        "layer": layer, "style": STYLES[text.bold][0], "height": CAPITAL * text.size, "rotation": degrees(text.angle)
+    }  # fmt: skip
+    alignment = {"start": Alignment.LEFT, "middle": Alignment.CENTER, "end": Alignment.RIGHT}[text.anchor]
+    space.add_text(_plain(text.text), dxfattribs=look).set_placement(text.at.tolist(), align=alignment)
 
 
 def _plain(text: str) -> str:

@@ -24,11 +24,10 @@ from rodshell.rods.elements import Elements
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status
 from rodshell.solve.load import Load, LoadedAssembly
 from rodshell.solve.sparse_ldl import SingularError
-from rodshell.solve.tangent import Tangent, by_projections, lowest_direction, subspace_iteration
+from rodshell.solve.tangent import Tangent, by_projections, subspace_iteration
 
 MODES = 4  # lowest ones that are looked at
 MODES_CLOSE, MOST_SWEEPS = 1e-2, 12  # relative change of the lowest eigenvalue: modes only say how far to go
-VECTORS, MOST_RESTARTS, MODE_SETTLED = 20, 12, 1e-12  # of Lanczos' method for the mode that has become unstable
 RAMPS = 1, 4, 16  # equal parts of a displacement, until one of them succeeds
 SMALL = 24  # unknowns up to which LAPACK finds a mode
 MOST_STEPS = 12  # of Newton's method for a point
@@ -304,8 +303,11 @@ class ArcLength:
         if size <= SMALL:
             row = np.linalg.eigh(np.array([inverse(unit) for unit in np.eye(size)]))[1][:, 0]
         else:
+            from scipy.sparse.linalg import LinearOperator, eigsh  # here, as forms without checks do not need it
+
             start = np.sin(1.0 + np.arange(size) ** 2)
-            row = lowest_direction(inverse, start, tolerance=MODE_SETTLED, vectors=VECTORS, most_restarts=MOST_RESTARTS)
+            operator = LinearOperator((size, size), matvec=inverse, dtype=float)
+            row = eigsh(operator, k=1, which="SA", v0=start, tol=MODES_CLOSE)[1][:, 0]
         mode = tangent.freedom.expand(row * scale)
         return np.asarray(mode / self.reach(mode))
 

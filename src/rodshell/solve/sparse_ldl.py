@@ -142,7 +142,7 @@ class Multifrontal:
         blocks = blocks_of(indptr, indices, begin)
         order = _minimum_degree(indptr, indices) if coordinates is None else _dissected(coordinates, blocks)
         self.plan = plan_of(indptr, indices, blocks, order)
-        self.parts = self.plan.each
+        self.parts, self.levels = self.plan.each, self.plan.levels
         self._spare = list[_Scratch]()  # scratch memory that no factorisation is using
 
     @property
@@ -158,7 +158,7 @@ class Multifrontal:
             scratch = self._spare.pop()
         except IndexError:
             scratch = self._new_scratch()
-        regular = _eliminate_parts(self.plan, data, scratch, panels, pivots)
+        regular = _eliminate_all(self.plan, self.levels, data, scratch, panels, pivots)
         self._spare.append(scratch)
         if not regular:
             raise SingularError("a pivot of the factorisation vanishes")
@@ -228,25 +228,28 @@ class MultifrontalFactors:
         return result
 
 
-def _eliminate_parts(plan: Plan, data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats) -> bool:
-    """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on the
-    threads. False where a pivot vanishes or is not finite."""
-    regular, last = list[bool](), len(plan.each) - 1
+def _eliminate_all(
+    plan: Plan, levels: list[list[Longs]], data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats
+) -> bool:
+    """Eliminate all supernodes, level by level, those of one level each by whichever thread is free; the bits do not
+    depend on the threads. False where a pivot vanishes or is not finite."""
+    regular = list[bool]()
+    for level in levels:
 
-    def run(part: int, thread: int) -> None:
-        regular.append(
-            _numeric(
-                plan.each[part], data, plan.first, plan.row_start,
-                plan.child_start, plan.children, plan.run_start, plan.runs,
-                plan.entry_start, plan.entry_source, plan.entry_place,
-                plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
-            )
-        )  # fmt: skip
+        def run(k: int, thread: int, level: list[Longs] = level) -> None:
+            regular.append(
+                _numeric(
+                    level[k], data, plan.first, plan.row_start,
+                    plan.child_start, plan.children, plan.run_start, plan.runs,
+                    plan.entry_start, plan.entry_source, plan.entry_place,
+                    plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
+                )
+            )  # fmt: skip
 
-    in_threads(run, last, most=len(scratch.threads))
-    if all(regular):
-        run(last, 0)
-    return all(regular)
+        in_threads(run, len(level), most=len(scratch.threads))
+        if not all(regular):
+            return False
+    return True
 
 
 def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:

@@ -322,40 +322,6 @@ def subspace_iteration(
     return values, rows, done
 
 
-def lowest_direction(
-    apply: Callable[[Floats], Floats], start: Floats, *, tolerance: float, vectors: int, most_restarts: int
-) -> Floats:
-    """(n,) direction of unit length of the lowest eigenvalue of a symmetric operator, by Lanczos' method with all
-    vectors kept orthogonal, restarted with the best direction [Golub and Van Loan 2013, 10.1 and 10.3].
-
-    Parameters
-    ----------
-    apply : the operator, on vectors (n,).
-    start : (n,) vector to begin with.
-    tolerance : of the residual, over the eigenvalue.
-    vectors : so many between restarts, fewer than n.
-    most_restarts : it ends after so many in any case.
-    """
-    best = start
-    for _ in range(most_restarts):
-        basis, diagonal, beside = np.empty((vectors, len(start))), list[float](), list[float]()
-        row = best / np.sqrt(np.einsum("i,i->", best, best))
-        for k in range(vectors):
-            basis[k] = row
-            image, known = apply(row), basis[: k + 1]
-            diagonal.append(float(np.einsum("i,i->", image, row)))
-            for _ in range(2):
-                image = image - np.einsum("j,ji->i", np.einsum("ji,i->j", known, image), known)
-            off = np.diag(beside, 1)
-            values, turn = np.linalg.eigh(np.diag(diagonal) + off + off.T)
-            beside.append(float(np.sqrt(np.einsum("i,i->", image, image))))
-            if beside[-1] * abs(turn[-1, 0]) <= tolerance * abs(values[0]):
-                return np.asarray(np.einsum("k,ki->i", turn[:, 0], known))
-            row = image / beside[-1]
-        best = np.einsum("k,ki->i", turn[:, 0], basis)
-    return np.asarray(best)
-
-
 def by_reflections(rows: Floats) -> Floats:
     """Rows (m, n), made orthogonal and of unit length by Householder's reflections."""
     return np.ascontiguousarray(np.linalg.qr(rows.T)[0].T)
