@@ -46,7 +46,7 @@ class _Checked:
         self._schema = schema
 
     def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
-        return self._schema.copy()
+        return {**self._schema}
 
 
 _REAL = core_schema.float_schema(strict=True)
