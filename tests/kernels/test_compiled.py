@@ -13,7 +13,7 @@ from rodshell.kernels.table import KERNELS
 from rodshell.rods.elements import _strains
 from rodshell.targets.target import newton_to_closest
 
-pytestmark = pytest.mark.skipif(COMPILED is None, reason="compiled kernels: pip install . with a C compiler")
+pytestmark = pytest.mark.skipif(COMPILED is None, reason="compiled kernels: RODSHELL_KERNELS=compiled pip install .")
 
 BITS = """
 import dataclasses, hashlib, json, sys

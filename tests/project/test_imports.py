@@ -35,4 +35,12 @@ def test_a_form_imports_no_writers_and_no_targets_that_it_does_not_use(tmp_path:
     unused = {"rodshell.targets.freeform", "rodshell.targets.from_file", "rodshell.targets.heightfield"}
     unused |= {"rodshell.output.pictures", "rodshell.output.pdf", "rodshell.output.report", "rodshell.output.drawings"}
     unused |= {"rodshell.formfinding.fall_drape", "scipy.spatial", "scipy.special", "scipy.interpolate"}
+    unused |= {"rodshell.solve.simulate", "urllib.request"}
     assert not modules & unused
+
+
+@pytest.mark.slow
+def test_drawings_and_the_report_import_no_graphs_of_scipy_and_no_network(tmp_path: Path) -> None:
+    modules = imported(FORM.replace("csv", "svg,report"), tmp_path)
+    assert (tmp_path / "out" / "cap" / "report.html").is_file()
+    assert not modules & {"ezdxf", "scipy.sparse.csgraph", "urllib.request"}

@@ -101,6 +101,33 @@ def test_threads_share_the_work_and_change_no_bit(monkeypatch, bad):
         assert np.abs(np.frombuffer(found[0][1]) - exact).max() < 1e-9 * np.abs(exact).max()
 
 
+def test_what_is_eliminated_at_the_same_time_needs_only_what_was_before():
+    """Every supernode once; its children in levels before its own, or before it in the same piece; no memory shared
+    by update matrices that are needed at the same time."""
+    matrix, places = grid_matrix(50)
+    triangle = upper(matrix)
+    plan = Multifrontal(triangle.indptr, triangle.indices, places).plan
+    done = set[int]()
+    for level in plan.levels:
+        before = frozenset(done)
+        for piece in level:
+            here = set[int]()
+            for s in piece.tolist():
+                children = plan.children[plan.child_start[s] : plan.child_start[s + 1]].tolist()
+                assert all(child in before or child in here for child in children)
+                here.add(s)
+            assert done.isdisjoint(here)
+            done |= here
+    assert done == set(range(len(plan.first) - 1))
+    assert len(plan.levels) > 2
+    assert max(len(level) for level in plan.levels[1:]) > 1  # else threads share nothing above the parts
+    above = np.concatenate([piece for level in plan.levels[1:] for piece in level])
+    below = (np.diff(plan.row_start) - np.diff(plan.first))[above]
+    order = np.argsort(plan.update_start[above])
+    starts, sizes = plan.update_start[above][order], (below * (below + 1) // 2)[order]
+    assert (starts[:-1] + sizes[:-1] <= starts[1:]).all()
+
+
 def test_blocks_whose_unknowns_are_coupled_differently():
     """A block is coupled as its unknowns are together: here each of three at a place has neighbours of its own."""
     size, places = 60, np.repeat(RANDOM.random((20, 2)), 3, axis=0)

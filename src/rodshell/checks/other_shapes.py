@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import coo_matrix, diags, triu
 
 from rodshell.arrays import Floats
 from rodshell.checks.bending import edge_directors, rod_frames
@@ -22,6 +22,7 @@ from rodshell.model import Shell
 from rodshell.rods.bend_twist import BendTwist
 from rodshell.solve.equilibrium import Equilibrium, find_equilibrium
 from rodshell.solve.problem import half_width
+from rodshell.solve.sparse_ldl import Qdldl
 from rodshell.validation import brief
 
 MODES = 4
@@ -229,8 +230,6 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     -------
     (n, 3) the nodes on that surface [m].
     """
-    from scipy.sparse.linalg import splu  # here, as forms without checks do not need it
-
     joined = np.arange(mesh.node_count)
     joined[mesh.joint_pairs[:, 1]] = mesh.joint_pairs[:, 0]
     ends = np.unique(joined[mesh.ends])
@@ -239,8 +238,11 @@ def spanned(mesh: GridMesh, positions: Floats) -> Floats:
     size = (mesh.node_count, mesh.node_count)
     pulls = coo_matrix((np.tile(stiffness, 2), (np.append(i, j), np.append(j, i))), shape=size).tocsr()
     whole = (diags(np.asarray(pulls.sum(axis=1)).ravel()) - pulls).tocsr()
+    upper = triu(whole[inner][:, inner], format="csc")
+    factors = Qdldl(upper.indptr.astype(np.int64), upper.indices.astype(np.int64)).factor(upper.data)
+    right = np.asarray(-(whole[inner][:, ends] @ positions[ends]))
     result = positions.copy()
-    result[inner] = splu(whole[inner][:, inner].tocsc()).solve(np.asarray(-(whole[inner][:, ends] @ positions[ends])))
+    result[inner] = np.array([factors.solve(column) for column in right.T]).T
     return np.asarray(result[joined])
 
 

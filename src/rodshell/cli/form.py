@@ -62,9 +62,11 @@ command.help = command.help.format(names=", ".join(BUILT_IN))
 
 def _frames(case: "Case") -> list[str]:
     """Patterns of the files that a fall streams."""
+    if not case.drape.frames:
+        return []
     from rodshell.solve.simulate import NAMES
 
-    return [f"{escape(case.drape.frames)}/{name}.npy" for name in NAMES] if case.drape.frames else []
+    return [f"{escape(case.drape.frames)}/{name}.npy" for name in NAMES]
 
 
 def _pictures(form: "Form") -> dict[str, str]:

@@ -1,9 +1,9 @@
 """Kernels: functions of plain loops that run as machine code.
 
-`njit` declares one. Where the wheel was built with a C compiler, kernels were compiled then, for one or more levels of
+`njit` declares one. Where the wheel was built with compiled kernels, they were made then, for one or more levels of
 the processor, and `njit` returns the compiled function of the highest level that this processor has; Numba is not
-needed. Elsewhere Numba compiles a kernel when it is first called. RODSHELL_KERNELS=jit chooses Numba in any case, and
-RODSHELL_KERNELS=FOLDER compiled libraries that are elsewhere.
+needed. Elsewhere Numba compiles a kernel when it is first called. RODSHELL_KERNELS=jit chooses Numba in any case,
+RODSHELL_KERNELS=compiled refuses it, and RODSHELL_KERNELS=FOLDER chooses compiled libraries that are elsewhere.
 
 Kernels that are called from Python have a row in `table`; the others are part of those.
 """
@@ -107,7 +107,7 @@ def _compiled() -> tuple[dict[str, Kernel] | None, str]:
     chosen = os.environ.get("RODSHELL_KERNELS", "")
     if chosen == "jit" or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return None, ""
-    folder = chosen or os.path.dirname(__file__)
+    folder = os.path.dirname(__file__) if chosen in ("", "compiled") else chosen
     found = [
         name for name in (sorted(os.listdir(folder)) if os.path.isdir(folder) else ()) if name.startswith("compiled_")
     ]

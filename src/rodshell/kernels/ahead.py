@@ -54,8 +54,8 @@ def _rows(every: bool) -> list[tuple[Any, tuple[Any, ...]]]:
     return [
         (getattr(import_module(f"{PACKAGE}{module}"), name), arguments_of(row))
         for module, rows in KERNELS.items()
-        if every or module not in OF_SOME_JOBS
         for name, row in rows.items()
+        if every or OF_SOME_JOBS.isdisjoint((module, f"{module}.{name}"))
     ]
 
 

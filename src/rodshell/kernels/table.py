@@ -4,10 +4,11 @@ A type is a letter and a number of dimensions, in C order: f float64, i int64, b
 (n, m) of float64, f alone a number; ff is a pair of numbers. Kernels that only kernels call need no row.
 """
 
-# Kernels of joints, meshes, twist and dynamics, which most forms do not call
+# Kernels of joints, meshes, twist, warm starts and dynamics, which most forms do not call: modules, or single kernels
 OF_SOME_JOBS = {
-    "contact.modified_mass", "joints.relative_rotation", "joints.ties", "rods.bend_twist", "solve.implicit_euler",
-    "solve.newton_matrix", "targets.field_fitting", "targets.rim", "targets.smooth_field",
+    "contact.modified_mass", "geometry.curves._on_curve", "joints.relative_rotation", "joints.ties", "rods.bend_twist",
+    "rods.isotropic._isotropic_bend_twist", "solve.implicit_euler", "solve.newton_matrix", "targets.field_fitting",
+    "targets.rim", "targets.smooth_field",
 }  # fmt: skip
 
 KERNELS: dict[str, dict[str, str]] = {

@@ -1,7 +1,7 @@
 """A picture of how the sections of rods change along them: EI over the rods' length, a line for each profile."""
 
 from collections.abc import Sequence
-from xml.sax.saxutils import escape
+from html import escape
 
 from rodshell.results.records import Rod, Stiffness
 from rodshell.results.wording import nice_ticks, rounded
@@ -51,8 +51,12 @@ def profiles_svg(rods: Sequence[Rod]) -> str | None:
         if k < MOST:
             y = TOP + 12 + 30 * k
             x = WIDTH - RIGHT + 16
-            parts.append(f'<text x="{x}" y="{y}" fill="{colour}" font-weight="bold">{escape(names)}</text>')
-            parts.append(f'<text x="{x}" y="{y + 13}" fill="#667079" font-size="11">{escape(_range(along))}</text>')
+            parts.append(
+                f'<text x="{x}" y="{y}" fill="{colour}" font-weight="bold">{escape(names, quote=False)}</text>'
+            )
+            parts.append(
+                f'<text x="{x}" y="{y + 13}" fill="#667079" font-size="11">{escape(_range(along), quote=False)}</text>'
+            )
     if len(alike) > MOST:
         y = TOP + 12 + 30 * MOST
         parts.append(f'<text x="{WIDTH - RIGHT + 16}" y="{y}" fill="#667079">and {len(alike) - MOST} more</text>')

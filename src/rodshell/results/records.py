@@ -11,7 +11,8 @@ from math import isfinite
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic_core import CoreSchema, core_schema
 
 Ends = Literal["pinned", "clamped"]
 Gate = Literal["flat", "from_flat", "remeshed", "tolerance", "stable"]
@@ -38,16 +39,31 @@ def _no_keys_for_null(value: object) -> object:
     return {} if value is None else value
 
 
-Real = Annotated[float, Field(strict=True)]
-Number = Annotated[Real | None, BeforeValidator(_finite_or_unknown)]
-Whole = Annotated[int, Field(strict=True)]
-Flag = Annotated[bool, Field(strict=True)]
-Text = Annotated[str, Field(strict=True), AfterValidator(printable)]
+class _Checked:
+    """What a value must be, by a schema that is written once: pydantic would infer it again for every key."""
+
+    def __init__(self, schema: CoreSchema) -> None:
+        self._schema = schema
+
+    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
+        return {**self._schema}
+
+
+_REAL = core_schema.float_schema(strict=True)
+_NUMBER = core_schema.with_info_before_validator_function(_finite_or_unknown, core_schema.nullable_schema(_REAL))
+
+Real = Annotated[float, _Checked(_REAL)]
+Number = Annotated[Real | None, _Checked(_NUMBER)]
+Whole = Annotated[int, _Checked(core_schema.int_schema(strict=True))]
+Flag = Annotated[bool, _Checked(core_schema.bool_schema(strict=True))]
+Text = Annotated[
+    str, _Checked(core_schema.no_info_after_validator_function(printable, core_schema.str_schema(strict=True)))
+]
 T = TypeVar("T")
 Rows = Annotated[tuple[T, ...], BeforeValidator(_no_rows_for_null)]
 ByEnds = Annotated[dict[Ends, T], BeforeValidator(_no_keys_for_null)]
-Flat = tuple[Number, Number]
-Point = tuple[Number, Number, Number]
+Flat = Annotated[tuple[Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 2))]
+Point = Annotated[tuple[Number, Number, Number], _Checked(core_schema.tuple_schema([_NUMBER] * 3))]
 
 
 class Record(BaseModel):

@@ -21,7 +21,7 @@ from scipy.sparse import csc_matrix
 from rodshell.arrays import Floats, Longs
 from rodshell.kernels import njit
 from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded, room, subtract_product, workspace
-from rodshell.solve.symbolic import Blocks, blocks_of, plan_of
+from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
 from rodshell.threads import in_threads, threads
 
 ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
@@ -143,7 +143,7 @@ class Multifrontal:
         blocks = blocks_of(indptr, indices, begin)
         order = _minimum_degree(indptr, indices) if coordinates is None else _dissected(coordinates, blocks)
         self.plan = plan_of(indptr, indices, blocks, order)
-        self.parts = self.plan.each
+        self.parts, self.levels = self.plan.each, self.plan.levels
         self._spare = list[_Scratch]()  # scratch memory that no factorisation is using
 
     @property
@@ -156,7 +156,7 @@ class Multifrontal:
         data = np.ascontiguousarray(data, dtype=np.float64)
         panels, pivots = memory or (room(self.fill), np.empty(len(self.indptr) - 1))
         scratch = self.take_scratch()
-        regular = _eliminate_parts(self, data, scratch, panels, pivots)
+        regular = _eliminate_all(self.plan, self.levels, data, scratch, panels, pivots)
         self.give_back(scratch)
         if not regular:
             raise SingularError("a pivot of the factorisation vanishes")
@@ -235,25 +235,28 @@ class MultifrontalFactors:
         return result
 
 
-def _eliminate_parts(solver: Multifrontal, data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats) -> bool:
-    """Eliminate the parts of the plan, each by whichever thread is free, then the last; the bits do not depend on the
-    threads. False where a pivot vanishes or is not finite."""
-    regular, plan, last = list[bool](), solver.plan, len(solver.parts) - 1
+def _eliminate_all(
+    plan: Plan, levels: list[list[Longs]], data: Floats, scratch: _Scratch, panels: Floats, pivots: Floats
+) -> bool:
+    """Eliminate all supernodes, level by level, those of one level each by whichever thread is free; the bits do not
+    depend on the threads. False where a pivot vanishes or is not finite."""
+    regular = list[bool]()
+    for level in levels:
 
-    def run(part: int, thread: int) -> None:
-        regular.append(
-            _numeric(
-                solver.parts[part], data, plan.first, plan.row_start,
-                plan.child_start, plan.children, plan.run_start, plan.runs,
-                plan.entry_start, plan.entry_source, plan.entry_place,
-                plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
-            )
-        )  # fmt: skip
+        def run(k: int, thread: int, level: list[Longs] = level) -> None:
+            regular.append(
+                _numeric(
+                    level[k], data, plan.first, plan.row_start,
+                    plan.child_start, plan.children, plan.run_start, plan.runs,
+                    plan.entry_start, plan.entry_source, plan.entry_place,
+                    plan.panel_start, plan.update_start, scratch.stacks, *scratch.threads[thread], panels, pivots,
+                )
+            )  # fmt: skip
 
-    in_threads(run, last, most=len(scratch.threads))
-    if all(regular):
-        run(last, 0)
-    return all(regular)
+        in_threads(run, len(level), most=len(scratch.threads))
+        if not all(regular):
+            return False
+    return True
 
 
 def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:

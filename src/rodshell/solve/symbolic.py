@@ -45,6 +45,20 @@ class Plan(NamedTuple):
         starts = self.part_start.tolist()
         return [self.parts[begin:stop] for begin, stop in pairwise(starts)]
 
+    @property
+    def levels(self) -> list[list[Longs]]:
+        """Supernodes to eliminate at the same time, each level after those before: first the separate parts, then the
+        supernodes of the last part, from the leaves of its tree to the root."""
+        *separate, last = self.each
+        if not separate:
+            return [[last]]
+        level = dict[int, int]()
+        for s in last.tolist():
+            children = self.children[self.child_start[s] : self.child_start[s + 1]].tolist()
+            level[s] = 1 + max((level[c] for c in children if c in level), default=0)
+        above = [[np.array([s]) for s in level if level[s] == k + 1] for k in range(max(level.values()))]
+        return [separate, *above]
+
 
 class Blocks(NamedTuple):
     """Unknowns in blocks of consecutive ones, `begin` (b + 1,), and the blocks that each is coupled to:
@@ -438,7 +452,7 @@ def stacks_of(up, below, child_start, children, part_start, parts):  # type: ign
 
     Each part has two stacks, for even and for odd depths of the tree: what a supernode reads, its children's, and what
     it writes are then never on the same stack, and the children's lie on top of theirs. The last that a part writes
-    stays there for the part that needs all.
+    stays there for the part that needs all; in that one every matrix stays, since threads share its supernodes.
 
     Parameters
     ----------
@@ -456,9 +470,10 @@ def stacks_of(up, below, child_start, children, part_start, parts):  # type: ign
         for s in here:
             part[s] = p
         height, deepest = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
+        stays = 0 < p == len(part_start) - 2
         for s in here:
             for e in range(child_start[s], child_start[s + 1]):
-                if part[children[e]] == p:
+                if part[children[e]] == p and not stays:
                     height[1 - odd[s]] -= below[children[e]] * padded(below[children[e]])
             start[s] = height[odd[s]]
             height[odd[s]] += below[s] * padded(below[s])

@@ -10,8 +10,6 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from rodshell.arrays import Bools, Floats
 from rodshell.output.drawing import INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil
@@ -229,12 +227,19 @@ def _offset(rod: GridRod) -> float:
 def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     """The rods u and v of each joint of two families, grid by grid."""
     pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
-    if not pairs:
-        return []
-    first, second = np.array(pairs).T
-    graph = coo_array((np.ones(len(pairs)), (first, second)), shape=(len(plan.rods),) * 2)
-    patch = connected_components(graph, directed=False)[1][first]
-    return [[pair for pair, k in zip(pairs, patch, strict=True) if k == name] for name in dict.fromkeys(patch)]
+    joined = list(range(len(plan.rods)))  # for each rod another one of its grid, or itself
+
+    def first_of(rod: int) -> int:
+        while joined[rod] != rod:
+            rod = joined[rod]
+        return rod
+
+    for u, v in pairs:
+        joined[first_of(v)] = first_of(u)
+    grids = dict[int, list[tuple[int, int]]]()
+    for u, v in pairs:
+        grids.setdefault(first_of(u), []).append((u, v))
+    return list(grids.values())
 
 
 def _largest_full(met: Bools, x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
