@@ -1,10 +1,10 @@
 """The first run: README's first command (environment, installation, build, first job) beside that of an earlier commit.
 
-    python -m benchmarks.first_run [--alike] [--compiled] [--uv] [--commit COMMIT]
+    python -m benchmarks.first_run [--alike] [--compiled] [--commit COMMIT]
 
 As written, or, by --alike, both with `pip install .` and `form hemisphere`. --compiled installs with compiled kernels,
-which takes a C compiler; --uv installs by uv where README uses pip. Each checkout is a clone of this repository. Caches
-are empty, as a newcomer's are, so that downloads count.
+which takes a C compiler. Each checkout is a clone of this repository. Caches are empty, as a newcomer's are, so that
+downloads count.
 """
 
 import argparse
@@ -38,7 +38,7 @@ class FirstRun:
         return self.install[0] + self.first[0], self.install[1] + self.first[1]
 
 
-def first_run(commit: str, *, alike: bool = False, compiled: bool = False, uv: bool = False) -> FirstRun:
+def first_run(commit: str, *, alike: bool = False, compiled: bool = False) -> FirstRun:
     """Of README's first command, as it stands at a commit, and of its job again."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "source"
@@ -49,13 +49,11 @@ def first_run(commit: str, *, alike: bool = False, compiled: bool = False, uv: b
         if alike:
             program = parts[-1].split()[0]
             parts[at], parts[-1] = "pip install .", f"{program} form hemisphere --out out/dome"
-        if uv:
-            parts[at : at + 1] = ["pip install uv", "uv pip install ."]
-        elif compiled:
+        if compiled:
             parts[at] = f"RODSHELL_KERNELS=compiled {parts[at]}"
         parts.append(f"{parts[-1]}-again")
         kept = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "NUMBA", "RODSHELL"))}
-        caches = {name: f"{folder}/caches/{name}" for name in ("XDG_CACHE_HOME", "PIP_CACHE_DIR", "UV_CACHE_DIR")}
+        caches = {name: f"{folder}/caches/{name}" for name in ("XDG_CACHE_HOME", "PIP_CACHE_DIR")}
         script = "\n".join(["at() { echo at $EPOCHREALTIME; times; }", "set -e", "at", *(f"{x}\nat" for x in parts)])
         done = subprocess.run(
             ["bash", "-c", script], cwd=source, capture_output=True, text=True, env=kept | caches
@@ -85,17 +83,13 @@ def _seconds(said: str) -> list[Seconds]:
     return [(clock - clocks[k], one - used[k]) for k, (clock, one) in enumerate(ends)]
 
 
-def section(*, alike: bool = False, compiled: bool = False, uv: bool = False, earlier: str = EARLIER) -> Section:
+def section(*, alike: bool = False, compiled: bool = False, earlier: str = EARLIER) -> Section:
     """README's first command: environment, installation, build, first job; then the job again. An earlier commit's
     first. Caches are empty. On a busy machine the clock depends on what else runs."""
-    then, now = first_run(earlier, alike=alike), first_run("HEAD", alike=alike, compiled=compiled, uv=uv)
-    how = (
-        ", both by `pip install .` and of the hemisphere" * alike
-        + ", with compiled kernels" * compiled
-        + ", by uv" * uv
-    )
+    then, now = first_run(earlier, alike=alike), first_run("HEAD", alike=alike, compiled=compiled)
+    how = ", both by `pip install .` and of the hemisphere" * alike + ", with compiled kernels" * compiled
     clock, processors = (ours / theirs for ours, theirs in zip(now.whole, then.whole, strict=True))
-    as_written = not (alike or compiled or uv)
+    as_written = not (alike or compiled)
     rows = [
         Row(f"README's first command{how}, on the clock, over commit {earlier}", f"{clock:.2f}",
             "at most 0.7" if as_written else ""),
@@ -123,8 +117,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--alike", action="store_true")
     parser.add_argument("--compiled", action="store_true")
-    parser.add_argument("--uv", action="store_true")
     parser.add_argument("--commit", default=EARLIER)
     given = parser.parse_args()
-    for row in section(alike=given.alike, compiled=given.compiled, uv=given.uv, earlier=given.commit).rows:
+    for row in section(alike=given.alike, compiled=given.compiled, earlier=given.commit).rows:
         print(f"{row.what}: {row.figure}" + f"   [{row.asked}]" * bool(row.asked))

@@ -46,7 +46,6 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "first": lambda _: first_run.section(),
     "first-alike": lambda _: first_run.section(alike=True),
     "first-compiled": lambda _: first_run.section(alike=True, compiled=True),
-    "first-uv": lambda _: first_run.section(uv=True),
     "loads": lambda quick: loads.loads(1 if quick else 3),
     "sameness": sameness.sameness,
     "sweeps": lambda quick: sweeps.sweeps(20 if quick else 100),

@@ -123,6 +123,13 @@ def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]]
     assert words in found.headline
 
 
+def test_a_shell_that_cannot_be_built_says_too_that_it_does_not_carry_its_own_weight() -> None:
+    broken = [(f"bending.{ends}.utilisation", 1.2) for ends in ("pinned", "clamped")]
+    found = verdict(changed(*broken, ("self_weight.pinned.load_factor", 0.42)))
+    assert found.level == "unbuildable"
+    assert any("it carries only 42 % of its own weight with pinned ends" in reason for reason in found.reasons)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [([("agreement.pinned.max_relative", 0.2), ("agreement.clamped.max_relative", 0.021)], "deviates from the target"),

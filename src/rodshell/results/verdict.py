@@ -262,7 +262,7 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
         yield f"the job is not complete: {status}"
     if any(shells[ends].stable is None for ends in usable):
         yield "whether the shell is stable was not checked"
-    yield from _weight(results, usable)
+    yield from _weight(results, usable or [*results.self_weight])
     for name, by_ends in results.loads.items():
         for ends in usable:
             if ends not in by_ends:
