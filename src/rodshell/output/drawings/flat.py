@@ -82,8 +82,8 @@ class FlatPlan:
             return f"{rod.id} at {self.rounding.mm(rod.from_cut_end(at))} mm"
 
         pairs = (zip((self.rods[k] for k in joint.rods), joint.at, strict=True) for joint in self.joints)
-        places = (", ".join(place(rod, at) for rod, at in pair) for pair in pairs)
-        return [f"{joint.id}: {where}" for joint, where in zip(self.joints, places, strict=True)]
+        said = (", ".join(place(rod, at) for rod, at in pair) for pair in pairs)
+        return [f"{joint.id}: {where}" for joint, where in zip(self.joints, said, strict=True)]
 
     @cached_property
     def across(self) -> list[tuple[Floats, Floats]]:
