@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -330,6 +329,8 @@ class Form:
 
     def _repr_html_(self) -> str:
         """The 3D viewer with all shapes, and what they are worth, as notebooks show it."""
+        from html import escape  # here, as its table of entities takes time to import
+
         from rodshell.output.pictures import picture_svg
         from rodshell.output.viewer import frame_html, scene_of
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from rodshell.case import Case
 from rodshell.case.case import Built, built
 from rodshell.case.rod_ends import RodEnds
-from rodshell.checks.sizing import Fit
 from rodshell.form import Form, Stages
 from rodshell.formfinding import Fall, PatchForm, find_stages, pop_up_stages
 from rodshell.formfinding.patches import PatchedForm, best_heading, find_patched_stages
@@ -24,6 +23,7 @@ from rodshell.targets.patch import Seam
 from rodshell.units import length_text
 
 if TYPE_CHECKING:
+    from rodshell.checks.sizing import Fit
     from rodshell.refining.acceptance import Refined
     from rodshell.refining.variables import Family
 
@@ -96,6 +96,8 @@ class Run:
 
     def table_form(self) -> Form:
         """Of a table of rods."""
+        from rodshell.checks.sizing import Fit
+
         case = self.asked
         assert case.target.held is not None
         ends: RodEnds = case.target.held.value
@@ -238,7 +240,7 @@ class Run:
             name = self.asked.drawings.name or found.target.name
             self.announce(f"{name}, {length_text(2 * found.target.size)} wide; {said}")
 
-    def _announce_rod(self, rod: Rod, fit: Callable[[], Fit]) -> None:
+    def _announce_rod(self, rod: Rod, fit: "Callable[[], Fit]") -> None:
         """A rod of which the case left something open, and what decided its size."""
         left_open = self.asked.rod.left_open
         if not left_open or self.announce is None:

@@ -83,7 +83,7 @@ def test_energy_never_grows_and_every_step_is_counted(monkeypatch):
             seen.append(energy(problem, taken.state))
         return taken
 
-    monkeypatch.setattr(path.ImplicitEuler, "take", recorded)
+    monkeypatch.setattr(ImplicitEuler, "take", recorded)
     found = relax(problem, state)
     assert found.report.stable
     assert len(seen) > 5

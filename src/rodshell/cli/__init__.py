@@ -41,6 +41,7 @@ def entry() -> None:
     """
     end_at_once()
     gc.set_threshold(RARELY)
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # which it looks for in every installed package
     code = main()
     sys.stdout.flush()
     sys.stderr.flush()

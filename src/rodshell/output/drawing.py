@@ -99,6 +99,12 @@ class Path:
     def flat(self) -> bool:
         return bool(self.points.shape[1] == 2)
 
+    @cached_property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Lowest x and y, highest x and y [mm]."""
+        x, y = self.points.T.tolist()
+        return min(x), min(y), max(x), max(y)
+
 
 @dataclass(frozen=True)
 class Mark:
@@ -230,10 +236,15 @@ class Drawing:
         ----------
         low, high : (2,) lower left and upper right corner of the rectangle [mm].
         """
+        left, bottom, right, top = map(float, (*low, *high))
+
+        def meets(x0: float, y0: float, x1: float, y1: float) -> bool:
+            return x1 >= left and y1 >= bottom and x0 <= right and y0 <= top
+
         paths = [
             replace(path, points=part, closed=False)
             for path in self.paths
-            if path.flat and np.all((path.points.max(axis=0) >= low) & (path.points.min(axis=0) <= high))
+            if path.flat and meets(*path.extent)
             for part in _inside(np.vstack([path.points, path.points[:1]]) if path.closed else path.points, low, high)
         ]
         boxes = [np.array([mark.at - mark.radius, mark.at + mark.radius]) for mark in self.marks]

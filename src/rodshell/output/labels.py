@@ -291,8 +291,8 @@ def lines_meet(box: Floats, lines: Floats) -> bool:
     box : (4, 2) corners in a row; lines : (m, 2, 2) ends.
     """
     sides = box[[1, 3]] - box[0]
-    axes = (2.0 * sides / np.sum(sides**2, axis=1)[:, None]).T
-    return bool(runs_through((lines - box.mean(axis=0)) @ axes).any())
+    axes = (2.0 * sides / (sides**2).sum(axis=1)[:, None]).T
+    return bool(runs_through((lines - box.sum(axis=0) / 4) @ axes).any())
 
 
 def lines_near(lines: Floats, place: Floats, reach: float) -> Floats:
@@ -304,16 +304,17 @@ def lines_near(lines: Floats, place: Floats, reach: float) -> Floats:
     """
     if not len(lines):
         return lines
-    near = np.all((lines.min(axis=1) < place + reach) & (lines.max(axis=1) > place - reach), axis=1)
-    return np.asarray(lines[near])
+    a, b = lines[:, 0], lines[:, 1]
+    near = (np.minimum(a, b) < place + reach) & (np.maximum(a, b) > place - reach)
+    return np.asarray(lines[near[:, 0] & near[:, 1]])
 
 
 def runs_through(lines: Floats) -> Bools:
     """(...) whether each of the lines (..., 2, 2) runs through the square from -1 to 1: no axis separates them."""
-    low, high = lines.min(axis=-2), lines.max(axis=-2)
-    off = lines[..., 0, 0] * lines[..., 1, 1] - lines[..., 0, 1] * lines[..., 1, 0]
-    apart = (low >= 1.0).any(axis=-1) | (high <= -1.0).any(axis=-1) | (np.abs(off) > (high - low).sum(axis=-1))
-    return np.asarray(~apart)
+    a, b, c, d = lines[..., 0, 0], lines[..., 0, 1], lines[..., 1, 0], lines[..., 1, 1]
+    left, low, right, high = np.minimum(a, c), np.minimum(b, d), np.maximum(a, c), np.maximum(b, d)
+    apart = (left >= 1.0) | (low >= 1.0) | (right <= -1.0) | (high <= -1.0)
+    return np.asarray(~(apart | (np.abs(a * d - b * c) > (right - left) + (high - low))))
 
 
 # Callouts

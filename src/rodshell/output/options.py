@@ -10,8 +10,6 @@ from rodshell.checks.bending import VON_MISES, require_known_stress
 from rodshell.errors import InputError
 from rodshell.fabrication import Fabrication
 from rodshell.joints import Joint
-from rodshell.output.drawing import LAYERS
-from rodshell.output.dxf import FORBIDDEN
 from rodshell.rods.section import Rod
 from rodshell.validation import described, instance, positive
 
@@ -55,19 +53,28 @@ class DrawingStyle:
             datetime.date.fromisoformat(self.date or "2000-01-01")
         except ValueError:
             raise InputError(f'the date of drawings cannot be "{self.date}": write a day as "2026-11-22"') from None
-        for layer, name in self.layers.items():
-            if layer not in LAYERS:
-                raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')
-            if not name.strip() or any(letter in FORBIDDEN or not letter.isprintable() for letter in name):
-                raise InputError(f'a layer cannot be called "{name}": a name has none of {FORBIDDEN}')
-        shown = [self.layers.get(layer, layer).upper() for layer in LAYERS]
-        if len(set(shown)) < len(shown):
-            twice = next(name for name in shown if shown.count(name) > 1)
-            raise InputError(f'two layers would be called "{twice}": give each its own name')
+        if self.layers:
+            _require_names(self.layers)
 
     def parameters(self) -> dict[str, Any]:
         """As it is kept in a result."""
         return asdict(self) | {"layers": dict(self.layers)}
+
+
+def _require_names(layers: Mapping[str, str]) -> None:
+    """Refuse new names of layers that a DXF file cannot have."""
+    from rodshell.output.drawing import LAYERS  # here, as most drawings have our layers
+    from rodshell.output.dxf import FORBIDDEN
+
+    for layer, name in layers.items():
+        if layer not in LAYERS:
+            raise InputError(f'there is no layer "{layer}" to rename: there are {", ".join(LAYERS)}')
+        if not name.strip() or any(letter in FORBIDDEN or not letter.isprintable() for letter in name):
+            raise InputError(f'a layer cannot be called "{name}": a name has none of {FORBIDDEN}')
+    shown = [layers.get(layer, layer).upper() for layer in LAYERS]
+    if len(set(shown)) < len(shown):
+        twice = next(name for name in shown if shown.count(name) > 1)
+        raise InputError(f'two layers would be called "{twice}": give each its own name')
 
 
 @dataclass(frozen=True)

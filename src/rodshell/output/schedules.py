@@ -16,6 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.output.grid import GridRod, joints_of, rods_of
 from rodshell.results import Archive, Results
+from rodshell.results.archive import made_once
 from rodshell.results.loaded import LoadedShell
 from rodshell.results.records import Ends, Meeting, printable
 from rodshell.results.verdict import ENDS
@@ -136,13 +137,20 @@ def sections_table(archive: Archive) -> Table:
 def joints_table(archive: Archive, *, brief: bool = False) -> Table:
     """One row a joint: where it is on both rods, in plan and in space, the angle between them, and the upper rod.
 
-    The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines. Each entry of
-    `columns` is a name and what it says of a joint: more may be added there.
+    The angle runs from the direction of rod a to that of rod b, 0 to 180 degrees, by the polylines.
 
     Parameters
     ----------
     brief : only the columns that have room on a sheet.
     """
+    columns, rows = _all_of_joints(archive)
+    kept = [k for k, name in enumerate(columns) if not (brief and name in _NOT_BRIEF)]
+    return [columns[k] for k in kept], [[row[k] for k in kept] for row in rows]
+
+
+@made_once
+def _all_of_joints(archive: Archive) -> Table:
+    """All columns. Each entry of `columns` is a name and what it says of a joint: more may be added there."""
     rods, final, mm = rods_of(archive), archive.final, rounding_of(archive.results).mm
     placed = [_joints_in_space(archive, rod, final) for rod in rods]
     loads = _joint_loads(archive, final)
@@ -156,23 +164,26 @@ def joints_table(archive: Archive, *, brief: bool = False) -> Table:
         space = map(mm, on_a[0]) if on_a else ("", "", "")
         columns = {
             "id": joint.id,
-            **({} if brief else {"rod_a": a.id, "rod_b": b.id}),
+            "rod_a": a.id,
+            "rod_b": b.id,
             "at_a_from_cut_end_mm": mm(a.from_cut_end(joint.at[0])),
             "at_b_from_cut_end_mm": mm(b.from_cut_end(joint.at[1])),
             "over": joint.over(rods),
-            **({} if brief else {"flat_x_mm": mm(x), "flat_y_mm": mm(y)}),
-            **({} if brief else {"final_state": (final or "") if on_a else ""}),
+            "flat_x_mm": mm(x),
+            "flat_y_mm": mm(y),
+            "final_state": (final or "") if on_a else "",
             **dict(zip(("final_x_mm", "final_y_mm", "final_z_mm"), space, strict=True)),
             "flat_deg": f"{flat:.2f}",
             "final_deg": "" if angle is None else f"{angle:.2f}",
-            **({} if brief else {"scissor_deg": "" if angle is None else f"{round(angle - flat, 2) + 0.0:.2f}"}),
-            **({} if brief else loads.get((a.id, b.id), dict.fromkeys(_LOADS, "") if loads else {})),
+            "scissor_deg": "" if angle is None else f"{round(angle - flat, 2) + 0.0:.2f}",
+            **loads.get((a.id, b.id), dict.fromkeys(_LOADS, "") if loads else {}),
         }  # fmt: skip
         rows.append(list(columns.values()))
     return list(columns), rows
 
 
 _LOADS = ("force_N", "normal_force_N", "shear_moment_Nm", "out_of_plane_moment_Nm")
+_NOT_BRIEF = {"rod_a", "rod_b", "flat_x_mm", "flat_y_mm", "final_state", "scissor_deg", *_LOADS}
 
 
 def _joint_loads(archive: Archive, final: str | None) -> dict[tuple[str, str], dict[str, str]]:

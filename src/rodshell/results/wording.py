@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil, floor, isfinite, log10, pi
 from typing import Any
 
@@ -20,7 +21,7 @@ class Rounding:
 
     step: float
 
-    @property
+    @cached_property
     def digits(self) -> int:
         """Decimals of a length in mm."""
         return max(round(-log10(self.step)), 0)

@@ -23,7 +23,6 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_equilibrium, find_stable
-from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused
 from rodshell.solve.newton_matrix import SparseSum
 from rodshell.solve.problem import Problem, Supports, linear_solver
 
@@ -279,6 +278,8 @@ def relax(
     -------
     Its report counts the descent's work too.
     """
+    from rodshell.solve.implicit_euler import ImplicitEuler, Motion, Refused  # here, as most paths need no descent
+
     begin = time.perf_counter()
     edges = problem.stretch.with_forces(None)
     motion = Motion((*problem.elements, edges), _pace(problem, state), problem.constraint, ())

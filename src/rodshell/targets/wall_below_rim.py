@@ -8,6 +8,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +16,11 @@ from rodshell.arrays import Bools, Floats, Ints
 from rodshell.errors import InputError
 from rodshell.geometry.frames import dot, unit
 from rodshell.targets.rim import Domain, Rim
-from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Gap, Implicit, Target, offset_shape
-from rodshell.targets.trianglemesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from rodshell.targets.smooth_field import SmoothField
+    from rodshell.targets.trianglemesh import TriangleMesh
 
 LEVEL = 1e-4  # of the size: an edge this even counts as a base
 FAR = 0.5  # of the field's reach
@@ -180,7 +183,7 @@ class WalledSurface(WalledTarget):
     """
 
     surface: Target
-    field: SmoothField
+    field: "SmoothField"
     rim_plan: RimPlan
     level_edge: float | None
 
@@ -227,7 +230,7 @@ class WalledSurface(WalledTarget):
 
 
 def walled_surface(
-    surface: Target, mesh: TriangleMesh, field: SmoothField, rims: Sequence[Rim], section: Callable[[float], Rim]
+    surface: Target, mesh: "TriangleMesh", field: "SmoothField", rims: Sequence[Rim], section: Callable[[float], Rim]
 ) -> WalledSurface:
     """The contact body of a mesh's surface that has one edge.
 

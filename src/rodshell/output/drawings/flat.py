@@ -75,6 +75,22 @@ class FlatPlan:
         return float(1e3 * np.median(known)) if len(known) else self.extent / 10
 
     @cached_property
+    def notes(self) -> list[str]:
+        """Of each joint: its id, and where it is on both rods."""
+
+        def place(rod: GridRod, at: float) -> str:
+            return f"{rod.id} at {self.rounding.mm(rod.from_cut_end(at))} mm"
+
+        pairs = (zip((self.rods[k] for k in joint.rods), joint.at, strict=True) for joint in self.joints)
+        said = (", ".join(place(rod, at) for rod, at in pair) for pair in pairs)
+        return [f"{joint.id}: {where}" for joint, where in zip(self.joints, said, strict=True)]
+
+    @cached_property
+    def across(self) -> list[tuple[Floats, Floats]]:
+        """Its `diagonals`."""
+        return diagonals(self)
+
+    @cached_property
     def text(self) -> float:
         """Size of the rods' labels at 1:1 [mm]: joint ids find room between the rods."""
         longest = max((len(joint.id) for joint in self.joints), default=1)
@@ -128,7 +144,7 @@ def flat_drawing(plan: FlatPlan, text: float) -> Drawing:
     for outline in plan.boundary:
         pencil.line(outline, "BOUNDARY-FINAL", closed=True)
     _rods(pencil, plan, text)
-    lines, across = np.concatenate([plan.cuts, *map(closed_segments, plan.footprint)]), diagonals(plan)
+    lines, across = np.concatenate([plan.cuts, *map(closed_segments, plan.footprint)]), plan.across
     _labels(pencil, plan, text, lines)
     _joints(pencil, plan, text, lines, np.array(across).reshape(-1, 2, 2))
     for a, b in across:
@@ -161,10 +177,8 @@ def _joints(pencil: Pencil, plan: FlatPlan, text: float, lines: Floats, across: 
     room, both, left_out = Room(plan.spacing), np.concatenate([lines, across]), 0
     for written in pencil.texts:
         room.take(written.box())
-    for joint, mark in zip(plan.joints, plan.marks, strict=True):
-        pair = zip((plan.rods[k] for k in joint.rods), joint.at, strict=True)
-        a, b = (f"{rod.id} at {plan.rounding.mm(rod.from_cut_end(at))} mm" for rod, at in pair)
-        pencil.mark(mark, radius, "MARK", note=f"{joint.id}: {a}, {b}")
+    for joint, mark, note in zip(plan.joints, plan.marks, plan.notes, strict=True):
+        pencil.mark(mark, radius, "MARK", note=note)
         size = min(LARGEST * text, (plan.spacing - 3 * clear) / (LETTER * len(joint.id)))
         for clear_of, corner in product((both, lines), CORNERS if size >= SMALL * text else ()):
             off = clear + 0.5 * size * np.array([LETTER * len(joint.id), LINE])
