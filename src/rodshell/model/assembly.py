@@ -163,7 +163,7 @@ class Assembly:
         freedom : free directions, as many of each block as in the plan.
         """
         data, every = np.zeros(len(self.indices)), zip(hessians, element_blocks, self._slots, strict=True)
-        sets = [one for one in every if len(one[0])]
+        sets = [(hessian, blocks, slots) for hessian, blocks, slots in every if len(hessian)]
         parts = self._parts
 
         def add(part: int, _: int) -> None:
