@@ -27,7 +27,10 @@ def in_threads(work: Callable[[int, int], object], count: int, *, most: int | No
     ------
     BaseException : what a piece of work raised; of several one.
     """
-    if count == 0:
+    wanted = 1 if count <= 1 else min(threads() if most is None else most, count)
+    if wanted == 1:
+        for piece in range(count):
+            work(piece, 0)
         return
     waiting, failures = iter(range(count)), list[BaseException]()
 
@@ -38,7 +41,7 @@ def in_threads(work: Callable[[int, int], object], count: int, *, most: int | No
         except BaseException as failure:  # another thread's must not be lost
             failures.append(failure)
 
-    others = [Thread(target=run, args=(thread,)) for thread in range(1, min(most or threads(), count))]
+    others = [Thread(target=run, args=(thread,)) for thread in range(1, wanted)]
     for other in others:
         other.start()
     run(0)

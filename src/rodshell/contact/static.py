@@ -59,16 +59,6 @@ class BoundToTarget:
         """The nodes (n, 3) put back on the surface [m]."""
         return self.target.retract(state)
 
-    def contact_forces(self, state: Floats, gradient: Floats) -> Floats:
-        """(n,) force of the target on each node along the outward normal [N]; negative where it pulls.
-
-        Parameters
-        ----------
-        state : (n, 3) nodes [m].
-        gradient : (n, 3) of the energy there [N].
-        """
-        return dot(self._latest.at(state).surface.normal, gradient)
-
 
 class _Latest:
     """Free directions and curvature at the latest state: a solver needs them several times at each state."""

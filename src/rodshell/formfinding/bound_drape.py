@@ -91,14 +91,20 @@ def bound_drape(
     touching = np.zeros(mesh.node_count, dtype=bool)
     touching[mesh.rod_nodes[on_rods[1]]] = True
     on_target = np.flatnonzero(touching)
-    pull = problem.constraint.contact_forces(found.state, found.gradient)[on_target]  # type: ignore[attr-defined]
+    value, gradient = target.level(found.state)
+    steep = np.sqrt(dot(gradient, gradient))
+    normal = gradient / steep[:, None]
+    pull = dot(normal, found.gradient)[on_target]  # force of the target along the outward normal [N]
     warnings = [*target.warnings, *net.warnings]
-    edges, bends = (np.asarray(touching[stencils].all(axis=1)) for stencils in (mesh.edges, mesh.bends))
-    strong = strong_bending(target, mesh, found.state, bends, rod) if joint and joint.holds_normals else None
+    strong = None
+    if joint and joint.holds_normals:
+        bends = np.asarray(touching[mesh.bends].all(axis=1))
+        strong = strong_bending(target, mesh, found.state, bends, rod)
     if strong is not None:
         warnings += strong.warnings
     if not eccentricity:
-        warnings += thickness_warnings(target, mesh, found.state, edges, rod, min(layout.spacing))
+        edges = np.asarray(touching[mesh.edges].all(axis=1))
+        warnings += thickness_warnings(normal, mesh, found.state, edges, rod, min(layout.spacing))
     if found.report.negative_modes:
         warnings.append(
             f"the drape is not a minimum of the bound grid's energy ({found.report.negative_modes} negative modes): "
@@ -113,7 +119,7 @@ def bound_drape(
             "the joints there nearly close; another anchor or heading, a smaller part or a seam may open them"
         )
     figures = DrapeFigures(
-        max_gap=_largest_gap(target, found.state[on_target]),
+        max_gap=float(np.abs(value / steep)[on_target].max()),  # to first order
         contact_pulls=int(np.count_nonzero(pull < -1e-6 * np.abs(pull).max(initial=0.0))),
         min_angle=net.min_angle,
         min_angle_at=net.min_angle_at,
@@ -205,12 +211,6 @@ def _bind(target: Target, mesh: GridMesh, start: Floats) -> BoundToTarget:
             count[nodes] -= 1
             guides[nodes] = np.gradient(start[nodes], axis=0)
     return BoundToTarget(target, count, guides)
-
-
-def _largest_gap(target: Target, points: Floats) -> float:
-    """Largest distance of points (n, 3) from the target they were moved onto, to first order [m]."""
-    value, gradient = target.level(points)
-    return float(np.abs(value / np.linalg.norm(gradient, axis=1)).max())
 
 
 def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[str]:

@@ -125,18 +125,19 @@ def rod_thickness(rod: Rod) -> float:
 
 
 def thickness_warnings(
-    target: Target, mesh: GridMesh, positions: Floats, edges: Bools, rod: Rod, spacing: float
+    normal: Floats, mesh: GridMesh, positions: Floats, edges: Bools, rod: Rod, spacing: float
 ) -> tuple[str, ...]:
     """A warning where thick rods, laid one above the other, would differ in length from lines on one surface.
 
     Parameters
     ----------
+    normal : (n, 3) of the target at the mesh's nodes.
     positions : (n, 3) of the mesh's nodes, on the target [m].
     edges : (e,) which edges of the mesh lie on the target.
     spacing : of the rods [m].
     """
     thick = rod_thickness(rod)
-    normal, (a, b) = unit(target.level(positions)[1]), mesh.edges[edges].T
+    a, b = mesh.edges[edges].T
     chord = positions[b] - positions[a]
     bent = thick * dot(normal[b] - normal[a], chord) / dot(chord, chord)
     if not (np.abs(bent).max(initial=0.0) > THICK or thick > CLOSE * spacing):

@@ -92,15 +92,9 @@ def agreement(popped: PopUp, target: Target) -> Agreement:
 
 def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     """(e, 3) points of the rods halfway along each edge, on the cubic through the nearest nodes of the rod."""
-    rods = mesh.edge_rods
-    entry = np.arange(len(rods)) + rods  # of `rod_nodes`: an edge begins there
-    begin, length = mesh.rod_start[rods], (mesh.rod_stop - mesh.rod_start)[rods]
-    middles, result = 0.5 * (mesh.stations[entry] + mesh.stations[entry + 1]), np.empty((len(rods), 3))
-    for count in range(2, 5):
-        here = np.flatnonzero(np.minimum(length, 4) == count)
-        first = np.clip(entry[here] + 1 - count // 2, begin[here], begin[here] + length[here] - count)
-        near = first[:, None] + np.arange(count)
-        result[here] = lagrange(mesh.stations[near], positions[mesh.rod_nodes[near]], middles[here])
+    result = np.empty((len(mesh.edges), 3))
+    for edges, near, middles in mesh.around_edges:
+        result[edges] = lagrange(mesh.stations[near], positions[mesh.rod_nodes[near]], middles)
     return result
 
 

@@ -27,7 +27,7 @@ from rodshell.model.shell import UP
 from rodshell.rods.section import Rod
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.path import MOST_STEPS, follow, relax
-from rodshell.solve.problem import Pattern, Problem, half_width
+from rodshell.solve.problem import Pattern, Problem, Supports, half_width
 from rodshell.units import length_text
 from rodshell.validation import choice, instance
 
@@ -161,7 +161,8 @@ def pop_up(
         if ends == "clamped" and found.report.converged:
             shell, found = stages.turn_clamps(shell, found)
     shell = shell.with_elements(found.elements)
-    held = Problem.of_shell(shell, shell.positions(found.state), pattern=found.problem.pattern)
+    supports, width = Supports(shell.held_ends()), half_width(shell.positions(found.state))
+    held = replace(found.problem, constraint=supports, length=width)
     return PopUp(ends, start, footprint, boundary, shell, replace(found, problem=held))
 
 

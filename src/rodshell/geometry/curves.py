@@ -101,11 +101,12 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
         low = knots[first] - beyond * (knots[min(first + 1, last)] - knots[first])
         high = knots[last] + beyond * (knots[last] - knots[max(first, last - 1)])
         for n in range(len(s)):
+            if not low <= s[n] <= high:
+                result[m, n, 0] = result[m, n, 1] = result[m, n, 2] = np.nan
+                continue
             row, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
             if window < first or window + most - 1 > last:
                 row, window = spare, _window(knots, s[n], right[n], first, last, shares, spare)
-            if not low <= s[n] <= high:
-                x = y = z = np.nan
             for k in range(near):
                 x += shares[row, k] * points[window + k, m, 0]
                 y += shares[row, k] * points[window + k, m, 1]

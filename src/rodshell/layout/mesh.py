@@ -87,6 +87,24 @@ class GridMesh:
         return np.asarray(np.diff(self.stations)[self._rod_of[1:] == self._rod_of[:-1]])
 
     @cached_property
+    def around_edges(self) -> list[tuple[Ints, Ints, Floats]]:
+        """The nearest entries of `rod_nodes` around each edge: four on a rod that has as many.
+
+        For each number k of entries the edges (m,), their entries (m, k), and where the edges' middles are on their
+        rods (m,) [m].
+        """
+        rods = self.edge_rods
+        entry = np.arange(len(rods)) + rods  # an edge begins there
+        begin, length = self.rod_start[rods], (self.rod_stop - self.rod_start)[rods]
+        middles, result = 0.5 * (self.stations[entry] + self.stations[entry + 1]), list[tuple[Ints, Ints, Floats]]()
+        for count in range(2, 5):
+            edges = np.flatnonzero(np.minimum(length, 4) == count)
+            if len(edges):
+                first = np.clip(entry[edges] + 1 - count // 2, begin[edges], begin[edges] + length[edges] - count)
+                result.append((edges, first[:, None] + np.arange(count), middles[edges]))
+        return result
+
+    @cached_property
     def bends(self) -> Ints:
         """(b, 3) nodes of each pair of consecutive edges of a rod."""
         return self._windows(3)
@@ -144,7 +162,7 @@ class GridMesh:
         nodes = np.arange(len(self.rod_nodes))
         return GridMesh(self.grid, flat, nodes, self.rod_start, self.stations, pairs[:, 0], pairs[:, 1])
 
-    @property
+    @cached_property
     def rod_stop(self) -> Ints:
         """(m,) where each rod ends in `rod_nodes`: one past its last entry."""
         return np.append(self.rod_start[1:], len(self.rod_nodes))

@@ -45,7 +45,9 @@ class Freedom:
         ----------
         blocks : number of blocks.
         """
-        return Freedom(np.tile(np.eye(3), (blocks, 1, 1)), np.full(blocks, 3, dtype=np.intp))
+        directions, axis = np.zeros((blocks, 3, 3)), np.arange(3)
+        directions[:, axis, axis] = 1.0
+        return Freedom(directions, np.full(blocks, 3, dtype=np.intp))
 
     def with_directions(self, blocks: Ints, *directions: tuple[float, float, float]) -> "Freedom":
         """The same, but these `blocks` (k,) free along the given orthonormal directions only (none: fixed).
@@ -55,7 +57,7 @@ class Freedom:
         blocks : (k,) indices of blocks.
         directions : orthonormal vectors, up to three.
         """
-        table, count = self.directions.copy(), self.count.copy()
+        table, count = self.directions.copy() if directions else self.directions, self.count.copy()
         for k, direction in enumerate(directions):
             table[blocks, k] = direction
         count[blocks] = len(directions)
@@ -156,11 +158,12 @@ class Assembly:
 
         Parameters
         ----------
-        hessians : of each element set, (m, 3k, 3k) element Hessians.
+        hessians : of each element set, (m, 3k, 3k) element Hessians; empty: none of this set.
         element_blocks : of each element set, (m, k) blocks of its elements.
         freedom : free directions, as many of each block as in the plan.
         """
-        data, sets = np.zeros(len(self.indices)), list(zip(hessians, element_blocks, self._slots, strict=True))
+        data, every = np.zeros(len(self.indices)), zip(hessians, element_blocks, self._slots, strict=True)
+        sets = [(hessian, blocks, slots) for hessian, blocks, slots in every if len(hessian)]
         parts = self._parts
 
         def add(part: int, _: int) -> None:
@@ -307,7 +310,10 @@ def _find_slots(blocks, count, start, rows, slot):  # type: ignore[no-untyped-de
 def _scatter(hessians, blocks, slots, count, above, directions, low, high, data):  # type: ignore[no-untyped-def]
     """Add T' H T of every element, in the columns of blocks from `low` to before `high`; T holds the free directions of
     its blocks as columns."""
-    k = blocks.shape[1]
+    k, whole = blocks.shape[1], np.empty(len(count), dtype=np.bool_)
+    for i in range(len(count)):  # free along x, y and z: T is 1
+        d = directions[i]
+        whole[i] = count[i] == 3 and d[0, 0] == 1.0 and d[1, 1] == 1.0 and d[2, 2] == 1.0
     for m in range(blocks.shape[0]):
         for b in range(k):
             j = blocks[m, b]
@@ -318,6 +324,12 @@ def _scatter(hessians, blocks, slots, count, above, directions, low, high, data)
                 if base < 0:
                     continue
                 i = blocks[m, a]
+                if whole[i] and whole[j]:
+                    for c in range(3):
+                        begin = base + c * above[j] + c * (c + 1) // 2
+                        for r in range(3 if i != j else c + 1):
+                            data[begin + r] += hessians[m, 3 * a + r, 3 * b + c]
+                    continue
                 for c in range(count[j]):
                     d0, d1, d2 = directions[j, c, 0], directions[j, c, 1], directions[j, c, 2]
                     w0 = hessians[m, 3 * a, 3 * b] * d0 + hessians[m, 3 * a, 3 * b + 1] * d1

@@ -53,8 +53,9 @@ class RodSections:
         """
         rod_of = np.repeat(np.arange(len(rods)), mesh.rod_stop - mesh.rod_start)
         of_rods = _uniform(rods)
-        nodes, on_edges = of_rods[rod_of, :3], of_rods[mesh.edge_rods]
-        edges, stretch, mass, rotary = on_edges[:, :3].copy(), *on_edges[:, 3:].T.copy()
+        nodes = of_rods[:, :3].take(rod_of, axis=0)
+        edges, *rest = (column.take(mesh.edge_rods, axis=0) for column in (of_rods[:, :3], *of_rods[:, 3:].T))
+        stretch, mass, rotary = rest
         for rod, profile, entries in varied_rods(mesh, rods):
             inner = rod_of[entries[1:]] == rod_of[entries[:-1]]
             here = (entries - rod_of[entries])[:-1][inner]  # edges are counted rod by rod

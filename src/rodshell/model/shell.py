@@ -192,6 +192,8 @@ class Shell:
     def freedom(self) -> Freedom:
         """All nodes free, ghosts fixed, one free component a twist angle; rods that could spin freely are held."""
         free = Freedom.free(len(self.like)).with_directions(self.ghosts)
+        if not self.angles:
+            return free
         turning = np.flatnonzero(self.like >= self.mesh.node_count + len(self.ghosts))
         return free.with_directions(turning, ANGLE).with_directions(self.spinning)
 
@@ -281,8 +283,9 @@ class _Builder:
         stretch = Stretch.elastic(parts.edges, mesh.edge_lengths, self.sections.stretch)
         bends = self._bends()
         linkers, linker_ties = self._linkers()
-        copies = np.bincount(self.like)
-        mass = self._shared_mass()[self.like] / copies[self.like][:, None]
+        mass = self._shared_mass()
+        if self.apart:
+            mass = mass[self.like] / np.bincount(self.like)[self.like][:, None]
         within, between = (*bends, *linkers), (*self._elastic(), *self._ties(), *linker_ties)
         return Shell(
             mesh, self.coupling, parts.node_count, within, between, stretch,
@@ -303,10 +306,7 @@ class _Builder:
         mesh, parts = self.mesh, self.parts
         inner = np.ones(len(mesh.rod_nodes), dtype=bool)
         inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
-        per_length = self.stiffness[inner] / mesh.voronoi_lengths[:, None]
-        edge = self.first_angle + np.arange(len(mesh.edges))
-        same_rod = mesh.edge_rods[1:] == mesh.edge_rods[:-1]
-        nodes, angles = parts.bends, np.column_stack([edge[:-1][same_rod], edge[1:][same_rod]])
+        nodes, per_length = parts.bends, self.stiffness[inner] / mesh.voronoi_lengths[:, None]
         if len(self.ghosts):
             rows = np.column_stack([_inner_nodes(parts), parts.ends.ravel(), self.ghosts])
             ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
@@ -318,6 +318,10 @@ class _Builder:
             elements: tuple[Elements, ...] = (IsotropicBend(np.ascontiguousarray(bends), stiffness.copy()),)
             if not self.twist:
                 return elements
+        edge = self.first_angle + np.arange(len(mesh.edges))
+        same_rod = mesh.edge_rods[1:] == mesh.edge_rods[:-1]
+        angles = np.column_stack([edge[:-1][same_rod], edge[1:][same_rod]])
+        if self.isotropic:
             return (*elements, self._bend_twist(nodes, angles, np.zeros((len(nodes), 2)), per_length[:, 2]))
         if len(self.ghosts):
             last = np.searchsorted(mesh.edge_rods, np.arange(len(self.rods)), side="right") - 1

@@ -229,7 +229,7 @@ def find_equilibrium(
         factorizations=step.factorizations,
         seconds=time.perf_counter() - begin,
         force_residual=float(np.abs(residual).max(initial=0.0)),
-        max_strain=float(np.abs(problem.stretch.strains(state)).max()),
+        max_strain=float(np.abs(step.strains(state)).max()),
         negative_modes=step.negative_modes,
         reason=reason if status is Status.OUT_OF_TIME else "",
     )

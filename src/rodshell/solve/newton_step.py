@@ -66,7 +66,13 @@ class NewtonStep:
         self.pattern = problem.pattern_at(state)
         self._assembly, self._solver = self.pattern.assembly, self.pattern.solver
         self._factors: Factors | None = None  # their memory serves for all factorisations of this iteration
-        self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in self._blocks]
+        *sets, _ = self._blocks
+        self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in sets]
+        self._curvature = problem.constraint.curvature(state, np.zeros_like(state))
+        self._curved = len(self._curvature) > 0
+        self._no_forces = np.zeros(len(problem.stretch.blocks))
+        self._least_force = LEAST_FORCE * float(problem.stretch.stiffness.max())
+        self._strained = state, problem.stretch.strains(state)
         self.dofs = self._free.size
         self.iterations = 0
         self.factorizations = 0
@@ -76,7 +82,7 @@ class NewtonStep:
         self._nearest = np.inf  # the last step that was near
         self._shifted = False  # the last step was one of the shifted Hessian
         self._last_step: _LastStep | None = None
-        self._factored = state, np.empty(0)  # where the matrix is from
+        self._factored = state, self._no_forces  # where the matrix is from
         self._last = np.inf, np.inf  # length of the last step and change of the forces, both relative
         self._chord = self._was_chord = self.settled = False
 
@@ -121,26 +127,25 @@ class NewtonStep:
         SingularError : a pivot vanishes, and not by a mode without stiffness.
         TooManyModesError : the start has more negative modes than are allowed.
         """
-        problem = self._problem
+        problem, stretch = self._problem, self._problem.stretch
         if not self._chord:
             self._factored = state, forces
-        at, strains = self._factored[0], problem.stretch.strains(state)
-        base = forces if problem.inextensible else np.zeros_like(forces)
-        stretch = problem.stretch.with_forces(forces, multipliers=base)
+        at, strains = self._factored[0], self.strains(state)
+        base = forces if problem.inextensible else self._no_forces
         self._free = free = problem.constraint.freedom(state)
         gradient = np.zeros_like(state) if problem.load is None else -problem.load
-        count = len(self.elements)
-        hessians = [NO_HESSIANS] * count if self._chord else self._hessians[:count]
+        hessians = [NO_HESSIANS] * len(self.elements) if self._chord else self._hessians[:-1]
         evaluate_all(self.elements, state, gradient, hessians)
         if self._chord:  # what the edges lack acts along those of the matrix, else strains do not settle
             stretch.add_axial(state, forces, gradient)
             stretch.add_axial(at, base + stretch.stiffness * strains - forces, gradient)
         else:
-            by_force = gradient.copy()
-            stretch.add_axial(state, forces, by_force)
-            evaluate_all((stretch,), state, gradient, self._hessians[-2:-1])
-            curvature = problem.constraint.curvature(state, by_force)
-            self._hessians[-1][:] = curvature if len(curvature) else 0.0
+            if self._curved:
+                by_force = gradient.copy()
+                stretch.add_axial(state, forces, by_force)
+                self._curvature = problem.constraint.curvature(state, by_force)
+            axial = stretch.with_forces(forces, multipliers=base)
+            evaluate_all((axial,), state, gradient, self._hessians[-1:])
         prescribed = problem.constraint.remaining(state)
         if prescribed is not None:
             gradient += self._times(prescribed)
@@ -155,15 +160,20 @@ class NewtonStep:
             self._chord = False
             return self.take(state, forces, descend)
         share = min(1.0, self._longest * problem.length / reach) if reach > 0 else 1.0
-        strains += stretch.elongation(at, motion)
-        change = base + stretch.stiffness * strains - forces
+        change = base + stretch.stiffness * (strains + stretch.elongation(at, motion)) - forces
         last = _LastStep(state, forces, self.elements, self.negative_modes, motion, change, reach, share)
         state_next, forces_next = self._after(last)
-        left = problem.stretch.strains(state_next)
+        left = self.strains(state_next)
         if not problem.inextensible:
-            left = left - forces_next / problem.stretch.stiffness
+            left = left - forces_next / stretch.stiffness
         self._judge(reach / problem.length, forces, forces_next)
         return reach, state_next, forces_next, float(np.abs(left).max())
+
+    def strains(self, state: Floats) -> Floats:
+        """(e,) strains of the edges at a state (n, 3), the latest of which is remembered."""
+        if state is not self._strained[0]:
+            self._strained = state, self._problem.stretch.strains(state)
+        return self._strained[1]
 
     def _after(self, last: _LastStep) -> tuple[Floats, Floats]:
         """State and forces after a step."""
@@ -202,7 +212,7 @@ class NewtonStep:
         The last factorisation is made where the forces are nearly those of the equilibrium: it counts its modes.
         """
         self.iterations += self.counts
-        size = max(float(np.abs(after).max(initial=0.0)), LEAST_FORCE * float(self._problem.stretch.stiffness.max()))
+        size = max(float(np.abs(after).max(initial=0.0)), self._least_force)
         changed, since = (float(np.abs(after - old).max(initial=0.0)) / size for old in (before, self._factored[1]))
         shrunk = moved / max(self._last[0], TINY), changed / max(self._last[1], TINY)
         rates = shrunk if self._chord else (max(CURVED * moved, changed), changed)
@@ -214,7 +224,7 @@ class NewtonStep:
     def _times(self, motion: Floats) -> Floats:
         """(n, 3) product of the Hessian last evaluated with displacements (n, 3)."""
         result = np.zeros_like(motion)
-        for hessians, blocks in zip(self._hessians, self._blocks, strict=True):
+        for hessians, blocks in zip(self._hessians, self._blocks[:-1], strict=True):
             _add_product(hessians, blocks, motion, result)
         return result
 
@@ -229,7 +239,7 @@ class NewtonStep:
         where the step that led there was too long."""
         if self._chord:
             return self._solve(right)
-        self._data = self._assembly.assemble(self._hessians, self._blocks, self._free)
+        self._data = self._assembly.assemble([*self._hessians, self._curvature], self._blocks, self._free)
         regular = self._count_negative_modes()
         if self.factorizations == 1 and self._most_modes is not None and self.negative_modes > self._most_modes:
             raise TooManyModesError

@@ -45,7 +45,7 @@ class Constraint(Protocol):
 
         Returns
         -------
-        (n, 3, 3) -lambda phi'' of each block [N/m], or an empty array.
+        (n, 3, 3) -lambda phi'' of each block [N/m]; or an empty array, at every state.
         """
         ...
 

@@ -24,7 +24,7 @@ from rodshell.solve.dense import add_rows, backward, eliminate, forward, padded,
 from rodshell.solve.symbolic import Blocks, Plan, blocks_of, plan_of
 from rodshell.threads import in_threads, threads
 
-ACCURATE = 1e-13  # a residual this small, relative to |A| |x|, needs no refinement
+ACCURATE = 1e-13  # a residual this small, relative to the diagonal times x, needs no refinement
 
 
 NONE_ABOVE, NOTHING = np.empty(0, dtype=np.int64), np.empty(0)
@@ -119,10 +119,11 @@ GIVEN_AWAY = "the memory of these factors was given to another factorisation"
 
 
 class _Scratch(NamedTuple):
-    """Memory for one factorisation at a time; nothing in it is needed afterwards."""
+    """Memory for one factorisation or solution at a time; nothing in it is needed afterwards."""
 
     threads: list[tuple[Floats, Floats]]  # of each thread: a front's pivot rows, and the dense kernels' workspace
     stacks: Floats  # update matrices
+    fronts: list[tuple[Floats, Floats]]  # of each thread: a front's part of a solution, and scratch of it
 
 
 class Multifrontal:
@@ -154,12 +155,9 @@ class Multifrontal:
         memory = reuse.given_away() if isinstance(reuse, MultifrontalFactors) else None
         data = np.ascontiguousarray(data, dtype=np.float64)
         panels, pivots = memory or (room(self.fill), np.empty(len(self.indptr) - 1))
-        try:  # popped at once: another thread may take the last
-            scratch = self._spare.pop()
-        except IndexError:
-            scratch = self._new_scratch()
+        scratch = self.take_scratch()
         regular = _eliminate_all(self.plan, self.levels, data, scratch, panels, pivots)
-        self._spare.append(scratch)
+        self.give_back(scratch)
         if not regular:
             raise SingularError("a pivot of the factorisation vanishes")
         return MultifrontalFactors(self, data, panels, pivots)
@@ -175,10 +173,19 @@ class Multifrontal:
         place[unknowns] = np.arange(len(unknowns))
         return unknowns, place
 
-    def _new_scratch(self) -> _Scratch:
-        plan = self.plan
-        threads_memory = [(room(plan.largest_panel), workspace(plan.largest_front)) for _ in range(threads())]
-        return _Scratch(threads_memory, room(plan.stack_size))
+    def take_scratch(self) -> _Scratch:
+        """Scratch memory, which is to be given back."""
+        try:  # popped at once: another thread may take the last
+            return self._spare.pop()
+        except IndexError:
+            plan, count = self.plan, range(threads())
+            eliminated = [(room(plan.largest_panel), workspace(plan.largest_front)) for _ in count]
+            solved = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in count]
+            return _Scratch(eliminated, room(plan.stack_size), solved)
+
+    def give_back(self, scratch: _Scratch) -> None:
+        """Keep scratch memory for the next factorisation or solution."""
+        self._spare.append(scratch)
 
 
 class MultifrontalFactors:
@@ -204,11 +211,10 @@ class MultifrontalFactors:
 
     def _substitute(self, right: Floats) -> Floats:
         assert self._memory is not None, GIVEN_AWAY
-        plan, (panels, pivots) = self._solver.plan, self._memory
-        x, parts = right[plan.order], self._solver.parts
+        solver, plan, (panels, pivots) = self._solver, self._solver.plan, self._memory
+        x, parts, scratch = right[plan.order], solver.parts, solver.take_scratch()
         fronts, last = (plan.first, plan.row_start, plan.rows, plan.panel_start, panels), len(parts) - 1
-        memory = [(room(plan.largest_front), room(2 * plan.largest_front)) for _ in range(threads() if last else 1)]
-        above, place = self._solver.above
+        memory, (above, place) = scratch.fronts, solver.above
         sums = np.zeros((last, len(above)))  # each part's own, so that the sum does not depend on the threads
 
         def rise(part: int, thread: int) -> None:
@@ -223,6 +229,7 @@ class MultifrontalFactors:
         _forward(parts[last], x, NONE_ABOVE, NOTHING, *fronts, *memory[0])
         descend(last, 0)
         in_threads(descend, last, most=len(memory))
+        solver.give_back(scratch)
         result = np.empty_like(x)
         result[plan.order] = x
         return result
@@ -313,23 +320,17 @@ def _update(s, first, row_start, update_start, stacks):  # type: ignore[no-untyp
 
 @njit(error_model="numpy")
 def _residual(indptr, indices, data, x, right):  # type: ignore[no-untyped-def]
-    """right - A x of a matrix stored by its upper triangle, and the largest entry of |A| |x|."""
-    residual, size, largest = np.empty(len(x)), np.zeros(len(x)), 0.0
+    """right - A x of a matrix stored by its upper triangle, and the largest entry of |D x|, D being its diagonal."""
+    residual, size = right.copy(), 0.0
     for j in range(len(x)):
-        residual[j] = right[j]
-    for j in range(len(x)):
-        for e in range(indptr[j], indptr[j + 1]):
-            i = indices[e]
-            product = data[e] * x[j]
-            residual[i] -= product
-            size[i] += abs(product)
-            if i != j:
-                product = data[e] * x[i]
-                residual[j] -= product
-                size[j] += abs(product)
-    for j in range(len(x)):
-        largest = max(largest, size[j])
-    return residual, largest
+        last, total = indptr[j + 1] - 1, 0.0
+        for e in range(indptr[j], last):
+            residual[indices[e]] -= data[e] * x[j]
+            total += data[e] * x[indices[e]]
+        product = data[last] * x[j]
+        residual[j] -= total + product
+        size = max(size, abs(product))
+    return residual, size
 
 
 @njit(error_model="numpy", nogil=True)
@@ -400,6 +401,7 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
         np.zeros(3, dtype=np.int64),
         np.empty(n, dtype=np.int64),
     )
+    furthest = np.empty((n, 2), dtype=np.int64)
     begins, ends = np.empty(n + 2, dtype=np.int64), np.empty(n + 2, dtype=np.int64)  # a stack of segments
     begins[0], ends[0], height = 0, n, 1
     newest = 0
@@ -413,8 +415,8 @@ def _dissect(coordinates, along, start, neighbours):  # type: ignore[no-untyped-
         for k in range(len(blocks)):
             blocks[k] = along[longest, begin + k]
             rank[blocks[k]] = k
-        best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing)
-        _separate(blocks, segment, here, rank, best, start, neighbours, part)
+        best = _best_cut(blocks, segment, here, rank, start, neighbours, crossing, furthest)
+        _separate(blocks, rank, best, furthest, part)
         for d in range(len(along)):
             row = along[d]
             for side in range(3):
@@ -453,17 +455,22 @@ def _longest(coordinates, along, begin, end):  # type: ignore[no-untyped-def]
 
 
 @njit()
-def _best_cut(blocks, segment, here, rank, start, neighbours, crossing):  # type: ignore[no-untyped-def]
-    """Rank of the last block before the straight cut that few couplings cross, near the middle."""
+def _best_cut(blocks, segment, here, rank, start, neighbours, crossing, furthest):  # type: ignore[no-untyped-def]
+    """Rank of the last block before the straight cut that few couplings cross, near the middle. `furthest` (n, 2)
+    returns the lowest and the highest rank to which each block is coupled in the segment, its own among them."""
     n = len(blocks)
     for k in range(n + 1):
         crossing[k] = 0
     for b in blocks:
+        low, high = rank[b], rank[b]
         for e in range(start[b], start[b + 1]):
             other = neighbours[e]
-            if segment[other] == here and rank[other] > rank[b]:
-                crossing[rank[b]] += 1
-                crossing[rank[other]] -= 1
+            if segment[other] == here:
+                low, high = min(low, rank[other]), max(high, rank[other])
+                if rank[other] > rank[b]:
+                    crossing[rank[b]] += 1
+                    crossing[rank[other]] -= 1
+        furthest[b, 0], furthest[b, 1] = low, high
     margin = max(1, int(UNBALANCED * n))
     best, least, across = margin - 1, np.inf, 0
     for k in range(n - margin):
@@ -475,18 +482,15 @@ def _best_cut(blocks, segment, here, rank, start, neighbours, crossing):  # type
 
 
 @njit()
-def _separate(blocks, segment, here, rank, best, start, neighbours, part):  # type: ignore[no-untyped-def]
+def _separate(blocks, rank, best, furthest, part):  # type: ignore[no-untyped-def]
     """Parts 0 before and 1 after the cut, and 2, which joins them: those on one side that are coupled to the other."""
     touching = np.zeros(2, dtype=np.int64)
     for b in blocks:
         side = 0 if rank[b] <= best else 1
         part[b] = side
-        for e in range(start[b], start[b + 1]):
-            other = neighbours[e]
-            if segment[other] == here and (rank[other] <= best) != (side == 0):
-                part[b] = 3 + side
-                touching[side] += 1
-                break
+        if (furthest[b, 1] > best) if side == 0 else (furthest[b, 0] <= best):
+            part[b] = 3 + side
+            touching[side] += 1
     joining = 0 if touching[0] <= touching[1] else 1
     for b in blocks:
         if part[b] >= 3:

@@ -157,14 +157,17 @@ class Target(ABC):
         """Closest points (n, 3), and the gradient there, as accurate as they were before the last step."""
         with np.errstate(all="ignore"):  # NaN far away, where the surface has no continuation
             y, gradient = self.retract(x, 1), np.empty_like(x)
-            left = np.arange(len(x))
+            left, here, near = np.arange(len(x)), x, y.copy()
             for _ in range(12):
-                step, convex, gradient[left] = self._newton_to_closest(x[left], y[left])
-                length = np.linalg.norm(step, axis=1)
-                y[left] += step * np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
-                left = left[~(convex & (length <= NEARLY * self.size))]
-                if len(left) == 0:
+                step, convex, gradient[left] = self._newton_to_closest(here, near)
+                length = np.sqrt(np.einsum("ij,ij->i", step, step))
+                step *= np.minimum(1.0, 0.3 * self.size / np.maximum(length, 1e-300))[:, None]
+                near += step
+                y[left] = near
+                far = ~(convex & (length <= NEARLY * self.size))
+                if not far.any():
                     return y, gradient
+                left, here, near = left[far], here[far], near[far]
             y[left] = self._descend_to_closest(x[left])
             gradient[left] = self.level(y[left])[1]
             return y, gradient
