@@ -161,8 +161,9 @@ def pop_up(
         if ends == "clamped" and found.report.converged:
             shell, found = stages.turn_clamps(shell, found)
     shell = shell.with_elements(found.elements)
-    supports, width = Supports(shell.held_ends()), half_width(shell.positions(found.state))
-    held = replace(found.problem, constraint=supports, length=width)
+    held = replace(found.problem, length=half_width(shell.positions(found.state)))
+    if start == "flat":  # the ends have arrived
+        held = replace(held, constraint=Supports(shell.held_ends()))
     return PopUp(ends, start, footprint, boundary, shell, replace(found, problem=held))
 
 

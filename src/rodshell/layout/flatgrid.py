@@ -108,25 +108,19 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
     ------
     ValueError : a piece belongs to no rod.
     """
-    (line, start, end), (of_piece, begin, stop) = _lines(rods), _lines(pieces)
-    tiny = 1e-9 * (end - start)
-    holds = (start - tiny <= begin[:, None]) & (stop[:, None] <= end + tiny)
-    for whole, piece in zip(line, of_piece, strict=True):
-        holds &= whole == piece[:, None]
-    found = holds.argmax(axis=1)
-    lost = ~holds[np.arange(len(pieces)), found]
-    if lost.any():
-        raise ValueError(f"{pieces[int(lost.argmax())].name} is not a piece of any rod")
-    return np.asarray(found)
-
-
-def _lines(rods: Sequence[FlatRod]) -> tuple[Floats, Floats, Floats]:
-    """The line of each rod, as (6, m) numbers that are equal on one line, and its start and end (m,) [m]."""
-    families = {"u": 0.0, "v": 1.0, "free": 2.0}
-    table = np.array(
-        [(families[rod.family], rod.offset, *rod.origin, *rod.direction, rod.start, rod.end) for rod in rods]
-    ).reshape(-1, 8)
-    return table.T[:6], table[:, 6], table[:, 7]
+    on_line: dict[tuple[object, ...], list[tuple[int, float, float]]] = {}
+    for k, rod in enumerate(rods):
+        tiny = 1e-9 * (rod.end - rod.start)
+        line = rod.family, rod.offset, rod.origin, rod.direction
+        on_line.setdefault(line, []).append((k, rod.start - tiny, rod.end + tiny))
+    found = list[int]()
+    for piece in pieces:
+        line = piece.family, piece.offset, piece.origin, piece.direction
+        whole = [k for k, start, end in on_line.get(line, ()) if start <= piece.start and piece.end <= end]
+        if not whole:
+            raise ValueError(f"{piece.name} is not a piece of any rod")
+        found.append(whole[0])
+    return np.array(found, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,10 +187,9 @@ class FlatGrid:
         direction = np.array([rod.direction for rod in rods])
         start = np.array([rod.start for rod in rods])
         end = np.array([rod.end for rod in rods])
-        a, b = np.triu_indices(len(rods), k=1)
-        sine = _cross(direction[a], direction[b])
-        crossing = np.abs(sine) > 1e-9
-        a, b, sine = a[crossing], b[crossing], sine[crossing]
+        sines = _cross(direction[:, None], direction)
+        a, b = np.nonzero(np.triu(np.abs(sines) > 1e-9, k=1))
+        sine = sines[a, b]
         apart = origin[b] - origin[a]
         at = np.column_stack([_cross(apart, direction[b]) / sine, _cross(apart, direction[a]) / sine])
         slack = margin - 1e-9 * (end - start)  # a crossing exactly at an end is a joint at that end

@@ -294,7 +294,9 @@ def cut_mesh(mesh: GridMesh, grid: FlatGrid) -> tuple[GridMesh, Ints]:
     s, node = mesh.stations[entry], mesh.rod_nodes[entry]
     node_of = np.full(len(mesh.flat), -1)
     node_of[shared] = np.arange(len(shared))
-    joined = np.isin(piece * mesh.node_count + node, (grid.crossings.rods * mesh.node_count + shared[joint][:, None]))
+    joints = np.append(np.sort((grid.crossings.rods * mesh.node_count + shared[joint][:, None]).ravel()), -1)
+    key = piece * mesh.node_count + node
+    joined = joints[np.searchsorted(joints[:-1], key)] == key
     starts = np.searchsorted(piece, np.arange(len(rods) + 1))
     from_end = np.minimum(s - s[starts[piece]], s[starts[piece + 1] - 1] - s)
     crowded = ~joined & (from_end > 0.0) & (from_end < CROWDED * mesh.edge_lengths.max())

@@ -306,7 +306,7 @@ class _Builder:
         mesh, parts = self.mesh, self.parts
         inner = np.ones(len(mesh.rod_nodes), dtype=bool)
         inner[mesh.rod_start] = inner[mesh.rod_stop - 1] = False
-        nodes, per_length = parts.bends, self.stiffness[inner] / mesh.voronoi_lengths[:, None]
+        nodes, per_length = parts.bends, self.stiffness.compress(inner, axis=0) / mesh.voronoi_lengths[:, None]
         if len(self.ghosts):
             rows = np.column_stack([_inner_nodes(parts), parts.ends.ravel(), self.ghosts])
             ends = np.column_stack([mesh.rod_start, mesh.rod_stop - 1]).ravel()
