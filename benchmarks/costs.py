@@ -76,9 +76,7 @@ def _contact() -> Row:
     for popped in form.popped.values():
         contact_of(popped.shell, popped.state, ROD)
     share = (clock() - formed) / len(form.popped) / (formed - begin)
-    what = (
-        f"{len(form.footprint.rods)} rods, {len(form.footprint.mesh.edges)} edges: contact of a shape over the form"
-    )
+    what = f"{len(form.footprint.rods)} rods, {len(form.footprint.mesh.edges)} edges: contact of a shape over the form"
     return Row(what, f"{100 * share:.1f} %", "at most 10 %")
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.kernels import njit
 from rodshell.rods.elements import NO_HESSIANS, Elements, evaluate_all
-from rodshell.solve.problem import Problem
+from rodshell.solve.problem import NO_CURVATURE, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
 TOLERANCE = 1e-13  # of the length: estimate of the error that is left
@@ -68,8 +68,7 @@ class NewtonStep:
         self._factors: Factors | None = None  # their memory serves for all factorisations of this iteration
         *sets, _ = self._blocks
         self._hessians = [np.zeros((len(b), 3 * b.shape[1], 3 * b.shape[1])) for b in sets]
-        self._curvature = problem.constraint.curvature(state, np.zeros_like(state))
-        self._curved = len(self._curvature) > 0
+        self._curvature, self._curved = NO_CURVATURE, True  # until the constraint says that it is not
         self._no_forces = np.zeros(len(problem.stretch.blocks))
         self._least_force = LEAST_FORCE * float(problem.stretch.stiffness.max())
         self._strained = state, problem.stretch.strains(state)
@@ -144,6 +143,7 @@ class NewtonStep:
                 by_force = gradient.copy()
                 stretch.add_axial(state, forces, by_force)
                 self._curvature = problem.constraint.curvature(state, by_force)
+                self._curved = len(self._curvature) > 0
             axial = stretch.with_forces(forces, multipliers=base)
             evaluate_all((axial,), state, gradient, self._hessians[-1:])
         prescribed = problem.constraint.remaining(state)

@@ -266,7 +266,9 @@ def _dissected(coordinates: Floats, blocks: Blocks) -> Longs:
 
 def _block_begins(coordinates: Floats) -> Longs:
     """Where blocks begin: unknowns in a row that lie at one place, such as the directions of a node; and their end."""
-    other = (coordinates[1:] != coordinates[:-1]).any(axis=1)
+    other = np.zeros(len(coordinates[1:]), dtype=bool)
+    for along in coordinates.T:
+        other |= along[1:] != along[:-1]
     return np.concatenate([[0], 1 + np.flatnonzero(other), [len(coordinates)]])
 
 
