@@ -1,4 +1,5 @@
-"""A read-only installation without a writable home: kernels are compiled in each run, and that is said."""
+"""Kernels that cannot be kept, or found: a read-only installation without a writable home compiles them in each run, and
+that is said; compiled ones that were asked for and are missing are an error."""
 
 import os
 import subprocess
@@ -51,3 +52,14 @@ def test_warming_up_what_would_be_lost_is_refused(
     monkeypatch.setattr("rodshell.cli.warmup.kernels_are_kept", lambda: False)
     assert main(["warmup"]) == 2
     assert "would be lost: no folder" in capsys.readouterr().err
+
+
+def test_compiled_kernels_that_are_asked_for_and_missing_are_one_sentence(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "from rodshell.cli import entry; entry()", "form", "hemisphere"]
+    environment = os.environ | {"RODSHELL_KERNELS": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=tmp_path)
+    assert ended.returncode == 2
+    assert ended.stderr == (
+        f"rodshell: error: RODSHELL_KERNELS={tmp_path}: no compiled kernels for this processor were found; without it "
+        "Numba compiles them\n"
+    )

@@ -117,7 +117,9 @@ def _compiled() -> tuple[dict[str, Kernel] | None, str]:
             loaded = (_load(os.path.join(folder, file)) for file in libraries)
             return {name: kernel for library in loaded for name, kernel in library.items()}, level
     if chosen:
-        raise InputError(f"no kernels for this processor in RODSHELL_KERNELS={chosen}")
+        raise InputError(
+            f"RODSHELL_KERNELS={chosen}: no compiled kernels for this processor were found; without it Numba compiles them"
+        )
     return None, ""
 
 
