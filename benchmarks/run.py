@@ -19,6 +19,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.g
 
 from benchmarks import (  # noqa: E402
     beside,
+    costs,
     earlier,
     factorisation,
     first_run,
@@ -46,6 +47,7 @@ SECTIONS: dict[str, Callable[[bool], Section]] = {
     "first": lambda _: first_run.section(),
     "first-alike": lambda _: first_run.section(alike=True),
     "first-compiled": lambda _: first_run.section(alike=True, compiled=True),
+    "costs": costs.costs,
     "loads": lambda quick: loads.loads(1 if quick else 3),
     "sameness": sameness.sameness,
     "sweeps": lambda quick: sweeps.sweeps(20 if quick else 100),

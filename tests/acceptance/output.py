@@ -5,7 +5,6 @@ The forms are a hemisphere, an ellipsoid turned by 45 degrees and a free form (a
 
 import csv
 import io
-import os
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -19,8 +18,7 @@ import rodshell as rs
 from rodshell.checks import bending
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid, straight_rods
 from rodshell.output import export
-from rodshell.output.files import DEFAULT
-from rodshell.results import Archive, Results
+from rodshell.results import Archive
 from tests.acceptance.cases import ELLIPSOID, HEMISPHERE, ROD, R, ridge_formula
 from tests.acceptance.rows import Row, print_table
 from tests.output.dxf_reader import read_dxf, rods_of_dxf
@@ -140,49 +138,6 @@ def circle_rows() -> Iterator[Row]:
     )
 
 
-def time_rows() -> Iterator[Row]:
-    """Time to make every file, from 20 to 120 rods: a vault of ten rods, crossed by ever more."""
-    rods, seconds = [], []
-    for across in (10, 30, 60, 110):
-        archive = vault(across)
-        rods.append(len(archive.results.plain()["rods"]))
-        seconds.append(_seconds(archive))
-    slope = float(np.polyfit(np.log(rods), np.log(seconds), 1)[0])
-    note = ", ".join(f"{n} rods {s:.2f} s" for n, s in zip(rods, seconds, strict=True))
-    yield Row("all files of a vault", "log-log slope of time over rods", slope, 1.25, "", note)
-
-
-def vault(across: int) -> Archive:
-    """Ten long rods and `across` short ones over a cylinder: as many joints on every short rod."""
-    length, width = 0.03 * (across + 1), 0.33
-    rods = [FlatRod.u(f"U{k + 1:02}", 0.03 * (k - 4.5), 0.0, length) for k in range(10)]
-    rods += [FlatRod.v(f"V{k + 1:03}", 0.03 * (k + 1), -width / 2, width / 2) for k in range(across)]
-    mesh = mesh_grid(FlatGrid.of(rods), 0.005)
-    bent = np.column_stack([mesh.flat[:, 0], 0.2 * np.sin(mesh.flat[:, 1] / 0.2), 0.2 * np.cos(mesh.flat[:, 1] / 0.2)])
-    ends = mesh.ends.ravel()
-    joints: list[list[dict[str, object]]] = [[] for _ in rods]
-    for (a, b), at in zip(mesh.grid.crossings.rods.tolist(), mesh.grid.crossings.at.tolist(), strict=True):
-        joints[a].append({"with": rods[b].name, "at": at[0] - rods[a].start})
-        joints[b].append({"with": rods[a].name, "at": at[1] - rods[b].start})
-    entries = [
-        {"id": rod.name, "family": rod.family, "offset": rod.offset, "start": rod.start, "end": rod.end,
-         "length": rod.length, "joints": met}
-        for rod, met in zip(rods, joints, strict=True)
-    ]  # fmt: skip
-    result = {"format": "rodshell-result", "version": 1, "status": "converged", "name": "vault", "rods": entries,
-              "footprint": mesh.flat[ends, :2].tolist(), "boundary": bent[ends].tolist()}  # fmt: skip
-    states = {"flat": mesh.flat, "popped_pinned": bent, "rod_nodes": mesh.rod_nodes, "rod_start": mesh.rod_start}
-    return with_deployment(Archive(Results.of(result), states), 9)
-
-
-def _seconds(archive: Archive) -> float:
-    """Processor time of an export and of the processes that help it: other work on the machine disturbs it little."""
-    with tempfile.TemporaryDirectory() as folder:
-        start = sum(os.times()[:4])
-        export(archive, folder, DEFAULT)
-        return sum(os.times()[:4]) - start
-
-
 def size_rows() -> Iterator[Row]:
     """Sizes of reports."""
     for name, archive, bound in (
@@ -202,7 +157,6 @@ def all_rows() -> Iterator[Row]:
         yield from reaction_rows(name)
     yield from circle_rows()
     yield from size_rows()
-    yield from time_rows()
 
 
 if __name__ == "__main__":

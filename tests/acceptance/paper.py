@@ -18,7 +18,7 @@ from rodshell.formfinding.dynamic_pop_up import DynamicPopUpSettings, dynamic_po
 from rodshell.formfinding.methods import Draped, Fall
 from rodshell.formfinding.progress import silent
 from rodshell.joints import Coupling, ExplicitPenalty, ImplicitPenalty, Linker, SharedDofs
-from rodshell.paper import fig8, genetic
+from rodshell.paper import genetic
 from tests.acceptance.rows import Row, print_table
 from tests.formfinding.falls import TARGETS, Particles
 from tests.nets.sphere_net import sphere_net_end
@@ -193,20 +193,6 @@ def pop_up_rows() -> Iterator[Row]:
         yield Row(f"pop-up in time, {coupling.name}", "nodes off statics", off, 1e-3 + 2 * gap, "R", note)
 
 
-def time_rows() -> Iterator[Row]:
-    """Fig 8's own runs: 2 s of fall against our drape, trim and map back; both warm, processor time."""
-    coupling = ExplicitPenalty(C1=C1)
-    fig8.timed_fall(fig8.CASES[0], coupling, fig8.USUAL_STEP, 0.05, silent)  # compiles
-    for case in fig8.CASES:
-        theirs, ours = fig8.timed_fall(case, coupling, fig8.USUAL_STEP, fig8.FALLING, silent), fig8.timed_ours(case)
-        ratio = theirs.seconds / ours.seconds
-        note = f"{ratio:.0f} times: {theirs.seconds:.1f} s, {theirs.dofs} unknowns, against {ours.seconds:.3f} s"
-        yield Row(case.target.name, "our time over the paper's method's, inverse", 1 / ratio, 1 / 50, "", note)
-        counts = f"{theirs.factorizations} of them in {theirs.steps} steps of {theirs.step_in_lapack:.0f} each"
-        note = f"{theirs.in_own:.1f} by our own band; {counts}"
-        yield Row(case.target.name, "a factorisation, in bare solves (LAPACK)", theirs.in_lapack, 5.0, "", note)
-
-
 def genetic_rows() -> Iterator[Row]:
     """The kept searches, their best popped up again, and the beginning of one made again."""
     for one in genetic.make(silent).comparisons:
@@ -231,7 +217,7 @@ def genetic_rows() -> Iterator[Row]:
 
 
 ROWS: tuple[Callable[[], Iterator[Row]], ...] = (
-    tail_rows, explicit_rows, shared_rows, linker_rows, friction_rows, pop_up_rows, time_rows, genetic_rows,
+    tail_rows, explicit_rows, shared_rows, linker_rows, friction_rows, pop_up_rows, genetic_rows,
 )  # fmt: skip
 
 

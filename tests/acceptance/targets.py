@@ -160,7 +160,7 @@ def same_rows() -> Iterator[Row]:
 
 
 def gallery_rows() -> Iterator[Row]:
-    """Every gallery target converged and stable; the whole job at some 30 rods each way against the dome's."""
+    """Every gallery target converged and stable."""
     for name, piece in gallery().items():
         form = piece.form()
         note = ", ".join(f"{ends} gap rms {100 * gap.rms_relative:.3f} %" for ends, gap in form.agreement.items())
@@ -169,29 +169,6 @@ def gallery_rows() -> Iterator[Row]:
         yield Row(name, "negative modes, drape and pop-ups", modes, 0)
         for ends, bound in (("pinned", piece.pinned), ("clamped", piece.clamped)):
             yield Row(name, f"gap {ends}, rms", 100 * form.agreement[ends].rms_relative, 100 * bound, "%size")
-    jobs: dict[str, list[tuple[float, tuple[int, int], str]]] = {name: [] for name in gallery()}
-    for name in 3 * list(jobs):  # the dome's among the others', so that a busy machine delays all alike
-        jobs[name].append(_whole_job(name))
-    least = {name: min(done, key=lambda job: job[0]) for name, done in jobs.items()}
-    for name, (seconds, rods, said) in least.items():
-        note = f"{rods[0]} x {rods[1]} rods, {seconds:.2f} s of CPU, {said}"
-        yield Row(name, "whole job over the dome's", seconds / least["dome"][0], 3.0, note=note)
-
-
-def _whole_job(name: str) -> tuple[float, tuple[int, int], str]:
-    """Seconds of CPU from the file to the pop-ups with about 30 rods each way; the number of rods; the status."""
-    piece = gallery()[name]
-    coarse = rs.chebyshev_net(piece.target, piece.layout(), anchor=piece.anchor)
-    lines = {family: len({rod.offset for rod in coarse.rods if rod.family == family}) for family in "uv"}
-    spacing = tuple(piece.spacing * lines[family] / 30 for family in "uv")
-    edge = min(float(np.sqrt(spacing[0] * spacing[1])) / 4, min(spacing))
-    layout = rs.GridLayout.orthogonal(spacing=(spacing[0], spacing[1]), edge=edge, rotate=piece.rotate)
-    started = time.process_time()
-    target = gallery_target(name)
-    form = rs.find_form(target, layout, SAME, anchor=piece.anchor)
-    seconds = time.process_time() - started
-    families = [rod.family for rod in form.footprint.rods]
-    return seconds, (families.count("u"), families.count("v")), form.status
 
 
 def gallery_target(name: str) -> rs.Target:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from tests.acceptance.output import TARGETS, circle_rows, file_rows, reaction_rows, rebuilt_rows, size_rows, time_rows
+from tests.acceptance.output import TARGETS, circle_rows, file_rows, reaction_rows, rebuilt_rows, size_rows
 from tests.acceptance.rows import Row
 from tests.acceptance.test_acceptance import check_reached
 
@@ -20,11 +20,3 @@ def test_every_shell(rows: Callable[[str], Iterator[Row]], name: str) -> None:
 @pytest.mark.parametrize("rows", [circle_rows, size_rows])
 def test_the_other_rows(rows: Callable[[], Iterator[Row]]) -> None:
     check_reached(rows())
-
-
-def test_time_grows_linearly_with_the_rods() -> None:
-    """A ratio of seconds within one run; a machine that was busy with something else gets a second try."""
-    (row,) = time_rows()
-    if not row.reached:
-        (row,) = time_rows()
-    assert row.reached, str(row)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from functools import cache
-from time import process_time
 
 import numpy as np
 
@@ -146,25 +145,9 @@ def strength_rows() -> Iterator[Row]:
     yield Row("given section with a strength", "not refused", float("fibre_distances" not in refused), 0, "", refused)
 
 
-def cost_rows() -> Iterator[Row]:
-    """What contact costs, of a form of 121 rods each way."""
-    spacing = 0.62 / 120
-    layout = rs.GridLayout.orthogonal(spacing=spacing, edge=spacing / 3)
-    rod = rs.Rod(rs.Circle(5e-4), rs.Material(1e6, 1e3))
-    begun = process_time()
-    form = rs.find_form(rs.Hemisphere(R), layout, rod)
-    formed = process_time()
-    for popped in form.popped.values():
-        contact_of(popped.shell, popped.state, rod)
-    share = (process_time() - formed) / len(form.popped) / (formed - begun)
-    note = f"{len(form.footprint.rods)} rods, {len(form.footprint.mesh.edges)} edges"
-    yield Row("hemisphere, 121 x 121", "one shape's contact over the form's time", 100 * share, 10, "%", note)
-
-
 def rows() -> Iterator[Row]:
     yield from stress_rows()
     yield from curvature_rows()
     yield from contact_rows()
     yield from design_rows()
     yield from strength_rows()
-    yield from cost_rows()

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from functools import cache
 from html import escape
 from itertools import groupby
 from typing import Any
@@ -41,10 +42,16 @@ def tag(name: str, *children: str, **attributes: Any) -> str:
     """
     words = [name]
     for key, value in attributes.items():
-        shown = value if isinstance(value, str) else number(value, 3)
-        words.append(f'{key.rstrip("_").replace("_", "-")}="{escape(shown)}"')
+        shown = escape(value) if isinstance(value, str) else number(value, 3)
+        words.append(f'{_attribute(key)}="{shown}"')
     opening = " ".join(words)
     return f"<{opening}>{''.join(children)}</{name}>" if children else f"<{opening}/>"
+
+
+@cache
+def _attribute(key: str) -> str:
+    """The name of an attribute, by that of Python's argument."""
+    return key.rstrip("_").replace("_", "-")
 
 
 def label(text: str, x: float, y: float, size: float, **attributes: Any) -> str:

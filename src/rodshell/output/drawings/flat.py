@@ -241,19 +241,15 @@ def _offset(rod: GridRod) -> float:
 def _patches(plan: FlatPlan) -> list[list[tuple[int, int]]]:
     """The rods u and v of each joint of two families, grid by grid."""
     pairs = [joint.rods for joint in plan.joints if [plan.rods[k].family for k in joint.rods] == ["u", "v"]]
-    joined = list(range(len(plan.rods)))  # for each rod another one of its grid, or itself
+    if not pairs:
+        return []
+    from scipy.sparse import coo_array  # here, as forms without drawings do not need it
+    from scipy.sparse.csgraph import connected_components
 
-    def first_of(rod: int) -> int:
-        while joined[rod] != rod:
-            rod = joined[rod]
-        return rod
-
-    for u, v in pairs:
-        joined[first_of(v)] = first_of(u)
-    grids = dict[int, list[tuple[int, int]]]()
-    for u, v in pairs:
-        grids.setdefault(first_of(u), []).append((u, v))
-    return list(grids.values())
+    first, second = np.array(pairs).T
+    graph = coo_array((np.ones(len(pairs)), (first, second)), shape=(len(plan.rods),) * 2)
+    patch = connected_components(graph, directed=False)[1][first]
+    return [[pair for pair, k in zip(pairs, patch, strict=True) if k == name] for name in dict.fromkeys(patch)]
 
 
 def _largest_full(met: Bools, x: Floats, y: Floats) -> tuple[float, float, float, float] | None:
