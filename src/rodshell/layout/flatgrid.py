@@ -1,5 +1,6 @@
 """Straight rods in a plane, their crossings, and the layers in which they lie."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -108,19 +109,19 @@ def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:
     ------
     ValueError : a piece belongs to no rod.
     """
-    on_line: dict[tuple[object, ...], list[tuple[int, float, float]]] = {}
+    on_line = defaultdict[tuple[object, ...], list[tuple[int, float, float]]](list)
     for k, rod in enumerate(rods):
         tiny = 1e-9 * (rod.end - rod.start)
-        line = rod.family, rod.offset, rod.origin, rod.direction
-        on_line.setdefault(line, []).append((k, rod.start - tiny, rod.end + tiny))
-    found = list[int]()
-    for piece in pieces:
-        line = piece.family, piece.offset, piece.origin, piece.direction
-        whole = [k for k, start, end in on_line.get(line, ()) if start <= piece.start and piece.end <= end]
-        if not whole:
+        on_line[rod.family, rod.offset, rod.origin, rod.direction] += [(k, rod.start - tiny, rod.end + tiny)]
+    found = np.empty(len(pieces), dtype=np.intp)
+    for row, piece in enumerate(pieces):
+        for k, start, end in on_line[piece.family, piece.offset, piece.origin, piece.direction]:
+            if start <= piece.start and piece.end <= end:
+                found[row] = k
+                break
+        else:
             raise ValueError(f"{piece.name} is not a piece of any rod")
-        found.append(whole[0])
-    return np.array(found, dtype=np.intp)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
