@@ -1,5 +1,5 @@
-"""Kernels that cannot be kept, or found: a read-only installation without a writable home compiles them in each run, and
-that is said; compiled ones that were asked for and are missing are an error."""
+"""Kernels that cannot be kept or found: a read-only installation without a writable home compiles them in each run, and
+says so; compiled ones that were asked for and are missing are an error."""
 
 import os
 import subprocess

@@ -118,7 +118,8 @@ def _compiled() -> tuple[dict[str, Kernel] | None, str]:
             return {name: kernel for library in loaded for name, kernel in library.items()}, level
     if chosen:
         raise InputError(
-            f"RODSHELL_KERNELS={chosen}: no compiled kernels for this processor were found; without it Numba compiles them"
+            f"RODSHELL_KERNELS={chosen}: no compiled kernels for this processor were found; without it Numba compiles "
+            "them"
         )
     return None, ""
 
