@@ -2,8 +2,8 @@
 
 `njit` declares one. Where the wheel was built with compiled kernels, they were made then, for one or more levels of
 the processor, and `njit` returns the compiled function of the highest level that this processor has; Numba is not
-needed. Elsewhere Numba compiles a kernel when it is first called. RODSHELL_KERNELS=jit chooses Numba in any case,
-RODSHELL_KERNELS=compiled refuses it, and RODSHELL_KERNELS=FOLDER chooses compiled libraries that are elsewhere.
+needed. Elsewhere Numba compiles a kernel when it is first called. RODSHELL_KERNELS=jit chooses Numba in any case, and
+RODSHELL_KERNELS=FOLDER compiled libraries that are elsewhere.
 
 Kernels that are called from Python have a row in `table`; the others are part of those.
 """
@@ -22,6 +22,7 @@ Kernel = Callable[..., Any]
 
 PACKAGE = "rodshell."
 LEVELS = ("x86-64-v3", "generic")  # of processors, from the highest
+UNCHOSEN = ("", "compiled")  # values of RODSHELL_KERNELS: nothing was set, or what counts when a wheel is built
 
 
 def levels_here() -> list[str]:
@@ -107,7 +108,7 @@ def _compiled() -> tuple[dict[str, Kernel] | None, str]:
     chosen = os.environ.get("RODSHELL_KERNELS", "")
     if chosen == "jit" or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return None, ""
-    folder = os.path.dirname(__file__) if chosen in ("", "compiled") else chosen
+    folder = os.path.dirname(__file__) if chosen in UNCHOSEN else chosen
     found = [
         name for name in (sorted(os.listdir(folder)) if os.path.isdir(folder) else ()) if name.startswith("compiled_")
     ]
@@ -116,7 +117,7 @@ def _compiled() -> tuple[dict[str, Kernel] | None, str]:
         if libraries:
             loaded = (_load(os.path.join(folder, file)) for file in libraries)
             return {name: kernel for library in loaded for name, kernel in library.items()}, level
-    if chosen:
+    if chosen not in UNCHOSEN:
         raise InputError(
             f"RODSHELL_KERNELS={chosen}: no compiled kernels for this processor were found; without it Numba compiles "
             "them"
