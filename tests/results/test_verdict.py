@@ -7,6 +7,7 @@ import pytest
 
 from rodshell.results import Results, Verdict
 from rodshell.results.verdict import facts, verdict, verdict_of
+from rodshell.results.wording import rounded_down
 
 
 def good() -> dict[str, Any]:
@@ -121,6 +122,13 @@ def test_what_no_support_can_cure_cannot_be_built(changes: list[tuple[str, Any]]
     found = verdict(changed(*changes))
     assert found.level == "unbuildable"
     assert words in found.headline
+
+
+def test_no_more_is_promised_than_the_shell_carries() -> None:
+    factor = ("self_weight.pinned.load_factor", 4.7152)
+    assert "carries at least 4.71 times its own weight" in verdict(changed(factor)).headline
+    for value, shown in ((3.0, "3"), (0.3, "0.3"), (0.99961, "0.999"), (1234.9, "1230"), (0.0, "0")):
+        assert rounded_down(value) == shown
 
 
 def test_a_shell_that_cannot_be_built_says_too_that_it_does_not_carry_its_own_weight() -> None:

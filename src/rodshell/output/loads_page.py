@@ -12,7 +12,7 @@ from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
 from rodshell.results.loaded import LoadedShell
 from rodshell.results.records import Ends
-from rodshell.results.wording import millimetres, percent, rounded, rounding_of, stress
+from rodshell.results.wording import millimetres, percent, rounded, rounding_of, shown_factor, stress
 from rodshell.units import percent_text
 
 CLOSE = 1.005  # both factors are found within 0.2 %: a larger ratio of theirs says something
@@ -130,21 +130,17 @@ def _span(results: Results) -> float | None:
     return float(np.ptp(points[:, :2], axis=0).min()) if len(points) else None
 
 
-def _factor(value: float | None, missing: str) -> str:
-    return missing if value is None else rounded(value)
-
-
 def _stability(name: str, ends: Ends, shell: LoadedShell) -> list[str]:
     """Three figures side by side."""
-    imperfect = _factor(shell.imperfect_factor, "not asked for" if shell.imperfect_kind is None else "over 100")
+    imperfect = "not asked for" if shell.imperfect_kind is None else shown_factor(shell.imperfect_factor)
     above = (shell.imperfect_factor or np.inf) > CLOSE * (shell.limit_factor or np.inf)
     if above and shell.limit_kind == "bifurcation" and shell.imperfect_kind not in (None, "not followed"):
         imperfect += " (the bifurcation is stable)"
     return [
         name,
         ends,
-        _factor(shell.linear_factor, "over 100"),
-        f"{_factor(shell.limit_factor, 'over 100')} ({shell.limit_kind})",
+        shown_factor(shell.linear_factor),
+        f"{shown_factor(shell.limit_factor)} ({shell.limit_kind})",
         imperfect,
     ]
 
@@ -164,7 +160,7 @@ def _modes(archive: Archive, shells: list[tuple[str, Ends, LoadedShell]]) -> Ite
         state = f"loaded_buckling_{ends}_{name}_{k}"
         if state in archive.states and factor is not None:
             yield (
-                f"Linear buckling mode {k} under {name}, {ends} ends: at {rounded(factor)} times the loads",
+                f"Linear buckling mode {k} under {name}, {ends} ends: at {shown_factor(factor)} times the loads",
                 ends,
                 state,
             )

@@ -13,6 +13,7 @@ from rodshell.results.wording import (
     percent,
     rounded,
     share_of_weight,
+    shown_factor,
     shown_length,
     small,
     stress,
@@ -216,12 +217,12 @@ def _loads(results: Results, length: Length) -> Iterator[str]:
     """What each combination of loads does, a line for each end condition."""
     for name, by_ends in results.loads.items():
         for ends, found in by_ends.items():
-            limit = "over 100" if found.limit_factor is None else rounded(found.limit_factor)
+            limit = shown_factor(found.limit_factor)
             line = f"  {name:<9} {ends:<8}stable up to {limit} times the loads ({found.limit_kind})"
             if found.linear_factor is not None:
-                line += f", linear {rounded(found.linear_factor)}"
+                line += f", linear {shown_factor(found.linear_factor)}"
             if found.imperfect_factor is not None:
-                line += f", with imperfections {rounded(found.imperfect_factor)}"
+                line += f", with imperfections {shown_factor(found.imperfect_factor)}"
             at = "" if found.at_factor == 1 else f" at {rounded(found.at_factor or 0.0)} times"
             line += f"; deflection{at} {length(found.max_deflection)}"
             if found.utilisation is not None:

@@ -8,7 +8,16 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from rodshell.results.records import Agreement, Ends, PopUp
 from rodshell.results.results import Clearance, Deployment, Level, Results, Verdict, WorstBent
-from rodshell.results.wording import millimetres, percent, place, rounded, rounding_of, whole_percent
+from rodshell.results.wording import (
+    millimetres,
+    percent,
+    place,
+    rounded,
+    rounded_down,
+    rounding_of,
+    shown_factor,
+    whole_percent,
+)
 from rodshell.rods.design_strength import RESERVED
 
 ENDS: tuple[Ends, Ends] = ("clamped", "pinned")
@@ -156,7 +165,7 @@ def _load_faults(results: Results, ends: Ends) -> Iterator[str]:
             yield f"with {ends} ends the shell is unstable before the loads of {name} act"
         elif limit is not None and limit < 1 and found.limit_kind != "not followed":
             how = "snaps through" if found.limit_kind == "limit point" else "buckles"
-            yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded(limit)} times these loads"
+            yield f"with {ends} ends the shell falls under {name}: it {how} at {rounded_down(limit)} times these loads"
         place = found.governs
         said = place is not None and place.by == "permanent" and (_bent(results, ends).utilisation or 0.0) > 1
         if used is not None and used > 1 and not said:
@@ -270,7 +279,7 @@ def _open_points(results: Results, usable: list[Ends]) -> Iterator[str]:
             elif by_ends[ends].imperfect_factor is not None and (by_ends[ends].imperfect_factor or 0.0) < 1:
                 yield (
                     f"with {ends} ends and imperfections the shell falls under {name} at "
-                    f"{rounded(by_ends[ends].imperfect_factor or 0.0)} times these loads"
+                    f"{rounded_down(by_ends[ends].imperfect_factor or 0.0)} times these loads"
                 )
     yield from _from_flat(results, usable, late=status != CONVERGED)
     yield from _other_shapes(results, usable)
@@ -361,7 +370,7 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
     """Why a result is good."""
     borne = [results.self_weight[ends].load_factor for ends in usable]
     least = min((factor for factor in borne if factor is not None), default=None)
-    weight = "over 100" if least is None else f"{'at least ' if len(usable) > 1 else ''}{rounded(least)}"
+    weight = "at least " * (least is not None and len(usable) > 1) + shown_factor(least)
     best = _best(results, usable)
     near = (
         f"; with {best[0]} ends the gap to the target is at most {percent(best[1].max_relative)} of its size"
@@ -377,8 +386,7 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[str]:
     for name, by_ends in results.loads.items():
         limits = [by_ends[ends].limit_factor for ends in usable if ends in by_ends]
         least = min((limit for limit in limits if limit is not None), default=None)
-        most = "over 100" if least is None else rounded(least)
-        yield f"under {name} it is stable up to {most} times these loads"
+        yield f"under {name} it is stable up to {shown_factor(least)} times these loads"
 
 
 def _mm(results: Results, metres: float | None) -> str:

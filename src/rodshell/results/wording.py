@@ -107,6 +107,18 @@ def rounded(value: float, digits: int = 3) -> str:
     return f"{float(text):.0f}" if abs(float(text)) >= 10**digits else text
 
 
+def rounded_down(value: float) -> str:
+    """A limit above 0 that must not be promised too high, such as a load factor: three significant digits, never
+    rounded up."""
+    step = 10.0 ** (floor(log10(value)) - 2) if value > 0 else 1.0
+    return rounded(floor(value / step + 1e-9) * step)
+
+
+def shown_factor(limit: float | None) -> str:
+    """A load factor up to which a shell is stable, or at which it buckles; none was met up to 100."""
+    return "over 100" if limit is None else rounded_down(limit)
+
+
 def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXACT) -> str:
     """A length [m] in mm with about `digits` significant digits, no finer than its rounding.
 
@@ -165,7 +177,7 @@ def share_of_weight(found: SelfWeight) -> str:
     if found.limit == "unstable unloaded":
         return "none: unstable unloaded"
     least = "at least " if found.limit == "not followed" else ""
-    return least + (percent(factor) if factor < 0.995 else f"{rounded(factor)} times")
+    return least + (percent(factor) if factor < 0.995 else f"{rounded_down(factor)} times")
 
 
 def whole_percent(share: float) -> str:

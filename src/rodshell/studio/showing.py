@@ -73,7 +73,7 @@ def _loads(archive: "Archive") -> Figures:
     rows, rounding = [], rounding_of(archive.results)
     for name, by_ends in archive.results.loads.items():
         for ends, found in by_ends.items():
-            limit = "over 100" if found.limit_factor is None else wording.rounded(found.limit_factor)
+            limit = wording.shown_factor(found.limit_factor)
             rows.append((f"{name}, {ends}: stable up to", f"{limit} times the loads ({found.limit_kind})"))
             at = "" if found.at_factor == 1 else f" at {wording.rounded(found.at_factor or 0.0)} times"
             rows.append(
