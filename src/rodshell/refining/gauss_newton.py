@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from rodshell.arrays import Floats
 from rodshell.errors import OutOfTimeError
@@ -149,8 +148,12 @@ def _least_squares(matrix: Floats, right: Floats, low: Floats, high: Floats) -> 
     n, size = matrix.shape[1], float(np.linalg.norm(right))  # of the order of one: the method's tolerances are absolute
     matrix, right = matrix / size, right / size
     tiny = 1e-6 * float(np.linalg.norm(matrix)) * np.eye(n)
+    matrix, right = np.vstack([matrix, tiny]), np.append(right, np.zeros(n))
+    free = np.asarray(np.linalg.lstsq(matrix, right)[0])
+    if n == 1 or bool(((low <= free) & (free <= high)).all()):
+        return np.clip(free, low, high)
+    from scipy.optimize import lsq_linear  # here: it takes as long to import as the step of an offer to compute
+
     tight = high - low < 1e-12
     low, high = np.where(tight, low - 1e-12, low), np.where(tight, high + 1e-12, high)
-    return np.asarray(
-        lsq_linear(np.vstack([matrix, tiny]), np.append(right, np.zeros(n)), (low, high), method="bvls").x
-    )
+    return np.asarray(lsq_linear(matrix, right, (low, high), method="bvls").x)
