@@ -14,7 +14,7 @@ from rodshell.case import Case
 from rodshell.checks import Checks, check
 from rodshell.checks.check import merged_checks
 from rodshell.checks.contact import contact_of_patches
-from rodshell.errors import InputError
+from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication import Fabricated, fabricate
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PatchForm, PopUp, Trimmed
 from rodshell.formfinding.patches import MergedPopUp, PatchedForm
@@ -247,14 +247,22 @@ class Form:
         )
 
     def finished(self, progress: Progress = silent) -> "Form":
-        """This form, its checks and fabrication made now; a progress may end the checks early."""
+        """This form, its checks and fabrication made now; a progress may end the checks early. Under loads that do not
+        fit the form it is not checked: `loaded.refused` says why."""
         checks = self.known_checks
         if checks is None or checks.stopped:
             checks = self._checked(progress)
         known = replace(self, _known_checks=checks)
         loaded, loads = self.known_loaded, self.case.built_loads()
         if loads is not None and (loaded is None or loaded.stopped):
-            loaded = check_loads(known, loads, progress=progress)
+            from rodshell.loads.check import unchecked  # most forms have no loads
+
+            try:  # the form is kept in any case
+                loaded = check_loads(known, loads, progress=progress)
+            except InputError as error:
+                loaded = unchecked(loads, refused=str(error))
+            except ConvergenceError as error:
+                loaded = unchecked(loads, stopped=str(error))
         return replace(known, _known_fabrication=known.fabrication, _known_loaded=loaded)
 
     # Files

@@ -9,6 +9,7 @@ import pytest
 
 import rodshell as rs
 from rodshell.cli import main
+from rodshell.errors import ConvergenceError
 from rodshell.results import read
 
 ROOF = """
@@ -109,3 +110,38 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
     said = capsys.readouterr().err.strip()
     assert message in said
     assert "\n" not in said
+
+
+def test_a_form_that_its_bracing_pulls_over_is_kept(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The reason is the status, a warning and, with exit code 2, what is said; an older result is not touched."""
+    Path("roof.toml").write_text(ROOF + '[pop_up]\nends = "pinned"\n')
+    Path("tight.toml").write_text((LOADS % "0.02").replace("prestrain = 0.001", "prestrain = 0.5"))
+    check = ["check", "--loads", "tight.toml", "--only", "csv", "-q"]
+    assert main([*check, "roof.toml"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert "pulls the shell out of its shape" in said
+    assert said.endswith("roof, without its loads")
+    kept = read("out/roof").results
+    assert kept.status.startswith("the loads were not checked: the bracing pulls the shell")
+    assert kept.status in kept.warnings
+    assert kept.verdict is not None
+    assert kept.verdict.level != "good"
+    assert set(kept.pop_up) == {"pinned"}
+    before = {path: path.read_bytes() for path in Path("out/roof").rglob("*") if path.is_file()}
+    assert main(["check", "--loads", "tight.toml", "-q", "out/roof"]) == 2
+    assert "pulls the shell out of its shape" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in Path("out/roof").rglob("*") if path.is_file()} == before
+
+
+def test_a_form_whose_check_fails_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one that ran out of time: partial results, exit code 3."""
+
+    def failing(*_: object, **__: object) -> None:
+        raise ConvergenceError("the patches take another shape together")
+
+    monkeypatch.setattr("rodshell.form.check_loads", failing)
+    assert main(["check", "roof.toml", "--loads", "light.toml", "--only", "csv", "-q"]) == 3
+    kept = read("out/roof").results
+    assert kept.status == "the patches take another shape together"
+    assert f"{kept.status}; not checked: winter" in kept.warnings
+    assert set(kept.pop_up) == {"pinned", "clamped"}

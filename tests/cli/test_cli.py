@@ -64,6 +64,7 @@ class FakeForm:
 
     told: ClassVar = list[OutputOptions]()
     from_table: ClassVar = True  # which makes no offer to refine it
+    known_loaded: ClassVar = None
 
     def finished(self, progress: Callable[[str, str, float], None]) -> "FakeForm":
         return self

@@ -41,4 +41,4 @@ def command(source: str, loads: str | None, **values: Any) -> int:
     names = kept_case(case.to_toml(), read_inputs(case.to_toml()), Path())[1]
     if path.is_dir() and output.out is None:
         output = output.into(source)
-    return run_and_deliver(case, source, output, ["case.toml", *names])
+    return run_and_deliver(case, source, output, ["case.toml", *names], formed_before=path.is_dir())

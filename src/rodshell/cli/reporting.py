@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 import click
 
 from rodshell.cli.interruption import Interruption
+from rodshell.errors import InputError
 from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
 
@@ -33,7 +34,7 @@ UNKEPT = "no folder to keep them in can be written; NUMBA_CACHE_DIR may name one
 SILENCE = 10.0  # s: the longest without a word, away from a terminal
 TICK = 0.5  # s, on a terminal
 BAR = 24  # characters
-FOUND, NOT_CONVERGED, UNBUILDABLE = 0, 3, 4
+FOUND, BAD_INPUT, NOT_CONVERGED, UNBUILDABLE = 0, 2, 3, 4
 
 
 class Progress:
@@ -151,12 +152,13 @@ class Result(Protocol):
 @dataclass(frozen=True)
 class Kept:
     """An archive as a result; `kinds` of files are written with it (None: all), and `more` by name. `offer` says what a
-    refinement would gain."""
+    refinement would gain, `refused` why its loads could not be checked."""
 
     archive: "Archive"
     kinds: list[str] | None = None
     more: dict[str, str] = field(default_factory=dict)
     offer: str = ""
+    refused: str = ""
 
     @property
     def status(self) -> str:
@@ -182,6 +184,7 @@ def run_and_deliver(
     names: Iterable[str],
     *,
     pictures: "Callable[[Form], dict[str, str]]" = lambda form: {},
+    formed_before: bool = False,
 ) -> int:
     """Run the job of a case and write its form; the exit code.
 
@@ -190,6 +193,7 @@ def run_and_deliver(
     name : of the folder out/NAME.
     names : patterns of the files that are written in addition to result.json, states.npz and those of the kinds.
     pictures : more files of the form, by name.
+    formed_before : the form is on disk already; where its loads cannot be checked it is not written again.
     """
     from rodshell.output.files import reserved
 
@@ -205,11 +209,14 @@ def run_and_deliver(
             announce=None if output.quiet else _announce,
             frames_in=place.new,
         )
+        refused = "" if form.known_loaded is None else form.known_loaded.refused
+        if refused and formed_before:
+            raise InputError(refused)
         archive = form.archive()
         if form.search is not None and not (output.quiet or output.as_json):
             click.echo(form.search.table())
         offer = "" if output.quiet or output.as_json else _offer(form, progress)
-        kept = Kept(archive, output.kinds, pictures(form), offer)
+        kept = Kept(archive, output.kinds, pictures(form), offer, refused)
         return deliver(kept, kept.save, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
 
 
@@ -262,6 +269,9 @@ def deliver(
     elif not quiet:
         click.echo(result.summary())
         click.echo(f"written to {folder}")
+    if isinstance(result, Kept) and result.refused:
+        click.echo(f"rodshell: error: {result.refused}; the form is in {folder}, without its loads", err=True)
+        return BAD_INPUT
     if result.status != "converged":
         late = result.status.startswith("out of time")
         said = result.status if late else f"NOT CONVERGED: {result.status}"

@@ -133,6 +133,7 @@ class LoadChecks:
     braced : (d, 2) crossings that each brace joins, the rod ends counted on from them; without bracing there are none.
     limits : what the rods are judged by.
     stopped, missing : when a time limit came, or "", and which combinations were not reached.
+    refused : why the form cannot be checked under these loads, or "".
     frequencies : lowest natural frequencies of the shells without loads, with bracing and locked joints [Hz].
     """
 
@@ -142,15 +143,18 @@ class LoadChecks:
     limits: Limits
     stopped: str = ""
     missing: tuple[str, ...] = ()
+    refused: str = ""
     frequencies: Mapping[Ends, Floats] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        late = f", {self.stopped}" if self.stopped else ""
+        late = f", {self.stopped or self.refused}" if self.stopped or self.refused else ""
         return f"<LoadChecks of {', '.join(self.shells) or 'no combination'}{late}>"
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
+        if self.refused:
+            return (f"the loads were not checked: {self.refused}",)
         late = (f"{self.stopped}; not checked: {', '.join(self.missing)}",) if self.stopped else ()
         lost = tuple(
             f"under {name} with {ends} ends the path of the loaded shell could not be followed beyond "
@@ -231,7 +235,20 @@ def check_shells(
                 missing.pop(0)
     except OutOfTimeError as late:
         stopped = str(late)
-    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else (), vibrations)
+    return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else (), frequencies=vibrations)
+
+
+def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChecks:
+    """No checks of a form under these loads.
+
+    Parameters
+    ----------
+    loads : and their combinations.
+    refused, stopped : why: the loads do not fit the form, or a computation failed.
+    """
+    none: dict[str, dict[Ends, LoadedShell]] = {name: {} for name in loads.combinations}
+    braced = np.empty((0, 2), dtype=np.intp)
+    return LoadChecks(loads, none, braced, Limits(bending={}), stopped, tuple(none), refused)
 
 
 def _said(progress: Progress, where: str, what: str) -> None:

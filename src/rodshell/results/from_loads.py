@@ -39,7 +39,8 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
         },
         warnings=(*results.warnings, *checks.warnings),
     )
-    return found.changed(status=checks.stopped) if checks.stopped and found.status == "converged" else found
+    late = f"the loads were not checked: {checks.refused}" if checks.refused else checks.stopped
+    return found.changed(status=late) if late and found.status == "converged" else found
 
 
 def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
