@@ -75,6 +75,30 @@ def test_large_fronts_go_through_blas_and_still_agree():
     assert np.abs(matrix @ factors.solve(right) - right).max() < 1e-9
 
 
+def test_memory_that_was_not_set_is_not_read(monkeypatch):
+    """It may hold anything, also what is no number: minus one as an integer, for one. A thread may have set none."""
+    kernels = {"_numeric": (-4, -3), "_forward": (-2, -1), "_backward": (-2, -1)}  # places of their scratch memory
+    for name, places in kernels.items():
+
+        def spoilt(*given, kernel=getattr(sparse_ldl, name), places=places):
+            for place in places:
+                given[place][:] = np.nan
+            return kernel(*given)
+
+        monkeypatch.setattr(sparse_ldl, name, spoilt)
+
+    def spoilt_room(numbers):
+        memory = dense.room(numbers)
+        memory[:] = np.nan
+        return memory
+
+    monkeypatch.setattr(sparse_ldl, "room", spoilt_room)
+    matrix, places = grid_matrix(20)
+    triangle, right = upper(matrix), RANDOM.standard_normal(matrix.shape[0])
+    factors = Multifrontal(triangle.indptr, triangle.indices, places).factor(triangle.data)
+    np.testing.assert_allclose(matrix @ factors.solve(right), right, atol=1e-10 * np.abs(right).max())
+
+
 @pytest.mark.parametrize("bad", [False, True])
 def test_threads_share_the_work_and_change_no_bit(monkeypatch, bad):
     matrix, places = grid_matrix(50)

@@ -364,8 +364,8 @@ def _backward(part, x, first, row_start, rows, panel_start, panels, pivots, loca
         size, width = row_start[s + 1] - row_start[s], first[s + 1] - first[s]
         panel = panels[panel_start[s] : panel_start[s + 1]].reshape(width, padded(size))
         values = local[: padded(size)]
-        for i in range(size):
-            values[i] = x[rows[row_start[s] + i]]
+        for i in range(len(values)):
+            values[i] = x[rows[row_start[s] + i]] if i < size else 0.0
         backward(panel, pivots[first[s] : first[s + 1]], values, aside)
         for i in range(width):
             x[first[s] + i] = values[i]
